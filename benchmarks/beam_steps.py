@@ -3,8 +3,9 @@
 
     python3 benchmarks/beam_steps.py [--elements 100 1000 10000] [--repeat 5]
 
-The first way is the block elimination of its source (Ahn 2012), the second the schemes and solvers of this package.
-The times are the best of so many repetitions, with ledger and certificates, on one thread. Nothing else should run.
+The first way is the block elimination of its source (Ahn 2012), the second the schemes and solvers
+of this package. The times are the best of so many repetitions, with ledger and certificates, on one
+thread. Nothing else should run.
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def main() -> None:
     options.add_argument("--repeat", type=int, default=5)
     given = options.parse_args()
     print(
-        f"{STEPS} steps, seconds\n  elements   reading A   reading C   exact law   exact law through the contract"
+        f"{STEPS} steps, seconds\n  elements   reading A   reading C   exact law   exact law "
+        "through the contract"
     )
     for count in given.elements:
         print(

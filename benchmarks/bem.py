@@ -1,32 +1,35 @@
 #!/usr/bin/env python3
-"""Measure accuracy and cost of boundary elements against numbers of elements and steps, and motions over long times.
+"""Measure accuracy and cost of boundary elements against numbers of elements and steps, and motions
+over long times.
 
     python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long] [--thin]
     python3 benchmarks/bem.py --json [--k 40 80] [--n 240 480]
 
-The body is the unit square with c_P = 1, c_S = 1/2, rho = 1, k elements on a side, c_P dt = h, and the symmetric
-form. Every row is computed by one thread in a process of its own, and its seconds are processor time. Errors are
-relative L2 norms over all nodes and steps. Two problems have exact solutions: oblique plane pulses of duration 2 up
-to T = 4 in a square without supports, and the top of a rod between rollers under a step and under a sin² load up to T
-= 6.
+The body is the unit square with c_P = 1, c_S = 1/2, rho = 1, k elements on a side, c_P dt = h, and
+the symmetric form. Every row is computed by one thread in a process of its own, and its seconds are
+processor time. Errors are relative L2 norms over all nodes and steps. Two problems have exact
+solutions: oblique plane pulses of duration 2 up to T = 4 in a square without supports, and the top
+of a rod between rollers under a step and under a sin² load up to T = 6.
 
---steps adds rows with k = 10 and other numbers of steps. --long computes the rod up to T = 60 for c_P dt / h from 0.1
-to 4. --thin computes a rod of widths down to h/20 under the sin² load, with c_P dt = h and h/2, and by Radau IIA with
-c_P dt = h.
+--steps adds rows with k = 10 and other numbers of steps. --long computes the rod up to T = 60 for
+c_P dt / h from 0.1 to 4. --thin computes a rod of widths down to h/20 under the sin² load, with c_P
+dt = h and h/2, and by Radau IIA with c_P dt = h.
 
---json prints seconds and memory of two ways to store and to condense the blocks. "direct" stores dense blocks and
-marches with all columns. "compressed" interpolates the tails and uses a circle of frequencies. A row has these keys:
+--json prints seconds and memory of two ways to store and to condense the blocks. "direct" stores
+dense blocks and marches with all columns. "compressed" interpolates the tails and uses a circle of
+frequencies. A row has these keys:
 
 * k, steps, way;
 * assembly_s, condensation_s, and total_s, which is their sum;
 * march_s: the motion of the rod by the method of this way; it is left out beyond k = 40;
 * peak_mb, blocks_mb: memory;
-* ratio_to_direct: total_s over that of the direct way, measured in the same run at k = 20 and 120 steps. For larger k
-  it is over the direct cost that follows from it: assembly grows like N n², condensation like N² n² (k + 1);
+* ratio_to_direct: total_s over that of the direct way, measured in the same run at k = 20 and 120
+  steps. For larger k it is over the direct cost that follows from it: assembly grows like N n²,
+  condensation like N² n² (k + 1);
 * error_against_exact: relative L2 error of the rod under the sin² load.
 
-growth has the exponents of total_s in N at k = 10 between the two largest numbers of steps, before (direct) and after
-(compressed). --k and --n are the sizes of the compressed rows.
+growth has the exponents of total_s in N at k = 10 between the two largest numbers of steps, before
+(direct) and after (compressed). --k and --n are the sizes of the compressed rows.
 """
 
 from __future__ import annotations
@@ -189,7 +192,8 @@ def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
 
 
 def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
-    """Greatest displacement (exact: 1) and work after the load in the first and last ten time units."""
+    """Greatest displacement (exact: 1) and work after the load in the first and last ten time
+    units."""
     dt = ratio / k
     blocks = bem.energetic_blocks(
         bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=dt, steps=round(end / dt)
@@ -236,7 +240,8 @@ def main() -> None:
     chosen = parser.parse_args()
     if chosen.n and len(chosen.n) != len(chosen.k):
         parser.error(
-            f"--n has {len(chosen.n)} numbers, --k {len(chosen.k)}; give one number of steps for each k"
+            f"--n has {len(chosen.n)} numbers, --k {len(chosen.k)}; give one number of steps for "
+            "each k"
         )
     if chosen.one:
         print(json.dumps(row(chosen.one[0], chosen.one[1], errors=bool(chosen.one[2]))))

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Compare convolution quadrature with the energetic boundary elements: accuracy and cost on the problems of bem.py.
+"""Compare convolution quadrature with the energetic boundary elements: accuracy and cost on the
+problems of bem.py.
 
     python3 benchmarks/bem_convolution.py [--sides 10 20] [--methods convolution energetic]
 
-The body is the unit square with k elements on a side, c_P dt = h, T = 6, N = 6 k steps, and the symmetric form. Every
-row is computed by one thread in a process of its own, and its seconds are processor time. Errors are those of bem.py.
-The contact problem is the pressed square under Tresca's friction. Its columns are the impulse at t = 4, the energy at
-t = 2, and the iterations of Uzawa's method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than
+The body is the unit square with k elements on a side, c_P dt = h, T = 6, N = 6 k steps, and the
+symmetric form. Every row is computed by one thread in a process of its own, and its seconds are
+processor time. Errors are those of bem.py. The contact problem is the pressed square under Tresca's
+friction. Its columns are the impulse at t = 4, the energy at t = 2, and the iterations of Uzawa's
+method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than
 2000. The last column is the greatest eigenvalue of W_0.
 """
 
@@ -63,7 +65,8 @@ Forces = Callable[[float, int], np.ndarray]
 
 
 def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.ndarray]]:
-    """problem(forces, fixed=, contact=), and the loads it takes from mean forces of any number of steps."""
+    """problem(forces, fixed=, contact=), and the loads it takes from mean forces of any number of
+    steps."""
     mesh, dt, steps = bem.polygon(SQUARE, 1.0 / k), 1.0 / k, 6 * k
     if method == "energetic":
         operator = bem.PoincareSteklov(

@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
-"""Measure the error of both forms of the Poincaré-Steklov operator: its squared energy norm against h, and the slope.
+"""Measure the error of both forms of the Poincaré-Steklov operator: its squared energy norm against
+h, and the slope.
 
-    python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40] [--examples square "concrete on steel"]
-        [--supports rollers clamped "Tresca 0.05"] [--json FILE] [--figure docs/figures/bem_error_of_forms.png]
+    python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40] [--examples square "concrete on
+    steel"]
+        [--supports rollers clamped "Tresca 0.05"] [--json FILE] [--figure
+        docs/figures/bem_error_of_forms.png]
 
-The examples are the pressed square under a step and the concrete box under its slow load. c_P dt / h is fixed, and a
-side has k elements. The base is on rollers, clamped, or in contact with friction. Every level is compared with the
-finest symmetric solution. demos/problems/error_of_forms.py defines errors, slopes and the error of the reference.
+The examples are the pressed square under a step and the concrete box under its slow load. c_P dt /
+h is fixed, and a side has k elements. The base is on rollers, clamped, or in contact with friction.
+Every level is compared with the finest symmetric solution. demos/problems/error_of_forms.py defines
+errors, slopes and the error of the reference.
 
---json FILE writes rows with the keys case, form, k, finest, error_squared, energy_difference, slope,
-local_slopes, settled, reference_error, cosine and certificate. Rows of other cases that
-the file has already stay, and the figure shows all.
+--json FILE writes rows with the keys case, form, k, finest, error_squared, energy_difference,
+slope, local_slopes, settled, reference_error, cosine and certificate. Rows of other cases that the
+file has already stay, and the figure shows all.
 """
 
 from __future__ import annotations
@@ -40,8 +44,8 @@ def table(rows: list[dict[str, Any]]) -> str:
         local = " ".join(f"{slope:.2f}" for slope in row["local_slopes"])
         lines.append(
             f"{row['case']:<32}{row['form']:<13}{row['k']:>4}{row['error_squared']:>11.3e}"
-            f"{row['reference_error']:>11.3e}{row['energy_difference']:>11.3e}{row['slope']:>7.2f}  {local}"
-            + ("" if row["settled"] else "  not settled")
+            f"{row['reference_error']:>11.3e}{row['energy_difference']:>11.3e}{row['slope']:>7.2f} "
+            f" {local}" + ("" if row["settled"] else "  not settled")
         )
     return "\n".join(lines)
 

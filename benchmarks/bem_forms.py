@@ -1,17 +1,21 @@
 #!/usr/bin/env python3
-"""Compare both forms of the Poincaré-Steklov operator: contact by each form, positivity, thin and sharp bodies.
+"""Compare both forms of the Poincaré-Steklov operator: contact by each form, positivity, thin and
+sharp bodies.
 
     python3 benchmarks/bem_forms.py [--sides 5 10 20] [--laws none Tresca Coulomb] [--json] [--thin]
 
-The unit square is pressed on its top by a unit step, with c_P = 1, c_S = 1/2, rho = 1, k elements on a side, c_P dt =
-h and T = 6. It has no friction, Tresca's threshold 0.05, or Coulomb's coefficient 0.5. The rows have the impulse of
-the contact forces at t = 4 and the energy, the work of all forces, at t = 2. Differences between the forms are the
-largest over all steps, relative to the largest impulse and energy of the symmetric form. The eigenvalues are those of
-the symmetric part of the space-time matrix of the whole boundary: k = 5 with 20 steps, k = 10 with 16, k = 20 with 8.
+The unit square is pressed on its top by a unit step, with c_P = 1, c_S = 1/2, rho = 1, k elements
+on a side, c_P dt = h and T = 6. It has no friction, Tresca's threshold 0.05, or Coulomb's
+coefficient 0.5. The rows have the impulse of the contact forces at t = 4 and the energy, the work
+of all forces, at t = 2. Differences between the forms are the largest over all steps, relative to
+the largest impulse and energy of the symmetric form. The eigenvalues are those of the symmetric
+part of the space-time matrix of the whole boundary: k = 5 with 20 steps, k = 10 with 16, k = 20
+with 8.
 
---thin computes two bodies. The first is the rod between rollers under a sin² load with h = 0.1: the relative L2 error
-of its top up to T = 6 at c_P dt = h/2. The second is the triangle (0, 0), (1, 0), (1, 0.12), which plane pulses
-cross. Their eigenvalues are those of 12 steps with h = 1/8 and c_P dt = h.
+--thin computes two bodies. The first is the rod between rollers under a sin² load with h = 0.1: the
+relative L2 error of its top up to T = 6 at c_P dt = h/2. The second is the triangle (0, 0), (1, 0),
+(1, 0.12), which plane pulses cross. Their eigenvalues are those of 12 steps with h = 1/8 and c_P dt
+= h.
 """
 
 from __future__ import annotations
@@ -60,7 +64,8 @@ TRIANGLE = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.12)]
 
 
 def spectrum(blocks: bem.EnergeticBlocks, form: str, steps: int) -> np.ndarray:
-    """Eigenvalues of the symmetric part of the space-time matrix of S, on the whole boundary, in increments."""
+    """Eigenvalues of the symmetric part of the space-time matrix of S, on the whole boundary, in
+    increments."""
     n = 2 * len(blocks.mesh)
     held = np.broadcast_to(np.eye(n), (steps, n, n))
     columns = marched(
@@ -160,7 +165,8 @@ def positivity(mesh: bem.BoundaryMesh, form: str) -> dict[str, Any]:
 
 
 def below_zero(values: np.ndarray) -> dict[str, Any]:
-    """How many of these eigenvalues are negative, the smallest, and how many there are; none where not computed."""
+    """How many of these eigenvalues are negative, the smallest, and how many there are; none where
+    not computed."""
     if not len(values):
         return dict.fromkeys(("negative_eigenvalues", "smallest_eigenvalue", "eigenvalues"))
     return {

@@ -1,26 +1,30 @@
 #!/usr/bin/env python3
-"""Measure what the mesh (H, DT) of the contact multiplier does beside the mesh (h, dt) of the displacements.
+"""Measure what the mesh (H, DT) of the contact multiplier does beside the mesh (h, dt) of the
+displacements.
 
-    python3 benchmarks/bem_multiplier.py [--sides 8 16 24] [--finest 32] [--json FILE] [--figure FILE]
+    python3 benchmarks/bem_multiplier.py [--sides 8 16 24] [--finest 32] [--json FILE] [--figure
+    FILE]
 
-A square is under the pressure 1 until t = 4, with c_P dt = 0.9 h and h = 1/k, without friction and with Tresca's
-threshold 0.05. H/h and DT/dt are 1, 2, 3, 4 and 8, in space alone, in time alone and in both. Contact is tested at
-the ends of intervals or in the mean. "degree" is the degree of lambda on a patch, and "sigma" belongs to the weight
-of the means.
+A square is under the pressure 1 until t = 4, with c_P dt = 0.9 h and h = 1/k, without friction and
+with Tresca's threshold 0.05. H/h and DT/dt are 1, 2, 3, 4 and 8, in space alone, in time alone and
+in both. Contact is tested at the ends of intervals or in the mean. "degree" is the degree of lambda
+on a patch, and "sigma" belongs to the weight of the means.
 
 * inf_sup: the constant of the pairing, space times time (demos/problems/inf_sup.py);
-* step: the smallest eigenvalue of the normal flexibility of one interval per length, over DT/(rho c_P).
+* step: the smallest eigenvalue of the normal flexibility of one interval per length, over DT/(rho
+  c_P).
 
-The other columns compare with nodal forces that are tested at the ends of steps, on a mesh with --finest elements on
-a side:
+The other columns compare with nodal forces that are tested at the ends of steps, on a mesh with
+--finest elements on a side:
 
-* oscillation: the largest second difference of the error of the contact force (means over intervals), over four times
-  the largest force;
+* oscillation: the largest second difference of the error of the contact force (means over
+  intervals), over four times the largest force;
 * impulse_error: the largest error of the contact impulse, over the largest impulse;
 * energy_error: the largest error of the energy of the body, over the largest energy;
 * multiplier_error: the error of the pressure in L2 of space and time, without the ends of the side;
 * t, force, finest: histories of the force, and of the means of the finest force;
-* uzawa: iterations to 1e-8 without friction with rho = 0.4/lambda_max(W[0]); null means more than 2000.
+* uzawa: iterations to 1e-8 without friction with rho = 0.4/lambda_max(W[0]); null means more than
+  2000.
 """
 
 from __future__ import annotations
@@ -51,7 +55,8 @@ RATIOS = (1, 2, 3, 4, 8)
 SIGMAS = (0.125, 0.25, 0.5, 1.0)  # sigma DT
 T_END = 4.0
 STEP = 0.9  # c_P dt / h: fronts then come inside of intervals, whatever their length
-TOLERANCE = 1e-6  # of certificates: before the front comes displacements are 1e-20, penetrations round-off of these
+# of certificates: before the front comes displacements are 1e-20, penetrations round-off of these
+TOLERANCE = 1e-6
 RHO, MOST = 0.4, 2000  # of Uzawa's step, of 1/lambda_max(W[0]); of his iterations
 INNER = 0.375  # |x| up to which pressures are compared: corners of a rubbing square are singular
 KEYS = (
@@ -74,7 +79,8 @@ KEYS = (
 
 @dataclass(frozen=True)
 class Answer:
-    """Impulse, energy and pressure of a run at times t, the first 0; pressure: of points x in each interval."""
+    """Impulse, energy and pressure of a run at times t, the first 0; pressure: of points x in each
+    interval."""
 
     t: np.ndarray
     impulse: np.ndarray
@@ -103,7 +109,8 @@ def answer(
 
 
 def errors(found: Answer, fine: Answer) -> dict[str, Any]:
-    """Histories of the contact force (means over intervals), oscillation and errors beside the finest answer."""
+    """Histories of the contact force (means over intervals), oscillation and errors beside the
+    finest answer."""
     t = found.t[found.t <= T_END * (1.0 + 1e-9)]
     n, exact = len(t), np.interp(t, fine.t, fine.impulse)
     force, wrong = (np.diff(history) / np.diff(t) for history in (exact, found.impulse[:n] - exact))

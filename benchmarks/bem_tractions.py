@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Compare contact tractions of boundary elements with those of finite elements on the pressed square.
+"""Compare contact tractions of boundary elements with those of finite elements on the pressed
+square.
 
     python3 benchmarks/bem_tractions.py [--elements 20 40] [--cells 80 160] [--json FILE]
 
-The unit square has c_P = 1, c_S = 1/2 and a unit pressure on its top from t = 0 to 5; c_P dt = h for both methods.
-Forces on the nodes of the finite elements are collected on those of the boundary elements
-(demos/problems/compare_tractions.py), on the whole contact boundary with its ends. The numbers are relative L2
-differences. "0.2 s" compares means over windows of time, and "patches" compares means over hat functions 0.1 wide
-too. "early" is until t = 3, at nodes two elements or more from the ends. "late" is the same from t = 3 to 5.
+The unit square has c_P = 1, c_S = 1/2 and a unit pressure on its top from t = 0 to 5; c_P dt = h
+for both methods. Forces on the nodes of the finite elements are collected on those of the boundary
+elements (demos/problems/compare_tractions.py), on the whole contact boundary with its ends. The
+numbers are relative L2 differences. "0.2 s" compares means over windows of time, and "patches"
+compares means over hat functions 0.1 wide too. "early" is until t = 3, at nodes two elements or
+more from the ends. "late" is the same from t = 3 to 5.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ COLUMNS = ("step", "0.1 s", "0.2 s", "patches", "early", "late")
 
 
 def row(both: Tractions) -> dict[str, float]:
-    """Differences in means over windows, patches, and apart: before and after the unloading wave, without the ends."""
+    """Differences in means over windows, patches, and apart: before and after the unloading wave,
+    without the ends."""
     inner = np.abs(both.x) < 0.5 - 1.5 * np.diff(both.x)[0]
     windows = {"step": 0.0, "0.1 s": 0.1, "0.2 s": 0.2}
     return {name: both.difference(window=window) for name, window in windows.items()} | {

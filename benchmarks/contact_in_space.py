@@ -1,13 +1,17 @@
 #!/usr/bin/env python3
-"""Measure the error of contact of spheres on meshes that do not match, and how it falls with the cells.
+"""Measure the error of contact of spheres on meshes that do not match, and how it falls with the
+cells.
 
-    python3 benchmarks/contact_in_space.py [--hertz 4 8 16] [--mindlin 4 8 12] [--torsion 4 6 8] [--json FILE]
+    python3 benchmarks/contact_in_space.py [--hertz 4 8 16] [--mindlin 4 8 12] [--torsion 4 6 8]
+    [--json FILE]
 
-The numbers are cells across the radius a of contact. A problem without numbers is left out. Hertz has three problems:
-a sphere on a rigid plane, two spheres, and a sphere of steel on a block of aluminium; the error is the mean over
-twelve approaches. Cattaneo and Mindlin press two spheres, push them by Q along x, and back. Torsion turns two spheres
-with Coulomb friction. tests/support/spheres.py says what is measured. P, Q and T are the forces and the moment by
-which the contact answers to given motions of the bodies far away. Errors are in per cent, and c/a is in per cent of
+The numbers are cells across the radius a of contact. A problem without numbers is left out. Hertz
+has three problems: a sphere on a rigid plane, two spheres, and a sphere of steel on a block of
+aluminium; the error is the mean over twelve approaches. Cattaneo and Mindlin press two spheres,
+push them by Q along x, and back. Torsion turns two spheres with Coulomb friction.
+tests/support/spheres.py says what is measured. P, Q and T are the forces and the moment by which
+the contact answers to given motions of the bodies far away. Errors are in per cent, and c/a is in
+per cent of
 1. "order" is the order of the absolute error between this number of cells and the one before.
 """
 

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Measure what a step with Coulomb friction costs, as a multiple of a plain linear step with the same matrix.
+"""Measure what a step with Coulomb friction costs, as a multiple of a plain linear step with the
+same matrix.
 
     python3 benchmarks/friction_cost.py [--sizes 2e4 2e5] [--steps 60] [--mu 0.3]
 
-The model is the wall of step_cost.py with its whole right side in possible contact. A vertical harmonic motion acts
-beside the horizontal one, so that points open, stick and slip. The certificate is on and nothing is recorded. Seconds
-are processor time of one thread. A linear step, by the fastest of three factors, is timed beside every step with
-contact. The rows have medians over the steps with contact, and the mean ratio.
+The model is the wall of step_cost.py with its whole right side in possible contact. A vertical
+harmonic motion acts beside the horizontal one, so that points open, stick and slip. The certificate
+is on and nothing is recorded. Seconds are processor time of one thread. A linear step, by the
+fastest of three factors, is timed beside every step with contact. The rows have medians over the
+steps with contact, and the mean ratio.
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ ROUTES: dict[str, Any] = {
     ),
 }
 HEADER = (
-    f"{'unknowns':>9} {'points':>6} {'route':<21} {'linear ms':>9} {'step ms':>9} {'ratio':>6} {'mean':>6} {'iter':>5}"
+    f"{'unknowns':>9} {'points':>6} {'route':<21} {'linear ms':>9} {'step ms':>9} {'ratio':>6} "
+    f"{'mean':>6} {'iter':>5}"
     f" {'closed':>6} {'slip':>5} {'certificate':>11}"
 )
 
@@ -46,7 +49,8 @@ HEADER = (
 def measured(
     problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: Linear
 ) -> dict[str, Any]:
-    """``count`` steps with contact, each beside a linear step; a third as many before them are not counted."""
+    """``count`` steps with contact, each beside a linear step; a third as many before them are not
+    counted."""
     steps = StepsWithContact(problem, solver, dt, count, linear)
     iterations, slipping = [], []
     for report in steps:
@@ -80,8 +84,10 @@ def measure(size: float, steps: int, mu: float) -> None:
         problem = plain if name == "no friction" else replace(plain, friction=vc.Coulomb(mu))
         f = measured(problem, solver, dt, steps, linear)
         print(
-            f"{model.system.space.unknowns:>9} {problem.surface.total:>6} {name:<21} {f['linear']:>9.3f}"
-            f" {f['step']:>9.3f} {f['ratio']:>6.2f} {f['mean']:>6.2f} {f['iterations']:>5.1f} {f['closed']:>6.1f}"
+            f"{model.system.space.unknowns:>9} {problem.surface.total:>6} {name:<21} "
+            f"{f['linear']:>9.3f}"
+            f" {f['step']:>9.3f} {f['ratio']:>6.2f} {f['mean']:>6.2f} {f['iterations']:>5.1f} "
+            f"{f['closed']:>6.1f}"
             f" {f['slip']:>5.1f} {f['worst']:>11.1e}",
             flush=True,
         )

@@ -1,20 +1,23 @@
 #!/usr/bin/env python3
-"""Measure what an incremental dynamic analysis costs with eight runs in a process, and with a process for each.
+"""Measure what an incremental dynamic analysis costs with eight runs in a process, and with a
+process for each.
 
     python3 benchmarks/ida.py [--records 20] [--scales 5] [--duration 4] [--mesh 4 6] [--json FILE]
-    python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= --scales 10 --step 0.2 \
+    python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= --scales 10
+    --step 0.2 \
         --duration 10 --jobs 2
 
-The case is the wall of demos/cases/wall_record.toml, which begins under its weight and slides with Coulomb friction,
-under synthetic motions. It may be another case with contact and with a probe called "top". The row has these keys:
+The case is the wall of demos/cases/wall_record.toml, which begins under its weight and slides with
+Coulomb friction, under synthetic motions. It may be another case with contact and with a probe
+called "top". The row has these keys:
 
 * ``records``, ``scales``, ``runs``, ``unknowns``, and ``steps`` of a run;
-* ``seconds_apart`` and ``seconds_together``: processor time of all processes of a study, from the command to its
-  table and figure; ``ratio`` is the ratio of the two;
-* ``wall_seconds_apart``, ``wall_seconds_together`` and ``wall_ratio``: the same by the clock, with so many ``jobs``
-  at a time;
-* ``worst_difference``: the largest difference between the demands of the two studies, over the largest of each
-  demand.
+* ``seconds_apart`` and ``seconds_together``: processor time of all processes of a study, from the
+  command to its table and figure; ``ratio`` is the ratio of the two;
+* ``wall_seconds_apart``, ``wall_seconds_together`` and ``wall_ratio``: the same by the clock, with
+  so many ``jobs`` at a time;
+* ``worst_difference``: the largest difference between the demands of the two studies, over the
+  largest of each demand.
 """
 
 from __future__ import annotations

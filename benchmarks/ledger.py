@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
-"""How far rounding carries the energy, and how far the energy ledger closes, for every time scheme and solver.
+"""How far rounding carries the energy, and how far the energy ledger closes, for every time scheme
+and solver.
 
     python3 benchmarks/ledger.py [--steps 1000] [--only Midpoint] [--json]
 
-Two runs of a block of 16 x 8 bilinear elements, 1 m high, without damping: *free*, it swings on a clamped side and
-touches nothing; *thrown*, it falls obliquely on a plane and rubs on it. Time steps have the Courant number 0.02, so
-that the quickest wave takes fifty of them for an element. Printed are
+Two runs of a block of 16 x 8 bilinear elements, 1 m high, without damping: *free*, it swings on a
+clamped side and touches nothing; *thrown*, it falls obliquely on a plane and rubs on it. Time steps
+have the Courant number 0.02, so that the quickest wave takes fifty of them for an element. Printed
+are
 
     drift   largest |E/E(0) - 1| of the free run, E its energy, for schemes that keep the energy
     defect  what the ledger of all steps cannot explain, over the largest energy, of the free and of the thrown run
 
-The table of docs/guide/schemes.md has the numbers. They are rounding errors: another BLAS gives others of their size.
+The table of docs/guide/schemes.md has the numbers. They are rounding errors: another BLAS gives
+others of their size.
 """
 
 from __future__ import annotations

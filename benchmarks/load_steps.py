@@ -10,8 +10,8 @@ steps and held sideways. No node of its boundary may pass the floor at height 0,
 step starts from the answer of the step before.
 
 "SNES" is PETSc's vinewtonrsls with the line search bt and a factor of MUMPS in every iteration. Its
-Dirichlet data are lifted as DOLFINx does it: the residual of the free unknowns is that of the linear
-step to the prescribed values. A tolerance of 1e-9 relative to the first residual ends it.
+Dirichlet data are lifted as DOLFINx does it: the residual of the free unknowns is that of the
+linear step to the prescribed values. A tolerance of 1e-9 relative to the first residual ends it.
 
 Each row is one size of mesh and of step; it ends at the first step that fails. ``iterations`` are
 Newton steps of all load steps, ``linear`` the iterations of the linear methods in them,
@@ -64,7 +64,8 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Block:
-    """Hold the block: its displacement u, energy and F, the condition at the top with its values g, and the floor."""
+    """Hold the block: its displacement u, energy and F, the condition at the top with its values g,
+    and the floor."""
 
     u: Any
     energy: Any
@@ -130,7 +131,8 @@ class Snes:
         self.posed.u.x.scatter_forward()
 
     def function(self, _snes: Any, x: Any, R: Any) -> None:
-        """F at free unknowns, with what the linear step to the prescribed values adds; u - g at held ones."""
+        """F at free unknowns, with what the linear step to the prescribed values adds; u - g at
+        held ones."""
         self.put(x)
         F = compat.assemble_vector(self.F)
         off = x.array_r[self.held] - self.posed.g.x.array[self.held]
@@ -187,7 +189,8 @@ class Snes:
 def run(
     posed: Block, count: int, solve: Callable[[], Any]
 ) -> tuple[list[Any], list[float], list[Any], int]:
-    """Take the load steps until one fails; return what each gave, its time on the busiest rank, u, and failures."""
+    """Take the load steps until one fails; return what each gave, its time on the busiest rank, u,
+    and failures."""
     given, seconds, fields = [], [], []
     for k in range(count):
         posed.lower_top(DOWN * (k + 1) / count)
@@ -259,7 +262,8 @@ def main(arguments: list[str] | None = None) -> int:
     )  # the forms are compiled here
     if COMM.rank == 0:
         print(
-            "cells  step | vi.solve: solved, Newton, linear, certificate | SNES: solved, factors | time ratio"
+            "cells  step | vi.solve: solved, Newton, linear, certificate | SNES: solved, factors | "
+            "time ratio"
         )
     for cells in given.cells:
         for step in given.steps:
@@ -267,8 +271,10 @@ def main(arguments: list[str] | None = None) -> int:
             rows.append(one)
             if COMM.rank == 0:
                 print(
-                    f"{cells:>5} {step:>5} | {one['solved']:>4} {one['iterations']:>4} {one['linear']:>4} "
-                    f"{one['certificate']:.0e} | {one['snes_solved']:>4} {one['snes_factorisations']:>4} | "
+                    f"{cells:>5} {step:>5} | {one['solved']:>4} {one['iterations']:>4} "
+                    f"{one['linear']:>4} "
+                    f"{one['certificate']:.0e} | {one['snes_solved']:>4} "
+                    f"{one['snes_factorisations']:>4} | "
                     f"{one['ratio']:.2f}",
                     flush=True,
                 )

@@ -4,9 +4,10 @@
     python3 benchmarks/long_steps.py [--t-end 3] [--only HHT]
     python3 benchmarks/long_steps.py --others     # a stockier wall, a free block and two bars
 
-The wall of docs/notebooks/shaken_wall.md on 2 x 12 bilinear elements, beside rigid ground, is shaken at 3 m/s². The
-table of docs/guide/schemes.md has a row for each scheme and a column for each time step: the energy that contact and
-scheme created, as a share of the largest energy of the run. Growth is chaotic, so that shares are printed in classes.
+The wall of docs/notebooks/shaken_wall.md on 2 x 12 bilinear elements, beside rigid ground, is
+shaken at 3 m/s². The table of docs/guide/schemes.md has a row for each scheme and a column for each
+time step: the energy that contact and scheme created, as a share of the largest energy of the run.
+Growth is chaotic, so that shares are printed in classes.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ def wall(divisions: tuple[int, int] = (2, 12), degree: int = 1) -> vc.ContactPro
 
 
 def readme_wall() -> vc.ContactProblem:
-    """The wall of README, of 8 x 12 elements; a wave needs 0.26 ms for the shorter edge of an element."""
+    """The wall of README, of 8 x 12 elements; a wave needs 0.26 ms for the shorter edge of an
+    element."""
     mesh, tags = fem.build_mesh(WallMesh(height=9.0, width=6.0, divisions=(8, 12)), MPI.COMM_WORLD)
     concrete = vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
     system = fem.assemble(
@@ -80,7 +82,8 @@ def readme_wall() -> vc.ContactProblem:
 
 
 def block() -> vc.ContactProblem:
-    """A unit square of 16 x 16 elements that falls on the ground; a wave needs 1.7 ms for an element."""
+    """A unit square of 16 x 16 elements that falls on the ground; a wave needs 1.7 ms for an
+    element."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(16, 16)), MPI.COMM_WORLD)
     rubber, weight = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0), fem.BodyForce((0.0, -10.0))
     system = fem.assemble(
@@ -143,7 +146,8 @@ def main() -> None:
                 print(
                     title,
                     name,
-                    f"Courant number {courant:g}: created {100.0 * done.facts['energy_created']:.2g} %,",
+                    f"Courant number {courant:g}: created "
+                    f"{100.0 * done.facts['energy_created']:.2g} %,",
                     ", ".join(f"{what} {value:.3g} J" for what, value in end.items()),
                     flush=True,
                 )

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Measure what a step costs when several runs are marched together, as a multiple of the step of a run alone.
+"""Measure what a step costs when several runs are marched together, as a multiple of the step of a
+run alone.
 
     python3 benchmarks/many_runs.py [--sizes 2e3] [--rounds 5] [--json FILE]
 
-The model is the wall of step_cost.py with its whole right side in possible contact. Harmonic motions of different
-amplitude and frequency shake it. ``march_many`` of k runs is timed beside k times ``march``, in turn. ``cost_ratio``
-is the processor time per run and step over that of single runs, the median of the rounds. Set-up is in neither time,
-and nobody reads the reports. ``worst_difference`` compares a step with the single step that begins with the same
-state: the largest difference in u and v over their largest entries.
+The model is the wall of step_cost.py with its whole right side in possible contact. Harmonic
+motions of different amplitude and frequency shake it. ``march_many`` of k runs is timed beside k
+times ``march``, in turn. ``cost_ratio`` is the processor time per run and step over that of single
+runs, the median of the rounds. Set-up is in neither time, and nobody reads the reports.
+``worst_difference`` compares a step with the single step that begins with the same state: the
+largest difference in u and v over their largest entries.
 """
 
 from __future__ import annotations
@@ -124,7 +126,8 @@ def line(row: dict[str, Any]) -> str:
     """A row of the table."""
     return (
         f"{row['unknowns']:>8} {row['runs']:>5} {1e6 * row['seconds_per_step']:>14.0f} "
-        f"{1e6 * row['seconds_per_single_step']:>10.0f} {row['cost_ratio']:>6.2f} {row['worst_difference']:>11.1e}"
+        f"{1e6 * row['seconds_per_single_step']:>10.0f} {row['cost_ratio']:>6.2f} "
+        f"{row['worst_difference']:>11.1e}"
     )
 
 
@@ -137,7 +140,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the rows into this file")
     options = parser.parse_args()
     print(
-        f"{'unknowns':>8} {'runs':>5} {'us/run + step':>14} {'alone us':>10} {'ratio':>6} {'difference':>11}"
+        f"{'unknowns':>8} {'runs':>5} {'us/run + step':>14} {'alone us':>10} {'ratio':>6} "
+        f"{'difference':>11}"
     )
     rows = [row for size in options.sizes for row in measured(size, options.rounds)]
     if options.json:

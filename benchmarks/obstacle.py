@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Measure what bounds on a field cost: ``vi.solve`` beside PETSc's SNESVI, on the membrane over a ball.
+"""Measure what bounds on a field cost: ``vi.solve`` beside PETSc's SNESVI, on the membrane over a
+ball.
 
     python3 benchmarks/obstacle.py [--cells 449] [--json FILE]
     mpirun -n 2 python3 benchmarks/obstacle.py
 
-First comes the cost at 2e5 unknowns: processor time of the busiest rank from the forms to the answer, without a first
-guess. "plain" is SNES vinewtonrsls as users set it up, with PETSc's tolerances, but without a line search and with
-MUMPS, which is its quickest setting. Then SNESVI with all defaults of PETSc stands beside ``vi.solve`` on a small
-mesh. It starts from nothing, from the solution, and with heights in another unit. ``wrong`` counts unknowns on the
-wrong side of the active set. ``error`` is the error of u, relative to its size, against ``vi.solve``.
+First comes the cost at 2e5 unknowns: processor time of the busiest rank from the forms to the
+answer, without a first guess. "plain" is SNES vinewtonrsls as users set it up, with PETSc's
+tolerances, but without a line search and with MUMPS, which is its quickest setting. Then SNESVI
+with all defaults of PETSc stands beside ``vi.solve`` on a small mesh. It starts from nothing, from
+the solution, and with heights in another unit. ``wrong`` counts unknowns on the wrong side of the
+active set. ``error`` is the error of u, relative to its size, against ``vi.solve``.
 """
 
 from __future__ import annotations
@@ -60,7 +62,8 @@ CASES = (  # what, size of u, whether it starts from the solution
 
 
 def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
-    """PETSc's reason, iterations and x (free and clamped unknowns) of SNES vinewtonrsls, from posed.u."""
+    """PETSc's reason, iterations and x (free and clamped unknowns) of SNES vinewtonrsls, from
+    posed.u."""
     A, V = compat.assemble_matrix(compat.compile_form(posed.a)), posed.u.function_space
     n = V.dofmap.index_map.size_local
     clamped, values = np.zeros(n, dtype=bool), posed.exact.x.array[:n]
@@ -199,7 +202,8 @@ def main(arguments: list[str]) -> int:
         for row in rows:
             case, reason, its, wrong, error, ours, worst = (row[key] for key in COLUMNS)
             print(
-                f"{case:<18} {reason:<24} {its:>4} {wrong:>6} {error:>8.1e} {ours:>14} {worst:>12.1e}"
+                f"{case:<18} {reason:<24} {its:>4} {wrong:>6} {error:>8.1e} {ours:>14} "
+                f"{worst:>12.1e}"
             )
         if given.json:
             given.json.write_text(json.dumps({**numbers, "snesvi_by_default": rows}, indent=1))

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Measure the building on a raft of demos/raft.py: what it costs at several sizes, and what halving h and dt changes.
+"""Measure the building on a raft of demos/raft.py: what it costs at several sizes, and what halving
+h and dt changes.
 
     python3 benchmarks/raft.py                          # costs at 2e4 and 1e5 unknowns
     python3 benchmarks/raft.py --sizes 2e4 1e5 3e5 --steps 8    # the table of the guide: seven minutes, 7 GB
@@ -8,9 +9,10 @@
     python3 benchmarks/raft.py --halving                # runs of 5 s on three meshes, and with three time steps
     python3 benchmarks/raft.py --json raft.json         # all of it as a file too
 
-Costs are seconds of processor time of rank 0: of the stages of set-up, of the first step, which prepares its solver,
-and the mean of those after it. For them the building starts from its rest with a rocking velocity about x and y, which
-lifts half of the raft at once: contact sets change from step to step, and no earthquake has to arrive first.
+Costs are seconds of processor time of rank 0: of the stages of set-up, of the first step, which
+prepares its solver, and the mean of those after it. For them the building starts from its rest with
+a rocking velocity about x and y, which lifts half of the raft at once: contact sets change from
+step to step, and no earthquake has to arrive first.
 """
 
 from __future__ import annotations
@@ -71,8 +73,8 @@ class Timer:
 def cost(
     finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity: bool
 ) -> dict[str, Any]:
-    """Return what set-up and steps of one mesh cost; without ``gravity`` its stage is left out, and the weight falls on
-    bodies without stresses."""
+    """Return what set-up and steps of one mesh cost; without ``gravity`` its stage is left out, and
+    the weight falls on bodies without stresses."""
     timer = Timer()
     mesh, tags = timer("mesh", raft.meshed, finer, COMM)
     static, problem = timer("assembling, contact", raft.problems, mesh, tags)

@@ -1,20 +1,22 @@
 #!/usr/bin/env python3
-"""Measure what a contact step costs in three dimensions without any factor, in products with the matrix of the step.
+"""Measure what a contact step costs in three dimensions without any factor, in products with the
+matrix of the step.
 
     python3 benchmarks/scale.py [--sizes 6e4 1e6] [--json FILE]
     mpirun -n 2 python3 benchmarks/scale.py --sizes 2e5
 
-The body is a block of two layers, the upper one ten times stiffer, on a wavy rigid plane; all of its lower face may
-touch. Some steps are those of the thrown block with the default scheme at Courant numbers C = c_p dt / h of 1 and 10,
-after a common history at C = 10. Others, at C = 100 and in statics, are those of a block at rest whose top is pushed
-down slowly. The plain linear problem is solved for the same steps: with the same A, load, tolerance, preconditioner
-and guess, and without contact.
+The body is a block of two layers, the upper one ten times stiffer, on a wavy rigid plane; all of
+its lower face may touch. Some steps are those of the thrown block with the default scheme at
+Courant numbers C = c_p dt / h of 1 and 10, after a common history at C = 10. Others, at C = 100 and
+in statics, are those of a block at rest whose top is pushed down slowly. The plain linear problem
+is solved for the same steps: with the same A, load, tolerance, preconditioner and guess, and
+without contact.
 
-Times are processor time of the busiest rank. ``flops`` are its operations in a step, as PETSc counts them; they show
-how ranks share the work, whatever else the machine does. A product is one with A as AIJ, timed in the same run.
-``peak_bytes`` includes set-up. ``bytes_per_unknown`` is the memory while stepping (Linux), with mesh, M, K and A, and
-without the memory that Python and its libraries take before the first mesh. On small blocks the condensed route
-stands beside it.
+Times are processor time of the busiest rank. ``flops`` are its operations in a step, as PETSc
+counts them; they show how ranks share the work, whatever else the machine does. A product is one
+with A as AIJ, timed in the same run. ``peak_bytes`` includes set-up. ``bytes_per_unknown`` is the
+memory while stepping (Linux), with mesh, M, K and A, and without the memory that Python and its
+libraries take before the first mesh. On small blocks the condensed route stands beside it.
 """
 
 from __future__ import annotations
@@ -53,7 +55,8 @@ SPEED = float(
 )  # of P waves in the upper layer
 COURANTS, FAR = (1.0, 10.0), 100.0
 PUSH = 5e-4  # of the top in a step at C = 100 and in a static one
-LARGE = 5e5  # unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries
+# unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries
+LARGE = 5e5
 SMALL = (2e3, 1.5e4)  # blocks for the condensed route
 ELEMENTS = {"hexahedra": "hexahedron", "tetrahedra": "tetrahedron"}
 
@@ -64,8 +67,8 @@ def busiest(seconds: float) -> float:
 
 
 class Memory:
-    """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where it is not told.
-    ``bare``: what Python and its libraries take before there is any mesh."""
+    """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where
+    it is not told. ``bare``: what Python and its libraries take before there is any mesh."""
 
     def __init__(self) -> None:
         self.bare = self.peak()
@@ -186,7 +189,8 @@ def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int
 
 
 class Watched:
-    """A solver that remembers what it prepared, and the steps it solved last with the processor time they took."""
+    """A solver that remembers what it prepared, and the steps it solved last with the processor
+    time they took."""
 
     def __init__(self, solver: Any) -> None:
         self.solver, self.check = solver, solver.check

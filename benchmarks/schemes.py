@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
-"""Measure what each time scheme does in an impact, against exact solutions, and what its step costs.
+"""Measure what each time scheme does in an impact, against exact solutions, and what its step
+costs.
 
-    python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--no-bars] [--json FILE]
+    python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--no-bars]
+    [--json FILE]
 
 There are two tables, in the form of docs/guide/schemes.md:
 
-* the bars (1D elements): the largest error of the contact force of a bar that is thrown at a wall, in the window 0.6
-  < t < 1.067; the energy of a bouncing bar after 1, 4 and 20 bounces over the exact 1/8; and the L2 error of its
-  contact force over four bounces. The force is the one that a scheme reports: end value or mean of the step;
-* the block: a unit square in plane strain is thrown at 1 m/s on the ground, in 400 steps of 1 ms. The columns are
-  energy and mean speed at the end, the largest force, and the time of a step over that of the plain linear step with
-  the same matrix, which is timed beside it.
+* the bars (1D elements): the largest error of the contact force of a bar that is thrown at a wall,
+  in the window 0.6 < t < 1.067; the energy of a bouncing bar after 1, 4 and 20 bounces over the
+  exact 1/8; and the L2 error of its contact force over four bounces. The force is the one that a
+  scheme reports: end value or mean of the step;
+* the block: a unit square in plane strain is thrown at 1 m/s on the ground, in 400 steps of 1 ms.
+  The columns are energy and mean speed at the end, the largest force, and the time of a step over
+  that of the plain linear step with the same matrix, which is timed beside it.
 """
 
 from __future__ import annotations
@@ -85,8 +88,8 @@ def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
 
 
 def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
-    """Energies of the bouncing bar after 1, 4 and ``count`` bounces over 1/8; relative L2 error of the force of four
-    bounces, and its largest force over the exact one."""
+    """Energies of the bouncing bar after 1, 4 and ``count`` bounces over 1/8; relative L2 error of
+    the force of four bounces, and its largest force over the exact one."""
     bar = Bar(PeriodicBar(), elements=elements)
     dt = bar.time_step(courant)
     per_bounce = round(3.0 / dt)
@@ -180,7 +183,8 @@ def print_bars(rows: dict[str, Any], count: int) -> None:
                 number(e) for e in found["energies"][: 3 if courant != "0.1" else 2]
             )
             print(
-                f"| {name} | {courant} | {found['oscillation']:.1e} | {energies} | {found['force_error']:.2f} | "
+                f"| {name} | {courant} | {found['oscillation']:.1e} | {energies} | "
+                f"{found['force_error']:.2f} | "
                 f"{number(found['peak'])} |",
                 flush=True,
             )
@@ -188,13 +192,15 @@ def print_bars(rows: dict[str, Any], count: int) -> None:
 
 def print_blocks(rows: dict[str, Any]) -> None:
     print(
-        "| scheme | unknowns | energy | mean speed | largest force | ms per step | over a linear step |\n"
+        "| scheme | unknowns | energy | mean speed | largest force | ms per step | over a linear "
+        "step |\n"
         "|---|---|---|---|---|---|---|"
     )
     for name, row in rows.items():
         for found in row:
             print(
-                f"| {name} | {found['unknowns']} | {number(found['energy'])} | {found['speed']:.3f} | "
+                f"| {name} | {found['unknowns']} | {number(found['energy'])} | "
+                f"{found['speed']:.3f} | "
                 f"{number(found['force'])} | {found['ms']:.2f} | {found['ratio']:.1f} |",
                 flush=True,
             )

@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
 """Measure what displacements of second order gain: elements of degree 1 and 2 on the same nodes.
 
-    python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100] [--json FILE]
+    python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100] [--json
+    FILE]
 
-The numbers are cells of degree 1. Cells of degree 2 are half as many on a side and have the same nodes, so that all
-elements have as many unknowns (nearly as many on the graded meshes of hertz). A problem without numbers is left out.
+The numbers are cells of degree 1. Cells of degree 2 are half as many on a side and have the same
+nodes, so that all elements have as many unknowns (nearly as many on the graded meshes of hertz). A
+problem without numbers is left out.
 
-* bending: the first frequency of a cantilever, 8 times as long as high, with so many cells over its height, in space
-  and in the plane (plane stress), against Q2 with 6 and 16 cells; nu = 0.3, and 0.4999 in plane strain.
-* hertz: the pressure of a cylinder on so many cells in the half-width of the contact: its error in L2 over the norm.
-* impact: the force of a bar thrown at a wall, on so many cells along it and 4 across: the rms of the error around the
-  contact, and the largest error in its middle, over the exact force.
+* bending: the first frequency of a cantilever, 8 times as long as high, with so many cells over its
+  height, in space and in the plane (plane stress), against Q2 with 6 and 16 cells; nu = 0.3, and
+  0.4999 in plane strain.
+* hertz: the pressure of a cylinder on so many cells in the half-width of the contact: its error in
+  L2 over the norm.
+* impact: the force of a bar thrown at a wall, on so many cells along it and 4 across: the rms of
+  the error around the contact, and the largest error in its middle, over the exact force.
 
 Errors are in per cent. "entries" are those of K for each unknown.
 """
@@ -66,7 +70,8 @@ def entries(system: SemiDiscreteSystem) -> float:
 
 
 def cantilever(body: str, cells: int, element: str) -> tuple[float, SemiDiscreteSystem]:
-    """(first frequency [rad/s], system) of a bending cantilever with so many cells over its height."""
+    """(first frequency [rad/s], system) of a bending cantilever with so many cells over its
+    height."""
     d, section, nu = SECTIONS[body]
     degree, simplices = ELEMENTS[element]
     lengths = (float(SLENDER), *(1.0,) * (d - 1))

@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""Measure what a step of a small system costs, as a multiple of the same mathematics in bare numpy, in one run.
+"""Measure what a step of a small system costs, as a multiple of the same mathematics in bare numpy,
+in one run.
 
     python3 benchmarks/small_systems.py [--steps 400] [--rounds 11] [--json FILE]
 
-The model is the wall of 8 x 12 cells with 216 unknowns and 11 contact points, under a harmonic motion, with the
-Zienkiewicz-Wood-Taylor step and an impact law. ``march`` yields certified steps. ``simulate`` also keeps energies,
-contact and a run folder. The bare loop in this file has the right-hand side, the substitutions, the search of the
-contact set, the certificate and the impact law, and no objects. Times are processor time of the thread. Each run is
-timed between two runs of the bare loop, and the median of their ratios counts, as the machine may be busy. Set-up
-without assembly is in all of them. Start-up is the processor time of ``vi-contact run wall`` from the command to the
-first step, over that of importing scipy and dolfinx just before, each in its own process; forms and byte code are
-cached.
+The model is the wall of 8 x 12 cells with 216 unknowns and 11 contact points, under a harmonic
+motion, with the Zienkiewicz-Wood-Taylor step and an impact law. ``march`` yields certified steps.
+``simulate`` also keeps energies, contact and a run folder. The bare loop in this file has the
+right-hand side, the substitutions, the search of the contact set, the certificate and the impact
+law, and no objects. Times are processor time of the thread. Each run is timed between two runs of
+the bare loop, and the median of their ratios counts, as the machine may be busy. Set-up without
+assembly is in all of them. Start-up is the processor time of ``vi-contact run wall`` from the
+command to the first step, over that of importing scipy and dolfinx just before, each in its own
+process; forms and byte code are cached.
 """
 
 from __future__ import annotations
@@ -141,7 +143,8 @@ main(["run", "wall", "--quiet", "--out", sys.argv[1]])
 
 
 def start_up(rounds: int) -> tuple[float, list[float]]:
-    """Processor time [s] from command to first step, the median, and its ratios to that of importing the libraries."""
+    """Processor time [s] from command to first step, the median, and its ratios to that of
+    importing the libraries."""
     found: dict[str, list[float]] = {LIBRARIES: [], FIRST_STEP: []}
     with tempfile.TemporaryDirectory() as folder:
         cached = {
@@ -235,18 +238,21 @@ def main() -> None:
     options = parser.parse_args()
     rows = measured(options.steps, options.rounds)
     print(
-        f"{'unknowns':>8} {'points':>6}  {'method':<9} {'ratio':>6} {'mean':>6} {'us/step':>8} {'bare us':>8} "
+        f"{'unknowns':>8} {'points':>6}  {'method':<9} {'ratio':>6} {'mean':>6} {'us/step':>8} "
+        f"{'bare us':>8} "
         f"{'certificate':>11}"
     )
     for row in rows:
         print(
-            f"{row['unknowns']:>8} {row['points']:>6}  {row['method']:<9} {row['ratio_median']:>6.2f} "
+            f"{row['unknowns']:>8} {row['points']:>6}  {row['method']:<9} "
+            f"{row['ratio_median']:>6.2f} "
             f"{row['ratio_mean']:>6.2f} {1e6 * row['seconds_per_step']:>8.0f} "
             f"{1e6 * row['bare_seconds_per_step']:>8.0f} {row['certificate']:>11.1e}"
         )
     first, ratios = start_up(options.rounds)
     print(
-        f"start-up: {first:.2f} s to the first step, {np.median(ratios):.2f} times scipy and dolfinx"
+        f"start-up: {first:.2f} s to the first step, {np.median(ratios):.2f} times scipy and "
+        "dolfinx"
     )
     rows.append(
         {

@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
-"""Measure what soil boundaries reflect: dashpots at an angle, and how far away the sides of a soil must be.
+"""Measure what soil boundaries reflect: dashpots at an angle, and how far away the sides of a soil
+must be.
 
-    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only dashpots|sides|boxes]
+    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only
+    dashpots|sides|boxes]
 
-dashpots: a group of plane waves runs in a strip that is one wavelength wide along the boundary, and whose sides are
-tied. The column is the energy that is left after the reflection, over the energy before it. sides: a heavy stiff box
-at the surface of a soft layer on rigid rock is shaken horizontally. The column is the largest deviation of the
-displacement of the box from that with sides twelve depths away. boxes: the same in space with sides that are tied in
-both directions, against sides six depths away. Then level ground on a compliant base is shaken in three components,
-between dashpots or free sides. The column is the deviation of the velocity in the middle of the surface from that of
-tied sides, which is exact.
+dashpots: a group of plane waves runs in a strip that is one wavelength wide along the boundary, and
+whose sides are tied. The column is the energy that is left after the reflection, over the energy
+before it. sides: a heavy stiff box at the surface of a soft layer on rigid rock is shaken
+horizontally. The column is the largest deviation of the displacement of the box from that with
+sides twelve depths away. boxes: the same in space with sides that are tied in both directions,
+against sides six depths away. Then level ground on a compliant base is shaken in three components,
+between dashpots or free sides. The column is the deviation of the velocity in the middle of the
+surface from that of tied sides, which is exact.
 """
 
 from __future__ import annotations
@@ -50,7 +53,8 @@ SHAKE = vc.Ricker(1.0, 4.0)
 
 
 def shaken_box(sides: str, distance: float) -> np.ndarray:
-    """History of the box's displacement (steps, 2) with sides of some kind at ``distance`` [m] from it."""
+    """History of the box's displacement (steps, 2) with sides of some kind at ``distance`` [m] from
+    it."""
     width = BOX[0] + 2.0 * distance
     divisions = round(width / H), round(DEPTH / H)
     block = BlockMesh(lengths=(width, DEPTH), divisions=divisions, corner=(-0.5 * width, -DEPTH))
@@ -79,7 +83,8 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
 
 
 def shaken_box_in_space(distance: float) -> np.ndarray:
-    """History of the displacement (steps, 3) of a box, 8 m x 8 m x 4 m in 8 m of soil, tied sides at ``distance``."""
+    """History of the displacement (steps, 3) of a box, 8 m x 8 m x 4 m in 8 m of soil, tied sides
+    at ``distance``."""
     width, h = 8.0 + 2.0 * distance, 2.0
     block = BlockMesh(
         lengths=(width, 8.0, width),
@@ -105,7 +110,8 @@ def shaken_box_in_space(distance: float) -> np.ndarray:
 
 
 def level_box(width: float, sides: str) -> np.ndarray:
-    """History of the velocity (steps, 3) in the middle of the surface of 8 m of level soil on a compliant base."""
+    """History of the velocity (steps, 3) in the middle of the surface of 8 m of level soil on a
+    compliant base."""
     block = BlockMesh(
         lengths=(width, 8.0, width),
         divisions=(round(width / 2.0), 8, round(width / 2.0)),

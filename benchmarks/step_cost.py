@@ -1,19 +1,24 @@
 #!/usr/bin/env python3
-"""Measure what a unilateral step costs, as a multiple of a plain linear step with the same matrix, in one run.
+"""Measure what a unilateral step costs, as a multiple of a plain linear step with the same matrix,
+in one run.
 
-    python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square] [--json FILE]
+    python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square] [--json
+    FILE]
 
-The problems are the wall of docs/start/first_wall.md with its whole right side in possible contact, the buried
-channel (two bodies and an impact law, after the gravity stage), and a block in space that is shaken over ground. They
-have a harmonic motion, the Zienkiewicz-Wood-Taylor step, an impact law and the certificate, with and without
-friction, and nothing is recorded. A linear step is right-hand side, one substitution and update, with the fastest of
-PETSc's Cholesky, MUMPS and CHOLMOD in free ordering; it is timed beside every unilateral step. Set-up is ordering,
-factor and condensed matrix, beside a factorisation of PETSc's own Cholesky and of CHOLMOD's. The square is the static
-problem of Signorini on triangles without assembly. It stands beside the plain way to condense: PETSc's factor, a
-substitution for every contact unknown, and a second one for the reactions.
+The problems are the wall of docs/start/first_wall.md with its whole right side in possible contact,
+the buried channel (two bodies and an impact law, after the gravity stage), and a block in space
+that is shaken over ground. They have a harmonic motion, the Zienkiewicz-Wood-Taylor step, an impact
+law and the certificate, with and without friction, and nothing is recorded. A linear step is
+right-hand side, one substitution and update, with the fastest of PETSc's Cholesky, MUMPS and
+CHOLMOD in free ordering; it is timed beside every unilateral step. Set-up is ordering, factor and
+condensed matrix, beside a factorisation of PETSc's own Cholesky and of CHOLMOD's. The square is the
+static problem of Signorini on triangles without assembly. It stands beside the plain way to
+condense: PETSc's factor, a substitution for every contact unknown, and a second one for the
+reactions.
 
-Seconds are processor time of one thread. Medians and means are over steps with contact. Any size can be asked for, in
-unknowns. Sizes in space and in statics that teach nothing or take minutes are left out.
+Seconds are processor time of one thread. Medians and means are over steps with contact. Any size
+can be asked for, in unknowns. Sizes in space and in statics that teach nothing or take minutes are
+left out.
 """
 
 from __future__ import annotations
@@ -172,7 +177,8 @@ def petsc(kind: str, order: str) -> Callable[[Any], Any]:
 
 
 class Factors:
-    """One matrix, factorised in several ways. ``setup``: seconds of each; small ones are made again, as caches warm."""
+    """One matrix, factorised in several ways. ``setup``: seconds of each; small ones are made
+    again, as caches warm."""
 
     def __init__(self, matrix: Any, dimension: int) -> None:
         order = (
@@ -199,7 +205,8 @@ def repeated(work: Callable[[], Any], rows: int) -> tuple[float, Any]:
 
 @dataclass
 class Linear:
-    """Plain linear steps by several factors of the matrix of the problem, on a state of their own."""
+    """Plain linear steps by several factors of the matrix of the problem, on a state of their
+    own."""
 
     problem: vc.ContactProblem
     dt: float
@@ -241,9 +248,9 @@ def set_up(problem: vc.ContactProblem, dt: float, scale: float) -> float:
 
 
 class StepsWithContact:
-    """Iterates over the reports of ``count`` steps with contact after a third as many to warm up, each beside linear
-    steps. ``seconds`` of each; ``plain``: of the linear steps by the fastest factor; ``active``: points in contact;
-    ``worst``: certificate of all steps."""
+    """Iterates over the reports of ``count`` steps with contact after a third as many to warm up,
+    each beside linear steps. ``seconds`` of each; ``plain``: of the linear steps by the fastest
+    factor; ``active``: points in contact; ``worst``: certificate of all steps."""
 
     def __init__(
         self,
@@ -280,7 +287,8 @@ class StepsWithContact:
 
 
 def measured(name: str, size: float, count: int) -> Iterator[dict[str, Any]]:
-    """The rows of one problem of one size, without and with friction, which have the same matrix."""
+    """The rows of one problem of one size, without and with friction, which have the same
+    matrix."""
     factors = None
     for friction in (None, RUBBING):
         problem, dt, state = PROBLEMS[name](size, friction)

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Run the first wall with every time scheme, with the time step of the article and a sixteenth of it.
+"""Run the first wall with every time scheme, with the time step of the article and a sixteenth of
+it.
 
     python3 benchmarks/wall_schemes.py [--only NAME…]
 
-It prints the table of docs/start/first_wall.md: the range of the top corner [µm], and the energy that contact, impact
-rule and scheme take, as a share of the input work. Each row is the command ``vi-contact run wall`` with the words of
-SCHEMES. Three minutes of one processor.
+It prints the table of docs/start/first_wall.md: the range of the top corner [µm], and the energy
+that contact, impact rule and scheme take, as a share of the input work. Each row is the command
+``vi-contact run wall`` with the words of SCHEMES. Three minutes of one processor.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ LOSSES = ("loss_contact", "loss_impact", "loss_algorithmic")
 
 
 def run(words: list[str], finer: int = 1) -> tuple[str, str]:
-    """Return the range of the top corner [µm] and the share of the input work that is taken, as the table has them."""
+    """Return the range of the top corner [µm] and the share of the input work that is taken, as the
+    table has them."""
     steps = ["--steps", str(400 * finer), "--set", f"run.dt.parts={20 * finer}"]
     with tempfile.TemporaryDirectory() as folder:
         said = io.StringIO()

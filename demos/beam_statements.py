@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Compare every reading of the normal force of Ahn (2012) with both statements that its text makes on the results.
+"""Compare every reading of the normal force of Ahn (2012) with both statements that its text makes
+on the results.
 
-The text prints the normal force incompletely, so that it can be read in three ways. It states that larger contact
-forces cause more oscillations of the tip, and that friction takes little energy beside viscosity. No reading gives
-both.
+The text prints the normal force incompletely, so that it can be read in three ways. It states that
+larger contact forces cause more oscillations of the tip, and that friction takes little energy
+beside viscosity. No reading gives both.
 
     bash demos/run.sh beam_statements              # the table of docs/theory/beam.md; figure in results/beam_statements
     bash demos/run.sh beam_statements --json       # the same as JSON
 
-There are 24 runs of 1000 elements and 1000 steps, which take about 5 s. docs/theory/beam.md explains the readings.
+There are 24 runs of 1000 elements and 1000 steps, which take about 5 s. docs/theory/beam.md
+explains the readings.
 """
 
 from __future__ import annotations
@@ -25,13 +27,15 @@ from demos.pictures.beam_statements import plot_statements
 from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, row
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 ELEMENTS, DT = 1000, 0.002
 OUT = Path("results/beam_statements")
 
 
 def main(quick: bool = False, as_json: bool = False, out: Path = OUT) -> list[Row]:
-    """Run all readings (``quick``: 50 elements, steps of 10 ms); print and draw their table; return its rows."""
+    """Run all readings (``quick``: 50 elements, steps of 10 ms); print and draw their table; return
+    its rows."""
     count, dt = (50, 0.01) if quick else (ELEMENTS, DT)
     rows = [row(reading, a2, count=count, dt=dt) for a2 in VISCOSITIES for reading in "ABC"]
     if as_json:
@@ -42,7 +46,8 @@ def main(quick: bool = False, as_json: bool = False, out: Path = OUT) -> list[Ro
     ]
     print(HEAD, *[one.line() for one in rows], sep="\n")
     print(
-        f"\nStatement 2 holds where friction takes less than {NEGLIGIBLE:g} of what viscosity takes."
+        f"\nStatement 2 holds where friction takes less than {NEGLIGIBLE:g} of what viscosity "
+        "takes."
     )
     print(
         f"Both statements hold for {', '.join(both)}."

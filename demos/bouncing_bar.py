@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Let an elastic bar bounce on a rigid wall, and compare every time scheme with the exact solution in one figure.
+"""Let an elastic bar bounce on a rigid wall, and compare every time scheme with the exact solution
+in one figure.
 
-The bar is clamped at its top and released from a compressed state; its foot strikes the wall at t = 1, 4, 7 and so on,
-for one unit of time each, under a constant force. Its energy is constant. Time schemes differ in how much the contact
-force oscillates, and in whether the energy grows, stays or falls.
+The bar is clamped at its top and released from a compressed state; its foot strikes the wall at t =
+1, 4, 7 and so on, for one unit of time each, under a constant force. Its energy is constant. Time
+schemes differ in how much the contact force oscillates, and in whether the energy grows, stays or
+falls.
 
     bash demos/run.sh bouncing_bar                # the figures and a table, into results/bouncing_bar
     bash demos/run.sh -n 2 bouncing_bar           # the same on two ranks
@@ -29,7 +31,8 @@ from demos.pictures.bars import plot_bounces
 from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 BAR = Bar(PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
 COURANT = 0.5  # dt c / h
 BOUNCES = 4
@@ -48,7 +51,8 @@ OUT = Path("results/bouncing_bar")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all schemes (``quick``: one bounce, 40 elements); return energies and forces over the exact ones."""
+    """Run all schemes (``quick``: one bounce, 40 elements); return energies and forces over the
+    exact ones."""
     comm = MPI.COMM_WORLD
     bar = replace(BAR, elements=40) if quick else BAR
     model = build(bar, comm)
@@ -93,7 +97,8 @@ def table(numbers: dict[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: dimension=2 or 3 in BAR; ThrownBar() or BouncingBar() of demos.exact as its case; COURANT = 4: the
-# default gains a little there and HHT does not; dt=vc.HalvedAtImpact(dt); impact=vc.Inelastic() with consistent mass.
+# Things to try: dimension=2 or 3 in BAR; ThrownBar() or BouncingBar() of demos.exact as its case;
+# COURANT = 4: the default gains a little there and HHT does not; dt=vc.HalvedAtImpact(dt);
+# impact=vc.Inelastic() with consistent mass.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Solve the examples of Aimi, Di Credico and Gimperlein (2024) by space-time boundary elements, beside finite elements.
+"""Solve the examples of Aimi, Di Credico and Gimperlein (2024) by space-time boundary elements,
+beside finite elements.
 
-The examples are a pressed square, concrete on steel, concrete in concrete, and a tennis ball on a moving plane.
-Boundary elements have unknowns on the boundary only, and they share no matrix with the finite elements. So the
-agreement of both methods shows that the mechanics agree.
+The examples are a pressed square, concrete on steel, concrete in concrete, and a tennis ball on a
+moving plane. Boundary elements have unknowns on the boundary only, and they share no matrix with
+the finite elements. So the agreement of both methods shows that the mechanics agree.
 
     bash demos/run.sh boundary_elements        # three figures and a table, into results/boundary_elements
 
@@ -41,7 +42,8 @@ from demos.problems.interior import interior_displacement
 from vi_contact import bem
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
 QUICK = {"square": 6, "steel": 5, "concrete": 4, "ball": 24}
 CELLS = {
@@ -82,7 +84,8 @@ OUT = Path("results/boundary_elements")
 
 
 class Answer(NamedTuple):
-    """Hold one law of one example by boundary elements and by finite elements (``fem``: its history)."""
+    """Hold one law of one example by boundary elements and by finite elements (``fem``: its
+    history)."""
 
     run: bem.ContactRun
     bodies: tuple[tuple[bem.BoundaryProblem, bem.BoundaryMotion], ...]
@@ -104,7 +107,8 @@ class Answer(NamedTuple):
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all examples and laws; return energies and impulses of both methods, iterations of Uzawa, certificates."""
+    """Run all examples and laws; return energies and impulses of both methods, iterations of Uzawa,
+    certificates."""
     comm = MPI.COMM_WORLD
     sizes, cells = (QUICK, QUICK_CELLS) if quick else (ELEMENTS, CELLS)
     answers, numbers = {}, {}
@@ -146,7 +150,8 @@ def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
 
 
 def boundary_elements(name: str, size: int) -> tuple[bem.BoundaryContact, Any, float]:
-    """Return (contact, its motion from the contact forces, dt): c_P dt = h, 4 h for the slow loads, h for the ball."""
+    """Return (contact, its motion from the contact forces, dt): c_P dt = h, 4 h for the slow loads,
+    h for the ball."""
     box = square.concrete()
     data = {"steel": box, "concrete": box}.get(name, square.Square(pressure=1.0))
     pressure = partial(pressure_of, data)
@@ -220,7 +225,8 @@ def results(answer: Answer) -> dict[str, float]:
 
 
 def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
-    """Run the source's iteration on a window of steps at once (all by default): how often, how far from the march."""
+    """Run the source's iteration on a window of steps at once (all by default): how often, how far
+    from the march."""
     settings = bem.SpaceTimeUzawa(tolerance=1e-9 if window else 1e-8, window=window)
     found = settings.solve(run.contact)
     off = np.abs(found.forces - run.forces).max() / np.abs(run.forces).max()
@@ -228,7 +234,8 @@ def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
 
 
 def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) -> None:
-    """Draw snapshots with friction, tractions of both methods, energies with and without friction."""
+    """Draw snapshots with friction, tractions of both methods, energies with and without
+    friction."""
     rows = {
         TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
         for name, laws in answers.items()
@@ -302,7 +309,8 @@ def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
 
 
 def tractions(name: str, law: str, answer: Answer, times: Sequence[float]) -> tuple[Panel, Panel]:
-    """Return panels of pressure and of shear (support on body, along +x) over x in the steps that end at some times."""
+    """Return panels of pressure and of shear (support on body, along +x) over x in the steps that
+    end at some times."""
     panels = []
     for quantity, both in zip(("pressure", SHEAR), answer.tractions, strict=True):
         curves = []
@@ -358,7 +366,8 @@ def table(numbers: dict[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend on rho;
-# compare_runs(problem, [Reference.of(run)], ...) of demos/problems/whole_runs.py beside finite elements.
+# Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend
+# on rho; compare_runs(problem, [Reference.of(run)], ...) of demos/problems/whole_runs.py beside
+# finite elements.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

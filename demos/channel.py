@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Shake a channel buried in soil on bedrock by a harmonic earthquake: Figs. 6 to 9 of the boundary method.
+"""Shake a channel buried in soil on bedrock by a harmonic earthquake: Figs. 6 to 9 of the boundary
+method.
 
-The soil may let go of both walls and of the base of the channel, but not enter it. After a gravity stage the same
-motion is run three times: sliding freely, with Coulomb friction, and bilateral, the linear comparison. The first steps
-are solved twice, condensed to the contact points and on all unknowns, and the two must agree to round-off.
+The soil may let go of both walls and of the base of the channel, but not enter it. After a gravity
+stage the same motion is run three times: sliding freely, with Coulomb friction, and bilateral, the
+linear comparison. The first steps are solved twice, condensed to the contact points and on all
+unknowns, and the two must agree to round-off.
 
     bash demos/run.sh channel                   # three runs with all figures, into results/channel
     bash demos/run.sh -n 3 channel              # the same on three ranks
@@ -40,7 +42,8 @@ from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.plots.histories import History
 from vi_contact.run.static import static_equilibrium
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 CHANNEL = Channel(
     ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5)
 )  # [m]
@@ -60,7 +63,8 @@ RUNS = {
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Make all runs (``quick``: 40 steps, 4 of them by both routes); return the key numbers in SI units."""
+    """Make all runs (``quick``: 40 steps, 4 of them by both routes); return the key numbers in SI
+    units."""
     comm = MPI.COMM_WORLD
     model = build(CHANNEL, comm)
     dt, histories, numbers = CHANNEL.time_step(), {}, {}
@@ -105,7 +109,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     if comm.rank == 0:
         draw(contact, histories, out, quick)
         print(
-            f"\nFigures and the film are in {out}, histories and ParaView files in folders below it."
+            f"\nFigures and the film are in {out}, histories and ParaView files in folders below "
+            "it."
         )
     comm.Barrier()  # nobody leaves before the figures are there
     return numbers
@@ -117,7 +122,8 @@ def folder(out: Path, name: str) -> Path:
 
 
 def key_numbers(history: History) -> dict[str, float]:
-    """Return openings of the walls' tops and feet, how often both walls' are open, rocking, largest pressure."""
+    """Return openings of the walls' tops and feet, how often both walls' are open, rocking, largest
+    pressure."""
     left, right = (
         pictures.opening(history, "19", (-1.0, 0.0)),
         pictures.opening(history, "13", (1.0, 0.0)),
@@ -217,8 +223,8 @@ def command_line(words: Sequence[str]) -> int:
     return command(["report", own.out]) if status == 0 and MPI.COMM_WORLD.rank == 0 else status
 
 
-# Things to try: weighing=("channel", "soil") in build(); sides=TiedSides(); vc.Coulomb(0.2); a finer mesh, size=0.25;
-# a real earthquake with --motion; mpirun -n 3.
+# Things to try: weighing=("channel", "soil") in build(); sides=TiedSides(); vc.Coulomb(0.2); a
+# finer mesh, size=0.25; a real earthquake with --motion; mpirun -n 3.
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         sys.exit(command_line(sys.argv[1:]))

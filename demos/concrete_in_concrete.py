@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Press down a box of concrete in the notch of a concrete block: two elastic bodies in frictional contact.
+"""Press down a box of concrete in the notch of a concrete block: two elastic bodies in frictional
+contact.
 
-4 MPa tanh((t/15 ms)²) act on the top of the 1 m box; its lower half is in the notch. It widens as it is pressed and
-leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the load.
+4 MPa tanh((t/15 ms)²) act on the top of the 1 m box; its lower half is in the notch. It widens as
+it is pressed and leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the
+load.
 
     bash demos/run.sh concrete_in_concrete              # two figures and a table, into results/concrete_in_concrete
     bash demos/run.sh -n 2 concrete_in_concrete         # the same on two ranks
@@ -31,7 +33,8 @@ from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 CELLS = 10  # along a side of the box
 FRICTION = {"smooth": vc.Frictionless(), "rough": vc.Coulomb(0.75)}
 DT = 1.0e-4  # [s]
@@ -42,8 +45,9 @@ OUT = Path("results/concrete_in_concrete")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run both, with the default scheme (``quick``: 8 cells, steps of 0.25 ms); return energies [J], work of friction
-    [J], shares of the load that floor and walls carry at the end, certificates and defects."""
+    """Run both, with the default scheme (``quick``: 8 cells, steps of 0.25 ms); return energies
+    [J], work of friction [J], shares of the load that floor and walls carry at the end,
+    certificates and defects."""
     comm = MPI.COMM_WORLD
     model = build(Embedded(concrete(8 if quick else CELLS)), comm)
     dt = 2.5 * DT if quick else DT
@@ -107,7 +111,8 @@ def draw(histories: Mapping[str, History], out: Path, ground: float) -> None:
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Return a table of energies over time; at the end the work of friction and the shares of the load."""
+    """Return a table of energies over time; at the end the work of friction and the shares of the
+    load."""
     energies = [f"E({1e3 * t:g} ms)" for t in TIMES]
     columns = (*energies, "friction", "floor", "walls")
     lines = [f"{'energies [J], shares of load':<30}" + "".join(f"{name:>11}" for name in columns)]
@@ -118,7 +123,7 @@ def table(numbers: Mapping[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: vc.Coulomb(0.2); a soft block, Embedded(..., block=vc.LinearElastic(E=1e9, nu=0.3, rho=1800.0));
-# a sudden load, history=None in Square().
+# Things to try: vc.Coulomb(0.2); a soft block, Embedded(..., block=vc.LinearElastic(E=1e9, nu=0.3,
+# rho=1800.0)); a sudden load, history=None in Square().
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Press a box of concrete on steel, slowly: the second example of the space-time boundary elements.
 
-4 MPa tanh((t/15 ms)²) act on the top of 1 m of concrete. A pressure wave crosses it 65 times in the 20 ms, so the box
-follows its static solution; on steel (Coulomb, mu = 0.3) its base sticks everywhere.
+4 MPa tanh((t/15 ms)²) act on the top of 1 m of concrete. A pressure wave crosses it 65 times in the
+20 ms, so the box follows its static solution; on steel (Coulomb, mu = 0.3) its base sticks
+everywhere.
 
     bash demos/run.sh concrete_on_steel                 # two figures and a table, into results/concrete_on_steel
     bash demos/run.sh -n 2 concrete_on_steel            # the same on two ranks
@@ -30,7 +31,8 @@ from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 BOX = concrete(cells=20)
 FRICTION = {"smooth": vc.Frictionless(), "on steel": vc.Coulomb(0.3)}
 DT = 5.0e-5  # [s]
@@ -41,8 +43,9 @@ OUT = Path("results/concrete_on_steel")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run both, with the default scheme (``quick``: steps of 0.25 ms); return energies [J], the last ones of energy,
-    corner and force over their static values without friction, certificates and defects."""
+    """Run both, with the default scheme (``quick``: steps of 0.25 ms); return energies [J], the
+    last ones of energy, corner and force over their static values without friction, certificates
+    and defects."""
     comm = MPI.COMM_WORLD
     model = build(BOX, comm)
     dt = 5.0 * DT if quick else DT
@@ -84,8 +87,8 @@ def folder(out: Path, name: str) -> Path:
 
 
 def static(box: Square, t: float) -> tuple[float, float, float]:
-    """Return (energy f²a²/(2E') [J/m], displacement of the corner ½ nu (1 + nu) f a/E [m], force f a [N/m]) of the box
-    in equilibrium without friction, E' = E/(1 - nu²)."""
+    """Return (energy f²a²/(2E') [J/m], displacement of the corner ½ nu (1 + nu) f a/E [m], force f
+    a [N/m]) of the box in equilibrium without friction, E' = E/(1 - nu²)."""
     material, side = box.material, box.side
     f = box.pressure * (box.history(t) if box.history else 1.0)
     plane = material.E / (1.0 - material.nu**2)
@@ -126,7 +129,8 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Return a table of energies over time, and the end over the static solution without friction."""
+    """Return a table of energies over time, and the end over the static solution without
+    friction."""
     columns = [f"E({1e3 * t:g} ms)" for t in TIMES]
     ends = ("energy", "corner", "force")
     lines = [
@@ -141,6 +145,7 @@ def table(numbers: Mapping[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: vc.Coulomb(0.1), which slips at the edges; T_END = 40e-3; a sudden load, history=None in Square().
+# Things to try: vc.Coulomb(0.1), which slips at the edges; T_END = 40e-3; a sudden load,
+# history=None in Square().
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

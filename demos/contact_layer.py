@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Replace the exact inequality by a boundary layer: for a stiff block, an elastic bar and the shaken wall.
+"""Replace the exact inequality by a boundary layer: for a stiff block, an elastic bar and the
+shaken wall.
 
-The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown at a rigid wall
-with 10 m/s, then it falls and bounces under gravity. In thinner and thinner layers its motion tends to that of the
-exact inequality, which is known in closed form. The motion of the shaken wall tends to that of the exact inequality
-too.
+The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown
+at a rigid wall with 10 m/s, then it falls and bounces under gravity. In thinner and thinner layers
+its motion tends to that of the exact inequality, which is known in closed form. The motion of the
+shaken wall tends to that of the exact inequality too.
 
     bash demos/run.sh contact_layer             # into results/contact_layer
     bash demos/run.sh -n 2 contact_layer        # the same on two ranks
@@ -36,7 +37,8 @@ from demos.problems import wall
 from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 BARS = (Bar(ThrownBar(), elements=100), Bar(BouncingBar(), elements=100))
 T_END = {ThrownBar: 1.4, BouncingBar: 16.0 / 3.0}  # one impact, one period [s]
 WIDTHS = (1.0, 0.5, 0.25, 0.1)  # b [m] of the bar's layers
@@ -50,8 +52,8 @@ OUT = Path("results/contact_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run block, bar, wall (``quick``: one restitution, two wide layers, one metric, a period); return the key
-    numbers."""
+    """Run block, bar, wall (``quick``: one restitution, two wide layers, one metric, a period);
+    return the key numbers."""
     comm = MPI.COMM_WORLD
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
@@ -93,7 +95,8 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[Metric, ...]) -> dict[str
 def thin_limit(
     bar: Bar, widths: tuple[float, ...], metrics: tuple[Metric, ...], out: Path
 ) -> dict[str, float]:
-    """Compute the bar's foot for every width, and beside it the exact inequality on the same mesh."""
+    """Compute the bar's foot for every width, and beside it the exact inequality on the same
+    mesh."""
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     name, t_end = type(case).__name__, T_END[type(case)]
     speed = (
@@ -114,7 +117,8 @@ def thin_limit(
     impulse, runs = float(np.mean(curve[2])) * t_end, {}
     if MPI.COMM_WORLD.rank == 0:
         print(
-            f"\n{name:24s} {'rms error of the foot [m]':>26s} {'energy left':>12s} {'impulse / exact':>16s}"
+            f"\n{name:24s} {'rms error of the foot [m]':>26s} {'energy left':>12s} "
+            f"{'impulse / exact':>16s}"
         )
     for label, (scheme, dt) in schemes.items():
         t, y, p, lost = marched(problem, scheme, dt, t_end)
@@ -150,7 +154,8 @@ def thin_limit(
 def shaken_wall(
     widths: tuple[float, ...], steps: int, periods: float, out: Path
 ) -> dict[str, float]:
-    """Run case b of the wall: how far its contact points are from those of the midpoint rule with gap >= 0."""
+    """Run case b of the wall: how far its contact points are from those of the midpoint rule with
+    gap >= 0."""
     model = wall.build(wall.Wall(), MPI.COMM_WORLD, base_inertia="catalogue")
     exact = model.problem("b", impact=None, mass=vc.ConsistentMass())
     concrete, dt = model.wall.material, 1.0 / (model.harmonic().frequency * steps)
@@ -175,8 +180,10 @@ def shaken_wall(
         }
         if MPI.COMM_WORLD.rank == 0:
             print(
-                f"wall, b = {1e6 * width:g} µm: rms distance to the exact inequality {1e6 * errors[-1]:.3f} µm, "
-                f"into it {1e6 * found.max():.3f} µm (amplitude {1e6 * np.max(np.abs(reference)):.1f} µm)"
+                f"wall, b = {1e6 * width:g} µm: rms distance to the exact inequality "
+                f"{1e6 * errors[-1]:.3f} µm, "
+                f"into it {1e6 * found.max():.3f} µm (amplitude "
+                f"{1e6 * np.max(np.abs(reference)):.1f} µm)"
             )
     if MPI.COMM_WORLD.rank == 0:
         plot_thin_limit(
@@ -205,7 +212,8 @@ def marched(
     return t, y, p, energy(system.u0, system.v0) - energy(state.u, state.v)
 
 
-# Things to try: a restitution other than ½ in thin_limit (on a bar it changes little: it is that of its foot's mass);
-# a mass that does not shrink with the width; PASSAGE = 2; dimension=2 in BARS; vc.Trapezoidal() beside vc.Midpoint().
+# Things to try: a restitution other than ½ in thin_limit (on a bar it changes little: it is that of
+# its foot's mass); a mass that does not shrink with the width; PASSAGE = 2; dimension=2 in BARS;
+# vc.Trapezoidal() beside vc.Midpoint().
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

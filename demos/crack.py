@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Break a bar in tension: a phase field whose damage can only grow, which is a lower bound on d.
 
-Each step is staggered: a plain linear solve gives the displacement, then the damage is found between its values
-before and one. First the bar stays homogeneous, and is loaded beyond its peak and unloaded; the answer is the closed
-form to the last digit. Then the ends keep d = 0, and the bar breaks in the middle at once: the elastic energy falls
-to nothing. The surface energy is that of the crack and of the damage all over the bar, which came before and cannot
-heal. The crack alone costs Gc (1 + h / (2 l)); this is the least energy with d = 1 where the bar broke, a strip of
-nodes that is h wide. The data are E = Gc = 1 and length 1.
+Each step is staggered: a plain linear solve gives the displacement, then the damage is found
+between its values before and one. First the bar stays homogeneous, and is loaded beyond its peak
+and unloaded; the answer is the closed form to the last digit. Then the ends keep d = 0, and the bar
+breaks in the middle at once: the elastic energy falls to nothing. The surface energy is that of the
+crack and of the damage all over the bar, which came before and cannot heal. The crack alone costs
+Gc (1 + h / (2 l)); this is the least energy with d = 1 where the bar broke, a strip of nodes that
+is h wide. The data are E = Gc = 1 and length 1.
 
     bash demos/run.sh crack                # a table and a figure, into results/crack
     bash demos/run.sh -n 2 crack           # the same on two ranks
@@ -34,7 +35,8 @@ from vi_contact.cli import status_of
 from vi_contact.fem import compat
 from vi_contact.solvers import ReducedNewton
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 WIDTH = 0.05  # l
 HEIGHT = 0.1
 ACROSS = 8  # cells; the strip has ten times as many along it
@@ -58,8 +60,9 @@ OUT = Path("results/crack")
 
 
 class Bar:
-    """Hold a strip without lateral displacement: displacement u along it, damage d; ``held``: whether d = 0 at its
-    ends. ``rounds`` of the staggered iteration, and the ``worst`` certificate, so far."""
+    """Hold a strip without lateral displacement: displacement u along it, damage d; ``held``:
+    whether d = 0 at its ends. ``rounds`` of the staggered iteration, and the ``worst`` certificate,
+    so far."""
 
     def __init__(self, comm: Any, across: int, held: bool) -> None:
         self.comm, self.across, self.rounds, self.worst = comm, across, 0, 0.0
@@ -119,7 +122,8 @@ class Bar:
         return found[0], found[1], found[2]
 
     def crack_alone(self) -> float:
-        """Let all damage heal but that of broken nodes, without load; return the surface energy over Gc H."""
+        """Let all damage heal but that of broken nodes, without load; return the surface energy
+        over Gc H."""
         self.u.x.array[:] = 0.0
         self.before.x.array[:] = self.d.x.array > BROKEN
         vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
@@ -127,7 +131,8 @@ class Bar:
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
-    """Run both bars (``quick``: half the cells, and the second one breaks at once); return stresses and energies."""
+    """Run both bars (``quick``: half the cells, and the second one breaks at once); return stresses
+    and energies."""
     comm, numbers = MPI.COMM_WORLD, {}
     strain, stress = critical(WIDTH)
     even = Bar(comm, 2, held=False)
@@ -178,6 +183,7 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
     return {key: comm.bcast(numbers.get(key)) for key in ("middle", "d")} | numbers
 
 
-# Things to try: upper=1.0 left out: nothing changes; lower=0.0: cracks heal when the load goes back.
+# Things to try: upper=1.0 left out: nothing changes; lower=0.0: cracks heal when the load goes
+# back.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Throw a steel ball on a rigid plane, and compare elastic finite elements with Hertz' quasi-static theory.
+"""Throw a steel ball on a rigid plane, and compare elastic finite elements with Hertz' quasi-static
+theory.
 
-A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microseconds, with up to 145 N on a spot of a
-third of a millimetre, and rebounds with its full speed. The model is a quarter of the ball, with the default scheme.
+A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microseconds, with up to
+145 N on a spot of a third of a millimetre, and rebounds with its full speed. The model is a quarter
+of the ball, with the default scheme.
 
     bash demos/run.sh hertz_impact                # the figure and a table, into results/hertz_impact
     bash demos/run.sh -n 2 hertz_impact           # the same on two ranks
@@ -26,7 +28,8 @@ from demos.pictures.impact import ImpactCurves, plot_impact
 from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 BALL = Ball(radius=0.01, speed=0.1, material=vc.LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))
 MESHES = (4, 8)  # cells in the largest contact radius
 STEPS = 200  # in the contact time
@@ -35,8 +38,8 @@ COLUMNS = ("approach", "duration", "force", "rebound", "certificate", "ledger de
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all meshes (``quick``: the first, half the steps); return approach, duration, force and rebound over those
-    of the theory, certificate and ledger defect, by mesh."""
+    """Run all meshes (``quick``: the first, half the steps); return approach, duration, force and
+    rebound over those of the theory, certificate and ledger defect, by mesh."""
     comm = MPI.COMM_WORLD
     curves, numbers = {}, {}
     for cells in MESHES[:1] if quick else MESHES:
@@ -99,7 +102,7 @@ def table(numbers: dict[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: speed=10.0 (the theory holds as long as the contact is small and long); E=1e7, rho=1000 for rubber;
-# MESHES = (12,), which takes a minute; scheme=vc.Midpoint() in simulate.
+# Things to try: speed=10.0 (the theory holds as long as the contact is small and long); E=1e7,
+# rho=1000 for rubber; MESHES = (12,), which takes a minute; scheme=vc.Midpoint() in simulate.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

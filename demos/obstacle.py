@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Stretch a membrane over a ball, a field with a lower bound, and compare it with the exact solution on five meshes.
+"""Stretch a membrane over a ball, a field with a lower bound, and compare it with the exact
+solution on five meshes.
 
-The membrane is held at the height of the exact solution along the sides of a square, and lies on the ball within the
-radius 0.69797, which is not known beforehand. The problem consists of a form of UFL and a lower bound.
+The membrane is held at the height of the exact solution along the sides of a square, and lies on
+the ball within the radius 0.69797, which is not known beforehand. The problem consists of a form of
+UFL and a lower bound.
 
     bash demos/run.sh obstacle                # a table and a figure, into results/obstacle
     bash demos/run.sh -n 2 obstacle           # the same on two ranks
@@ -26,14 +28,16 @@ from demos.problems.membrane import build
 from vi_contact import vi
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 CELLS = (16, 32, 64, 128, 256)  # squares along a side
 DRAWN = 64
 OUT = Path("results/obstacle")
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
-    """Solve on all meshes (``quick``: the three coarse ones); return errors, the contact radius, the force."""
+    """Solve on all meshes (``quick``: the three coarse ones); return errors, the contact radius,
+    the force."""
     comm, known, numbers = MPI.COMM_WORLD, Membrane(), {}
     meshes = CELLS[:3] if quick else CELLS
     drawn = None
@@ -96,6 +100,7 @@ def table(numbers: dict[str, float], meshes: tuple[int, ...], known: Membrane) -
     return "\n".join(lines)
 
 
-# Things to try: Membrane(unit=1e-9) in build(): the same active set; method=ReducedNewton() of vi_contact.solvers.
+# Things to try: Membrane(unit=1e-9) in build(): the same active set; method=ReducedNewton() of
+# vi_contact.solvers.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Throw a particle on a wall with a boundary layer: Figs. 1, 2 and 3 of the paper on b-geometry (ENOC 2017).
+"""Throw a particle on a wall with a boundary layer: Figs. 1, 2 and 3 of the paper on b-geometry
+(ENOC 2017).
 
-There is no impact law. The particle slows down in a thin layer before the wall, by Newton's law in a metric that
-grows without bound there, and comes back. Restitution and duration are results in closed form. Beside them stand
-motions by integration in time: with the force that begins smoothly, and with the other readings of the law.
+There is no impact law. The particle slows down in a thin layer before the wall, by Newton's law in
+a metric that grows without bound there, and comes back. Restitution and duration are results in
+closed form. Beside them stand motions by integration in time: with the force that begins smoothly,
+and with the other readings of the law.
 
     bash demos/run.sh particle_layer        # into results/particle_layer
 
@@ -29,7 +31,8 @@ from demos.boundary_layer.trajectory import layer_motion
 from demos.pictures.layer import plot_cut_off, plot_parameters, plot_particle
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 STIFFNESSES = (0.5, 1.0, 2.0, 5.0, 10.0)  # k [N/m]
 DAMPERS = (0.0, 0.5, 1.0, 2.0, 5.0)  # c [N]
 MASS, SPEED, WIDTH = 1.0, 1.0, 1.0  # m [kg], V [m/s], b [m]
@@ -39,7 +42,8 @@ OUT = Path("results/particle_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Make table and figures (``quick``: one k in the table, one a/b below 1); return the key numbers."""
+    """Make table and figures (``quick``: one k in the table, one a/b below 1); return the key
+    numbers."""
     out.mkdir(parents=True, exist_ok=True)
     numbers = table(STIFFNESSES[2:3] if quick else STIFFNESSES)
     plot_particle(
@@ -54,7 +58,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     layer = layer_for(WANTED, mass=MASS, speed=SPEED, width=WIDTH)
     numbers["wanted"] = ParticleImpact(layer, MASS, SPEED).restitution
     print(
-        f"\nFor e = {WANTED:g} at half the layer's depth: k = {layer.k:.6f} N/m, c = {layer.c:.6f} N"
+        f"\nFor e = {WANTED:g} at half the layer's depth: k = {layer.k:.6f} N/m, c = {layer.c:.6f} "
+        "N"
     )
     if progress:
         print(f"Figures are in {out}.")
@@ -67,7 +72,8 @@ def impact(k: float, c: float) -> ParticleImpact:
 
 
 def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
-    """Print restitution, duration and compression of all pairs: closed form, and its distance from integration."""
+    """Print restitution, duration and compression of all pairs: closed form, and its distance from
+    integration."""
     numbers, worst = {}, 0.0
     print("     k      c        e      e_p(f̂)   t_c [s]    t_f [s]  x_min [m]")
     for k in stiffnesses:
@@ -78,7 +84,8 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
                 worst, abs(found.restitution - one.restitution), abs(found.duration - one.duration)
             )
             print(
-                f"{k:6g} {c:6g} {one.restitution:10.6f} {one.poisson_covector:9.6f} {one.compression_time:9.6f} "
+                f"{k:6g} {c:6g} {one.restitution:10.6f} {one.poisson_covector:9.6f} "
+                f"{one.compression_time:9.6f} "
                 f"{one.duration:10.6f} {one.deepest:10.6f}"
             )
             numbers |= {f"e {k:g} {c:g}": one.restitution, f"t_f {k:g} {c:g}": one.duration}
@@ -107,7 +114,8 @@ def readings(ratios: tuple[float, ...], out: Path) -> dict[str, float]:
         for ratio in (*ratios, 1.0):
             found = collide(Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH), metric)
             print(
-                f" {metric.name:9s} {ratio:6g} {found.restitution:9.5f} {found.duration:10.5f} {found.deepest:10.5f}"
+                f" {metric.name:9s} {ratio:6g} {found.restitution:9.5f} {found.duration:10.5f} "
+                f"{found.deepest:10.5f}"
             )
             numbers[f"{metric.name} {ratio:g}"] = found.restitution
     layers = {ratio: Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH) for ratio in ratios}
@@ -116,8 +124,8 @@ def readings(ratios: tuple[float, ...], out: Path) -> dict[str, float]:
     return numbers
 
 
-# Things to try: a particle twice as fast in a layer with a speed of its own, vc.Layer(1.0, k=1.0, c=1.0, speed=1.0): c
-# counts twice; WIDTH = 1e-3 with k = 1e6 (b cancels: the same restitution); c = 100, an almost plastic impact;
-# gravity as the system's force, and t_end instead of contacts=1.
+# Things to try: a particle twice as fast in a layer with a speed of its own, vc.Layer(1.0, k=1.0,
+# c=1.0, speed=1.0): c counts twice; WIDTH = 1e-3 with k = 1e6 (b cancels: the same restitution); c
+# = 100, an almost plastic impact; gravity as the system's force, and t_end instead of contacts=1.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Shake a building on a raft on soil in all three directions: it lifts off at its edges and corners, and slides.
+"""Shake a building on a raft on soil in all three directions: it lifts off at its edges and
+corners, and slides.
 
-The two bodies have tetrahedra that do not match, with Coulomb friction between them. There are three stages, as in
-practice. In the first, gravity acts on a firm base. In the second, the base is released and its reactions are kept as
-forces. In the third, an earthquake of three components comes up from below. The sides of the soil are tied to each
-other, because level ground moves in this way. docs/guide/raft.md has the data, the figures, the mesh and the time
-step.
+The two bodies have tetrahedra that do not match, with Coulomb friction between them. There are
+three stages, as in practice. In the first, gravity acts on a firm base. In the second, the base is
+released and its reactions are kept as forces. In the third, an earthquake of three components comes
+up from below. The sides of the soil are tied to each other, because level ground moves in this way.
+docs/guide/raft.md has the data, the figures, the mesh and the time step.
 
     bash demos/run.sh raft                          # 2e4 unknowns, 1000 steps, into results/raft
     bash demos/run.sh -n 2 raft --size 1e5          # on two ranks
@@ -39,7 +40,8 @@ from vi_contact.cli import status_of
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.faces import plot_faces
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 CONCRETE = vc.LinearElastic(E=2.5e10, nu=0.2, rho=2500.0)
@@ -84,7 +86,8 @@ def main(
     progress: bool = True,
     steps: int | None = None,
 ) -> dict[str, float]:
-    """Run all three stages (``quick``: 3e3 unknowns, 150 steps of 10 ms) and draw; return the key numbers."""
+    """Run all three stages (``quick``: 3e3 unknowns, 150 steps of 10 ms) and draw; return the key
+    numbers."""
     comm = MPI.COMM_WORLD
     dt, t_end = (1e-2, 1.5) if quick else (DT, T_END)
     steps = round(t_end / dt) if steps is None else steps
@@ -124,7 +127,8 @@ def meshed(finer: float, comm: Any) -> tuple[Any, Any]:
 
 
 def problems(mesh: Any, tags: Any) -> tuple[vc.ContactProblem, vc.ContactProblem]:
-    """Return the gravity stage on a firm base, and the dynamic problem on a base that lets waves in and out."""
+    """Return the gravity stage on a firm base, and the dynamic problem on a base that lets waves in
+    and out."""
     cells = [(tags["soil"], SOIL), (tags["building"], CONCRETE)]
     tied = [
         fem.Tied(tags[f"soil_{one}"], tags[f"soil_{two}"])
@@ -147,19 +151,22 @@ def problems(mesh: Any, tags: Any) -> tuple[vc.ContactProblem, vc.ContactProblem
 
 
 def stages(finer: float, comm: Any, solver: Any = None) -> tuple[vc.ContactProblem, vc.State]:
-    """Return (dynamic problem with the reactions of the firm base as forces, its first state, at rest)."""
+    """Return (dynamic problem with the reactions of the firm base as forces, its first state, at
+    rest)."""
     static, problem = problems(*meshed(finer, comm))
     return fem.release(static, vc.static_equilibrium(static, solver=solver), problem)
 
 
 def recorders() -> tuple[Any, ...]:
-    """Return what is recorded: energies, contact, forces and rotation of the raft, histories of points."""
+    """Return what is recorded: energies, contact, forces and rotation of the raft, histories of
+    points."""
     raft = engineering.Resultants("raft", (0.0, 0.0, 0.0))
     return vc.Energy(), vc.Contact(), raft, vc.Probe(POINTS, velocity=True, acceleration=True)
 
 
 def earthquake() -> list[vc.GroundMotion]:
-    """Return three made-up components of the motion of an outcrop of the rock, each with its seed."""
+    """Return three made-up components of the motion of an outcrop of the rock, each with its
+    seed."""
     ground = ground_motion.KanaiTajimi(s0=0.01)
     envelope = ground_motion.Envelope(rise=0.5, end=3.0, decay=2.0)  # [s], [1/s]
     components = []
@@ -200,7 +207,8 @@ def key_numbers(history: Any, weight: float) -> dict[str, float]:
 
 
 def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
-    """Draw all figures and, where there are not too many cells, the film around the largest uplift."""
+    """Draw all figures and, where there are not too many cells, the film around the largest
+    uplift."""
     run = vc.read_run(out)
     history, times = run.history, pictures.instants(run.history)
     pictures.plot_motions(history, out / "motions.png", weight=weight, mu=MU)
@@ -233,7 +241,8 @@ def command_line(words: Sequence[str]) -> int:
 
 
 # Things to try:
-# - MU = 0.2: it slides more and rocks less; PEAKS times 0.2: nothing opens and the response is linear.
+# - MU = 0.2: it slides more and rocks less; PEAKS times 0.2: nothing opens and the response is
+#   linear.
 # - CORE further to the side: it twists as it slides.
 # - fem.CompliantBase without ROCK: the soil goes on below, and nothing comes back from the rock.
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Throw a spinning rigid body on a plane with a boundary layer: second example of the paper on b-geometry (ENOC 2017).
+"""Throw a spinning rigid body on a plane with a boundary layer: second example of the paper on
+b-geometry (ENOC 2017).
 
-The first body has one contact point. Its motion through thinner and thinner layers tends to the impact map of rigid
-body dynamics. The second body is an ellipsoid that tumbles down on the plane. Every bounce has the wanted restitution
-at the point that touches, and turns spin into flight and back.
+The first body has one contact point. Its motion through thinner and thinner layers tends to the
+impact map of rigid body dynamics. The second body is an ellipsoid that tumbles down on the plane.
+Every bounce has the wanted restitution at the point that touches, and turns spin into flight and
+back.
 
     bash demos/run.sh rigid_body_layer      # into results/rigid_body_layer
 
@@ -28,7 +30,8 @@ from demos.boundary_layer.trajectory import layer_motion
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 BODY = RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))
 BEFORE = np.array([0.3, 0.0, -1.0, 0.5, -0.4, 0.2])  # velocity of the mass centre, spin in the body
 RESTITUTION = 0.593624
@@ -61,7 +64,8 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
     rate = BODY.gradient(at_plane) @ BEFORE
     exact = BODY.after_impact(at_plane, BEFORE, RESTITUTION)
     print(
-        f"A = {BODY.gradient(at_plane)}, g_11 = {BODY.normal_mass(at_plane):g} kg, rate {rate:g} m/s\n"
+        f"A = {BODY.gradient(at_plane)}, g_11 = {BODY.normal_mass(at_plane):g} kg, rate {rate:g} "
+        "m/s\n"
         f"impact map with e = {RESTITUTION:g}: {np.round(exact, 6)}\n"
         f"energy {BODY.kinetic_energy(BEFORE):.6f} -> {BODY.kinetic_energy(exact):.6f} J\n\n"
         "  b [m]        e    duration/b   largest difference of velocities"
@@ -80,7 +84,8 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
         errors.append(float(np.max(np.abs(motion.v[-1] - exact))))
         contact = motion.contacts[0]
         print(
-            f"{width:7.0e} {contact.restitution:10.6f} {contact.duration / width:10.4f} {errors[-1]:18.2e}"
+            f"{width:7.0e} {contact.restitution:10.6f} {contact.duration / width:10.4f} "
+            f"{errors[-1]:18.2e}"
         )
     plot_thin_limit(
         {"velocities": (np.array(widths), np.array(errors))},
@@ -105,7 +110,8 @@ def tumbling(t_end: float, out: Path) -> dict[str, float]:
     energy = np.array([EGG.energy(q, v) for q, v in zip(motion.q, motion.v, strict=True)])
     still = np.full(len(energy), energy[0])
     print(
-        "\n   t [s]   rate in [m/s]      e     g_11 [kg]   energy lost [J]   ½ g_11 (1 - e²) ρ̇²   deepest/b"
+        "\n   t [s]   rate in [m/s]      e     g_11 [kg]   energy lost [J]   ½ g_11 (1 - e²) ρ̇²   "
+        "deepest/b"
     )
     worst = 0.0
     for contact in motion.contacts:
@@ -133,7 +139,8 @@ def tumbling(t_end: float, out: Path) -> dict[str, float]:
     }
 
 
-# Things to try: vc.Metric.FULL in layer_motion (another restitution for the same k and c); EGG_E = 1.0, which bounces
-# for ever and loses nothing; axes (0.3, 0.3, 0.3), a ball whose spin no impact can change; EGG_WIDTH = 1e-2, soft skin.
+# Things to try: vc.Metric.FULL in layer_motion (another restitution for the same k and c); EGG_E =
+# 1.0, which bounces for ever and loses nothing; axes (0.3, 0.3, 0.3), a ball whose spin no impact
+# can change; EGG_WIDTH = 1e-2, soft skin.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Rock a block on its corners: Housner's rigid block (1963) as the stiff limit of a finite element body.
+"""Rock a block on its corners: Housner's rigid block (1963) as the stiff limit of a finite element
+body.
 
-A concrete block, 0.4 m wide and 2 m high, is tilted and let go; then it stands on a ground that moves. Its contact is
-two points, the corners of its base. Housner had to assume the loss of energy when the block changes from one corner
-to the other. Here it is a result of unilateral contact with inelastic impulses and a little damping.
+A concrete block, 0.4 m wide and 2 m high, is tilted and let go; then it stands on a ground that
+moves. Its contact is two points, the corners of its base. Housner had to assume the loss of energy
+when the block changes from one corner to the other. Here it is a result of unilateral contact with
+inelastic impulses and a little damping.
 
     bash demos/run.sh rocking_block         # into results/rocking_block
     bash demos/run.sh -n 2 rocking_block    # the same on two ranks
@@ -31,7 +33,8 @@ from demos.problems import rocking_block as rocking
 from vi_contact import fem
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 SHAPE = HousnerBlock(width=0.4, height=2.0)  # [m]
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.0, rho=2400.0)  # [Pa, -, kg/m³]
 BLOCK = rocking.RockingBlock(
@@ -47,7 +50,8 @@ OUT = Path("results/rocking_block")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run free rocking and ground pulses (``quick``: two impacts, steps of 4 ms); return the key numbers."""
+    """Run free rocking and ground pulses (``quick``: two impacts, steps of 4 ms); return the key
+    numbers."""
     comm = MPI.COMM_WORLD
     model = rocking.build(BLOCK, comm)
     dt = (
@@ -88,8 +92,8 @@ def run(
 def free_rocking(
     model: rocking.RockingModel, dt: vc.HalvedAtImpact, t_end: float, out: Path, progress: bool
 ) -> dict[str, float]:
-    """Release the block from RELEASE alpha: beside the rigid one, in Housner's kinematics and in small
-    displacements."""
+    """Release the block from RELEASE alpha: beside the rigid one, in Housner's kinematics and in
+    small displacements."""
     theta0 = RELEASE * SHAPE.alpha
     solution = run(model.problem, model, model.tilted(theta0), dt, t_end, out / "free", progress)
     history = solution.history
@@ -103,7 +107,8 @@ def free_rocking(
     if MPI.COMM_WORLD.rank == 0:
         print(f"\nFree rocking from {RELEASE} alpha\n{solution.summary()}")
         print(
-            "\n  impact   time [s]   Housner   rigid, small   amplitude/alpha before it   Housner   rigid, small"
+            "\n  impact   time [s]   Housner   rigid, small   amplitude/alpha before it   Housner  "
+            " rigid, small"
         )
         before = (
             SHAPE.amplitudes(theta0, count) / SHAPE.alpha,
@@ -111,7 +116,8 @@ def free_rocking(
         )
         for n in range(count):
             print(
-                f"  {n + 1:6d} {times[n]:10.4f} {housner[n]:9.4f} {rigid[n]:14.4f} {peaks[n] / SHAPE.alpha:27.4f} "
+                f"  {n + 1:6d} {times[n]:10.4f} {housner[n]:9.4f} {rigid[n]:14.4f} "
+                f"{peaks[n] / SHAPE.alpha:27.4f} "
                 f"{before[0][n]:9.4f} {before[1][n]:14.4f}"
             )
         plot_rocking(
@@ -138,7 +144,8 @@ def free_rocking(
 def pulses(
     model: rocking.RockingModel, dt: vc.HalvedAtImpact, out: Path, progress: bool
 ) -> dict[str, float]:
-    """Return the shake by slow pulses around g b/h and rectangular ones around the shortest that overturns."""
+    """Return the shake by slow pulses around g b/h and rectangular ones around the shortest that
+    overturns."""
     unit = SHAPE.onset_acceleration
     shortest = SHAPE.overturning_time(STRENGTH * SHAPE.gravity * SHAPE.alpha)
     lifted, turned, numbers = {}, {}, {"onset": model.onset_acceleration}
@@ -166,17 +173,21 @@ def pulses(
         )
     if MPI.COMM_WORLD.rank == 0:
         print(
-            f"\nGround pulses: rocking starts at {unit:.4f} m/s² (Housner), {numbers['onset']:.4f} m/s² (mesh);"
-            f"\n  a rectangle of {STRENGTH:g} times that overturns from {shortest:.4f} s on (Housner)"
+            f"\nGround pulses: rocking starts at {unit:.4f} m/s² (Housner), {numbers['onset']:.4f} "
+            "m/s² (mesh);"
+            f"\n  a rectangle of {STRENGTH:g} times that overturns from {shortest:.4f} s on "
+            "(Housner)"
         )
         for share in ONSET:
             print(
-                f"  slow pulse, {share:g} g b/h: largest gap {1e3 * numbers[f'gap_{share:g}']:.4f} mm"
+                f"  slow pulse, {share:g} g b/h: largest gap {1e3 * numbers[f'gap_{share:g}']:.4f} "
+                "mm"
             )
         for share in LENGTHS:
             angle = numbers[f"last_angle_{share:g}"]
             print(
-                f"  rectangle of {share * shortest:.4f} s: rotation {angle:.2f} of the overturning angle at the end, "
+                f"  rectangle of {share * shortest:.4f} s: rotation {angle:.2f} of the overturning "
+                "angle at the end, "
                 f"{'overturned' if angle > 1.0 else 'came back'}"
             )
         plot_pulses(lifted, turned, out / "pulses.png", angle=BLOCK.overturning_angle, unit=unit)
@@ -184,9 +195,9 @@ def pulses(
     return numbers
 
 
-# Things to try: no damping (vc.NoDamping() for BLOCK): the vibration of one impact meets the next; a softer or stiffer
-# block (E from 3e9 to 3e11); MoreauJean(theta=1.0), which damps the rocking itself; dt=1e-3 instead of
-# model.time_steps(); vc.Trapezoidal() with NoDamping(), which loses no energy: the block hops; a real record,
-# vc.GroundMotion(vc.read_record(file)); mpirun -n 3.
+# Things to try: no damping (vc.NoDamping() for BLOCK): the vibration of one impact meets the next;
+# a softer or stiffer block (E from 3e9 to 3e11); MoreauJean(theta=1.0), which damps the rocking
+# itself; dt=1e-3 instead of model.time_steps(); vc.Trapezoidal() with NoDamping(), which loses no
+# energy: the block hops; a real record, vc.GroundMotion(vc.read_record(file)); mpirun -n 3.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

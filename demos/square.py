@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Press a square on a rigid support without friction, with Tresca's and with Coulomb's friction, by finite elements.
+"""Press a square on a rigid support without friction, with Tresca's and with Coulomb's friction, by
+finite elements.
 
 This is the first example of the space-time boundary elements.
 
-A pressure of 0.1 acts on the top of the unit square from t = 0 on (c_P = 1, c_S = 1/2). Its wave arrives at the
-support at t = 1 and comes back; the energy grows linearly until then, and friction takes some of it.
+A pressure of 0.1 acts on the top of the unit square from t = 0 on (c_P = 1, c_S = 1/2). Its wave
+arrives at the support at t = 1 and comes back; the energy grows linearly until then, and friction
+takes some of it.
 
     bash demos/run.sh square                # three figures and a table, into results/square
     bash demos/run.sh -n 2 square           # the same on two ranks
@@ -33,7 +35,8 @@ from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 SQUARE = Square(cells=20, pressure=0.1)  # h = dt = 0.05, as the source has it
 FRICTION = {
     "no friction": vc.Frictionless(),
@@ -48,8 +51,8 @@ OUT = Path("results/square")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run every friction law with every scheme (``quick``: 10 cells, default scheme); return energies, work of
-    friction, certificates and defects."""
+    """Run every friction law with every scheme (``quick``: 10 cells, default scheme); return
+    energies, work of friction, certificates and defects."""
     comm = MPI.COMM_WORLD
     model = build(replace(SQUARE, cells=10) if quick else SQUARE, comm)
     dt = model.square.time_step
@@ -129,7 +132,7 @@ def table(numbers: dict[str, float], runs: list[str]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: cells=80; confined=True in SQUARE, where the wave is plane and the base feels twice the pressure;
-# vc.Coulomb(0.1), which slips; fem and ParaView with results/square/*/fields.xdmf.
+# Things to try: cells=80; confined=True in SQUARE, where the wave is plane and the base feels twice
+# the pressure; vc.Coulomb(0.1), which slips; fem and ParaView with results/square/*/fields.xdmf.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

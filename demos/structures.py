@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Press beams, a frame and plates on rigid stops and on the ground, and throw them at stops, beside closed forms.
+"""Press beams, a frame and plates on rigid stops and on the ground, and throw them at stops, beside
+closed forms.
 
-Contact needs only M, K and loads of a body. Here they are cubic beam elements as scipy matrices, and thin plates by a
-form of DOLFINx. Every static problem is solved on the condensed route and on all unknowns, and every answer is
-checked again in the conditions of contact.
+Contact needs only M, K and loads of a body. Here they are cubic beam elements as scipy matrices,
+and thin plates by a form of DOLFINx. Every static problem is solved on the condensed route and on
+all unknowns, and every answer is checked again in the conditions of contact.
 
     bash demos/run.sh structures                # tables and a figure, into results/structures
     bash demos/run.sh -n 2 structures           # the plates on two ranks
@@ -28,7 +29,8 @@ from demos.pictures.structures import Shown, plot_structures
 from demos.problems import structures as posed
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 ELEMENTS = (20, 40, 80, 160)  # of the beam on the ground
 CELLS = (8, 16, 32, 64)  # along the side of a plate on a stop, or the diameter
 GROUND_CELLS = (8, 16, 32)  # of the disk on the ground
@@ -40,7 +42,8 @@ OUT = Path("results/structures")
 
 
 def solved(problem: vc.ContactProblem, both: bool = True) -> tuple[Any, float, float]:
-    """Return the equilibrium, how far the two routes differ (0 for one alone), and the residual of the answer."""
+    """Return the equilibrium, how far the two routes differ (0 for one alone), and the residual of
+    the answer."""
     if not both:
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
         return state, 0.0, posed.residual(problem, state)
@@ -92,7 +95,8 @@ def beam_on_the_ground(numbers: dict[str, float], shown: Shown, counts: tuple[in
 def plates_on_stops(
     comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]
 ) -> None:
-    """Press a simply supported square and a clamped disk on a stop at the middle, and over a gap."""
+    """Press a simply supported square and a clamped disk on a stop at the middle, and over a
+    gap."""
     for name, disk in (("square", False), ("disk", True)):
         for share in (0.0, 0.5):
             errors = []
@@ -200,7 +204,8 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 def table(numbers: dict[str, float], shown: Shown) -> str:
     """Return errors of all meshes, with their orders, and what else is known."""
     lines = [
-        f"frame on a stop: force {numbers['frame: force']:.6f} N, exact {numbers['frame: exact']:.6f} N",
+        f"frame on a stop: force {numbers['frame: force']:.6f} N, exact "
+        f"{numbers['frame: exact']:.6f} N",
         "",
         "relative error on meshes that halve, and its order",
     ]
@@ -213,7 +218,8 @@ def table(numbers: dict[str, float], shown: Shown) -> str:
         "",
         f"beam off the ground over {', '.join(f'{value:g}' for value in off.values())} m, exact "
         f"{posed.HEAVY.length:g} m",
-        f"disk on the ground up to r = {', '.join(f'{value:.4f}' for value in radii.values())} m, exact "
+        f"disk on the ground up to r = {', '.join(f'{value:.4f}' for value in radii.values())} m, "
+        "exact "
         f"{numbers['ground: exact radius'] * 0.5 * posed.SIDE:.4f} m",
         "",
     ]
@@ -224,7 +230,8 @@ def table(numbers: dict[str, float], shown: Shown) -> str:
             if key.startswith(f"thrown {name}")
         }
         lines.append(
-            f"thrown {name}: touches at {1e3 * told['touches']:.3f} ms, free motion {1e3 * told['exact']:.3f} "
+            f"thrown {name}: touches at {1e3 * told['touches']:.3f} ms, free motion "
+            f"{1e3 * told['exact']:.3f} "
             f"ms, step {1e3 * told['step']:.3f} ms; energy left {told['left']:.4f}, largest rise "
             f"{told['rise']:.0e}, ledger {told['defect']:.0e}"
         )
@@ -234,12 +241,14 @@ def table(numbers: dict[str, float], shown: Shown) -> str:
     }
     lines += [
         "",
-        f"worst residual {worst['residual']:.1e}; largest difference of the two routes {worst['apart']:.1e}",
+        f"worst residual {worst['residual']:.1e}; largest difference of the two routes "
+        f"{worst['apart']:.1e}",
     ]
     return "\n".join(lines)
 
 
-# Things to try: vc.ZienkiewiczWoodTaylor() as the scheme of thrown(); solver=vc.Volume() in solved() for the beam of 40
-# elements, where its exchanges cycle; SHARE = 0.05, more of the disk on the ground.
+# Things to try: vc.ZienkiewiczWoodTaylor() as the scheme of thrown(); solver=vc.Volume() in
+# solved() for the beam of 40 elements, where its exchanges cycle; SHARE = 0.05, more of the disk on
+# the ground.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

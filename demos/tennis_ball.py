@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Push a disk up with a plane, gently, and let it fly: the tennis ball of the space-time boundary elements.
+"""Push a disk up with a plane, gently, and let it fly: the tennis ball of the space-time boundary
+elements.
 
-The plane rises by 0.05 within one second and goes down again; the disk (R = 1/2, c_P = 2, c_S = 1, no weight) leaves it
-on its way down and flies up with a constant velocity and constant energy, whether it rubs on the plane or not.
+The plane rises by 0.05 within one second and goes down again; the disk (R = 1/2, c_P = 2, c_S = 1,
+no weight) leaves it on its way down and flies up with a constant velocity and constant energy,
+whether it rubs on the plane or not.
 
     bash demos/run.sh tennis_ball                # three figures and a table, into results/tennis_ball
     bash demos/run.sh -n 2 tennis_ball           # the same on two ranks
@@ -33,7 +35,8 @@ from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 DISK = Disk(radius=0.5, size=0.04, push=Push(height=0.05, rise=1.0))  # h = 2 dt = 0.04
 FRICTION = {
     "no friction": vc.Frictionless(),
@@ -57,7 +60,8 @@ COLUMNS = (
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all friction laws with the default scheme (``quick``: cells of 0.1); return the columns of the table."""
+    """Run all friction laws with the default scheme (``quick``: cells of 0.1); return the columns
+    of the table."""
     comm = MPI.COMM_WORLD
     model = build(replace(DISK, size=0.1) if quick else DISK, comm)
     dt = model.disk.time_step
@@ -153,7 +157,7 @@ def table(numbers: Mapping[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: Push(height=0.1, rise=4.0), a gentler push of which boundary elements say v = 0.0679; vc.Coulomb(0.1),
-# which slips; scheme=vc.Midpoint() in simulate; size=0.02.
+# Things to try: Push(height=0.1, rise=4.0), a gentler push of which boundary elements say v =
+# 0.0679; vc.Coulomb(0.1), which slips; scheme=vc.Midpoint() in simulate; size=0.02.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

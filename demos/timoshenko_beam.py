@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Rub a viscoelastic Timoshenko beam on a wall with its tip: Ahn (2012), and what that scheme leaves out.
+"""Rub a viscoelastic Timoshenko beam on a wall with its tip: Ahn (2012), and what that scheme
+leaves out.
 
-First come the runs of the source with their figures 8.1 to 8.9. Their normal force is given, friction is regularised,
-and Newton's method solves a scalar equation in each step. Then the friction inequality itself stands beside them. In
-the last run the beam is also a rod that is pulled against the wall. Its computed contact force drives the friction,
-and the tip slips, sticks, lifts off and touches again.
+First come the runs of the source with their figures 8.1 to 8.9. Their normal force is given,
+friction is regularised, and Newton's method solves a scalar equation in each step. Then the
+friction inequality itself stands beside them. In the last run the beam is also a rod that is pulled
+against the wall. Its computed contact force drives the friction, and the tip slips, sticks, lifts
+off and touches again.
 
     bash demos/run.sh timoshenko_beam       # into results/timoshenko_beam
 
-Units are SI with the source's dimensionless data; docs/theory/beam.md explains the numbers. One process is enough.
+Units are SI with the source's dimensionless data; docs/theory/beam.md explains the numbers. One
+process is enough.
 """
 
 from __future__ import annotations
@@ -40,7 +43,8 @@ from demos.problems.published_beam import (
 )
 from vi_contact.cli import status_of
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 VISCOSITIES = (0.001, 2.0)  # a2 of the source [s]: almost elastic, strongly damped
 READING = "C"  # of the normal force that is drawn; the table has all of them
 SPANS = ((0.0, 0.6), (0.6, 1.5), (1.5, 2.0))  # of Figs. 8.4 to 8.9 [s]
@@ -65,14 +69,17 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def published(count: int, dt: float, out: Path) -> dict[str, float]:
-    """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with READING."""
+    """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with
+    READING."""
     steps, forces = round(T_END / dt), readings(dt)
     numbers, drawn = {}, {}
     print(
-        f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = {T_END:g} s [J]"
+        f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = "
+        f"{T_END:g} s [J]"
     )
     print(
-        "  a2 [s]  reading   E(0)     E(end)   lost to friction, viscosity   tip(1), tip(end) [m]   updates   ledger"
+        "  a2 [s]  reading   E(0)     E(end)   lost to friction, viscosity   tip(1), tip(end) [m]  "
+        " updates   ledger"
     )
     for viscosity in VISCOSITIES:
         for name, force in forces.items():
@@ -94,7 +101,8 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
                 (history["loss_friction"][-1], history["loss_damping"][-1]),
             )
             print(
-                f"  {viscosity:6g}  {name:7s} {energy[0]:8.4f} {energy[-1]:8.4f} {lost[0]:14.4f} {lost[1]:13.4f} "
+                f"  {viscosity:6g}  {name:7s} {energy[0]:8.4f} {energy[-1]:8.4f} {lost[0]:14.4f} "
+                f"{lost[1]:13.4f} "
                 f"{tip[steps // 2]:13.5f} {tip[-1]:9.5f} {run.mean_updates:11.3f} {defect:9.1e}"
             )
             key = f"a2 {viscosity:g} {name}"
@@ -125,7 +133,8 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
 
 def exact(count: int, dt: float, out: Path) -> dict[str, float]:
-    """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and eps -> 0."""
+    """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and
+    eps -> 0."""
     body, elements, start = (
         beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
         beam.Elements(count),
@@ -151,7 +160,8 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
     errors = np.array([np.max(np.abs(run["u_tip"] - law["u_tip"])) for run in runs.values()])
     stuck = int(np.sum(law["slip"][1:] == 0.0))
     print(
-        f"\nThe friction inequality, mu = {MU:g}, r_n = {FORCE:g} N: {stuck} of {steps} steps stick; "
+        f"\nThe friction inequality, mu = {MU:g}, r_n = {FORCE:g} N: {stuck} of {steps} steps "
+        "stick; "
         f"two routes differ by {apart:.1e} m"
     )
     for eps, error in zip(EPS, errors, strict=True):
@@ -163,7 +173,8 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 
 
 def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float]:
-    """Run rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
+    """Run rod and beam as one contact problem, with impulses on velocities: their forces do not
+    ring."""
     problem = rubbing_problem(
         ROD,
         beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
@@ -195,9 +206,10 @@ def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float
     }
 
 
-# Things to try: READING = "A"; beam.Elements(ELEMENTS) instead of published_elements, a tip that may turn (the source's
-# last rotation function holds it: docs/theory/beam.md); eps = 2e-4 in published(); mu that falls with the rate,
-# vc.SlipRateCoulomb(vc.ExponentialDecay(0.4, 0.2, 0.5)), in rubbing(); scheme=vc.Midpoint() there, whose contact forces
-# ring; body_force=lambda t: 20.0 + 10.0 * np.sin(8.0 * t) for ROD.
+# Things to try: READING = "A"; beam.Elements(ELEMENTS) instead of published_elements, a tip that
+# may turn (the source's last rotation function holds it: docs/theory/beam.md); eps = 2e-4 in
+# published(); mu that falls with the rate, vc.SlipRateCoulomb(vc.ExponentialDecay(0.4, 0.2, 0.5)),
+# in rubbing(); scheme=vc.Midpoint() there, whose contact forces ring; body_force=lambda t: 20.0 +
+# 10.0 * np.sin(8.0 * t) for ROD.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

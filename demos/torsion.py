@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Twist an elastic-plastic bar: find a stress function between bounds on a disk (known exactly) and on a square.
+"""Twist an elastic-plastic bar: find a stress function between bounds on a disk (known exactly) and
+on a square.
 
-The yield condition |∇u| <= k is, for a bar without holes, the obstacle |u| <= k times the distance to the boundary.
-Where u lies on the obstacle the bar is plastic. On the disk the plastic zone and the torque are known for every
-twist. On the square the elastic bar and the limit torque are known, and one twist is computed again by another
-method, projected relaxation of finite differences.
+The yield condition |∇u| <= k is, for a bar without holes, the obstacle |u| <= k times the distance
+to the boundary. Where u lies on the obstacle the bar is plastic. On the disk the plastic zone and
+the torque are known for every twist. On the square the elastic bar and the limit torque are known,
+and one twist is computed again by another method, projected relaxation of finite differences.
 
     bash demos/run.sh torsion                # a table and a figure, into results/torsion
     bash demos/run.sh -n 2 torsion           # the same on two ranks
@@ -31,7 +32,8 @@ from vi_contact import vi
 from vi_contact.cli import status_of
 from vi_contact.fem import compat
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 CELLS = 64  # along a side, or a diameter
 TWISTS = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)  # G theta a / k
 DRAWN = 2.0
@@ -39,7 +41,8 @@ OUT = Path("results/torsion")
 
 
 def section(comm: Any, cells: int, disk: bool) -> Any:
-    """Return a mesh of the square (-1, 1)², or of the disk that it becomes when squares around 0 are made circles."""
+    """Return a mesh of the square (-1, 1)², or of the disk that it becomes when squares around 0
+    are made circles."""
     kind = dolfinx.mesh.DiagonalType.crossed if disk else dolfinx.mesh.DiagonalType.right
     on = dolfinx.mesh.create_rectangle(comm, [[-1, -1], [1, 1]], [cells, cells], diagonal=kind)
     if disk:
@@ -80,7 +83,8 @@ class Bar:
 
 
 def relaxed(cells: int, w: float, sweeps: int = 4000) -> Any:
-    """Return u at the nodes (cells + 1)² of the square by projected over-relaxation of five-point differences."""
+    """Return u at the nodes (cells + 1)² of the square by projected over-relaxation of five-point
+    differences."""
     h, omega = 2.0 / cells, 2.0 / (1.0 + np.sin(np.pi / cells))
     line = np.linspace(-1.0, 1.0, cells + 1)
     x, y = np.meshgrid(line, line, indexing="ij")
@@ -102,7 +106,8 @@ def relaxed(cells: int, w: float, sweeps: int = 4000) -> Any:
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
-    """Twist both bars (``quick``: on a quarter of the cells); return torques, zones and their errors."""
+    """Twist both bars (``quick``: on a quarter of the cells); return torques, zones and their
+    errors."""
     comm, cells, numbers, fields = MPI.COMM_WORLD, CELLS // 2 if quick else CELLS, {}, {}
     torques: dict[str, list[float]] = {}
     for name, disk in (("disk", True), ("square", False)):
@@ -154,8 +159,8 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 
 
 def against_relaxation(points: Any, values: Any, cells: int, w: float) -> float:
-    """Return the largest difference of u on the square from finite differences: on these triangles they are the same
-    equations."""
+    """Return the largest difference of u on the square from finite differences: on these triangles
+    they are the same equations."""
     nodes = np.rint((points[:, :2] + 1.0) * 0.5 * cells).astype(int)
     return float(np.max(np.abs(values - relaxed(cells, w)[nodes[:, 0], nodes[:, 1]])))
 
@@ -163,7 +168,8 @@ def against_relaxation(points: Any, values: Any, cells: int, w: float) -> float:
 def table(numbers: dict[str, float]) -> str:
     """Return torques beside the known ones."""
     lines = [
-        f"{'twist':>6} {'disk: torque':>13} {'exact':>9} {'error of u':>11} {'plastic from':>13} {'exact':>7} "
+        f"{'twist':>6} {'disk: torque':>13} {'exact':>9} {'error of u':>11} {'plastic from':>13} "
+        f"{'exact':>7} "
         f"{'square: torque':>15} {'elastic':>9} {'limit':>7}"
     ]
     for w in TWISTS:
@@ -172,12 +178,15 @@ def table(numbers: dict[str, float]) -> str:
         )
         zone = f"{inner:.4f}" if inner < 2.0 else "none"
         lines.append(
-            f"{w:>6g} {torque:>13.5f} {float(disk_torque(w)):>9.5f} {error:>11.1e} {zone:>13} {1.0 / w:>7.4f} "
-            f"{numbers[f'square {w:g}: torque']:>15.5f} {square_elastic()[0] * w:>9.5f} {SQUARE_LIMIT:>7.4f}"
+            f"{w:>6g} {torque:>13.5f} {float(disk_torque(w)):>9.5f} {error:>11.1e} {zone:>13} "
+            f"{1.0 / w:>7.4f} "
+            f"{numbers[f'square {w:g}: torque']:>15.5f} {square_elastic()[0] * w:>9.5f} "
+            f"{SQUARE_LIMIT:>7.4f}"
         )
     lines += [
         "",
-        f"square at {DRAWN:g}, difference from projected relaxation: {numbers['relaxation']:.1e} of k a",
+        f"square at {DRAWN:g}, difference from projected relaxation: {numbers['relaxation']:.1e} "
+        "of k a",
     ]
     return "\n".join(lines)
 

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Shake a tower that stands on soil, lifts off and slides, above a compliant base and between free-field sides.
+"""Shake a tower that stands on soil, lifts off and slides, above a compliant base and between
+free-field sides.
 
-There are three stages, as in practice. In the first, gravity acts on firm supports. In the second, the supports are
-released and their reactions are kept as forces. In the third, an earthquake comes up from below. A compliant base
-takes the upgoing motion, which is half of an outcrop record, so the motion of the base differs from the record that
-is put in. docs/guide/soil.md explains these boundaries.
+There are three stages, as in practice. In the first, gravity acts on firm supports. In the second,
+the supports are released and their reactions are kept as forces. In the third, an earthquake comes
+up from below. A compliant base takes the upgoing motion, which is half of an outcrop record, so the
+motion of the base differs from the record that is put in. docs/guide/soil.md explains these
+boundaries.
 
     bash demos/run.sh tower_on_soil         # into results/tower_on_soil
     bash demos/run.sh -n 2 tower_on_soil    # the same on two ranks
@@ -30,7 +32,8 @@ from vi_contact.cli import status_of
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(500.0, 250.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 TOWER = vc.LinearElastic(E=1.5e9, nu=0.2, rho=500.0)  # a building seen as one block
@@ -45,7 +48,8 @@ OUT = Path("results/tower_on_soil")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key numbers."""
+    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key
+    numbers."""
     comm = MPI.COMM_WORLD
     h, dt, t_end = (2.0, 1e-2, 1.1) if quick else (1.0, DT, T_END)
     lower, upper = (
@@ -89,7 +93,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         print(f"  outcrop {OUTCROP.amplitude:.2f} (upgoing wave {0.5 * OUTCROP.amplitude:.2f})")
         print("".join(f"  {name} {value:.2f}\n" for name, value in peak.items()))
         print(
-            f"Largest share of the foot that is open {numbers['uplift']:.2f}, slip {1e3 * numbers['slip']:.1f} mm"
+            f"Largest share of the foot that is open {numbers['uplift']:.2f}, slip "
+            f"{1e3 * numbers['slip']:.1f} mm"
         )
         draw(history, out / "motions.png")
         plot_energy(history, out / "energy.png")
@@ -154,7 +159,10 @@ if __name__ == "__main__":
     raise SystemExit(status_of(lambda: main(quick="--quick" in sys.argv)))
 
 # Things to try:
-# - MU = 0.2 slides instead of rocking; a smaller amplitude keeps the foot closed and the response linear.
-# - fem.CompliantBase without ROCK: the soil goes on below, the surface moves with the outcrop record itself.
-# - tied=fem.Tied(...) in place of the free-field sides: what the tower radiates comes back in from the other side.
+# - MU = 0.2 slides instead of rocking; a smaller amplitude keeps the foot closed and the response
+#   linear.
+# - fem.CompliantBase without ROCK: the soil goes on below, the surface moves with the outcrop
+#   record itself.
+# - tied=fem.Tied(...) in place of the free-field sides: what the tower radiates comes back in from
+#   the other side.
 # - DAMPING with alpha: see docs/reference/faq.md.

@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Shake a wall beside the ground by a harmonic earthquake: Figs. 1 to 5 of the boundary method for dynamic contact.
+"""Shake a wall beside the ground by a harmonic earthquake: Figs. 1 to 5 of the boundary method for
+dynamic contact.
 
-A concrete wall, 9 m high, is clamped at its base; on its right side it may lift off the ground but not enter it. Every
-step is solved twice, condensed to the contact points and on all unknowns, and the two must agree to round-off.
+A concrete wall, 9 m high, is clamped at its base; on its right side it may lift off the ground but
+not enter it. Every step is solved twice, condensed to the contact points and on all unknowns, and
+the two must agree to round-off.
 
     bash demos/run.sh wall                      # all figures, into results/wall, results/wall/a and results/wall/b
     bash demos/run.sh -n 3 wall                 # the same on three ranks
     bash demos/run.sh wall --case a --motion FILE --scale 2   # one run as "vi-contact run wall", and its report
 
-Units are SI; the case data and what the source leaves open are explained in docs/start/first_wall.md.
+Units are SI; the case data and what the source leaves open are explained in
+docs/start/first_wall.md.
 """
 
 from __future__ import annotations
@@ -36,7 +39,8 @@ from vi_contact.cli import status_of
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 WALL = wall_model.Wall(height=9.0, width=6.0, thickness=0.20, divisions=(8, 12))  # [m]
 CASES = {
     "a": "Fig. 4: three possible contact points",
@@ -133,8 +137,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
-    """Draw Fig. 2, the wall and its points, and Fig. 1: the step of case b that presses most, as a structure with its
-    loads and one with its reactions; return by how much their sum misses the answer of the step, relatively."""
+    """Draw Fig. 2, the wall and its points, and Fig. 1: the step of case b that presses most, as a
+    structure with its loads and one with its reactions; return by how much their sum misses the
+    answer of the step, relatively."""
     problem, most, pressed = model.problem("b", excitation=model.harmonic(AMPLITUDE)), -1.0, None
     scheme, dt = vc.ZienkiewiczWoodTaylor(phi=0.5), model.time_step()
     for state, report in vc.march(
@@ -153,7 +158,8 @@ def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
 def compare_schemes(
     model: wall_model.WallModel, case: str, steps: int, refined: int, figure: Path
 ) -> None:
-    """Run the source's scheme and impact rule beside the default scheme, which needs no rule and does not ring."""
+    """Run the source's scheme and impact rule beside the default scheme, which needs no rule and
+    does not ring."""
     runs = {}
     for name, impact, finer in (
         ("source's rule, its dt", vc.Inelastic(), 1),
@@ -192,7 +198,8 @@ def compare_schemes(
 
 
 def command_line(words: Sequence[str]) -> int:
-    """Run the built-in case and draw its report, both routes to every step; without --case, cases a and b."""
+    """Run the built-in case and draw its report, both routes to every step; without --case, cases a
+    and b."""
     options = ArgumentParser(add_help=False, allow_abbrev=False)
     options.add_argument("--case", choices=BUILT_IN)
     options.add_argument("--out", default=str(OUT))
@@ -208,8 +215,8 @@ def command_line(words: Sequence[str]) -> int:
     return 0
 
 
-# Things to try: bilateral instead of unilateral contact (case "bilateral"); impact=vc.Elastic(); a finer mesh,
-# Wall(divisions=(32, 48)); triangles; a real earthquake with --motion; mpirun -n 3.
+# Things to try: bilateral instead of unilateral contact (case "bilateral"); impact=vc.Elastic(); a
+# finer mesh, Wall(divisions=(32, 48)); triangles; a real earthquake with --motion; mpirun -n 3.
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         raise SystemExit(command_line(sys.argv[1:]))

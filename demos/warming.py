@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Warm a wall between rigid walls, warm a bar at once, and tear a body apart, and compare with closed forms.
+"""Warm a wall between rigid walls, warm a bar at once, and tear a body apart, and compare with
+closed forms.
 
     sigma = C (eps(u) - eps_0),     eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
 
-A wall below a rigid ceiling is warmed slowly: the gap g closes at (1 + nu) alpha dT H = g, and from there on the
-pressure is E / (1 - nu²) ((1 + nu) alpha dT - g / H). A bar that is warmed at once sends the stress E alpha dT along
-itself as waves, whose arrivals are known. A jump b across a layer strains a held bar by b / L.
+A wall below a rigid ceiling is warmed slowly: the gap g closes at (1 + nu) alpha dT H = g, and from
+there on the pressure is E / (1 - nu²) ((1 + nu) alpha dT - g / H). A bar that is warmed at once
+sends the stress E alpha dT along itself as waves, whose arrivals are known. A jump b across a layer
+strains a held bar by b / L.
 
     bash demos/run.sh warming                 # a table and a figure, into results/warming
     bash demos/run.sh -n 2 warming            # the same on two ranks
@@ -31,7 +33,8 @@ from vi_contact.cli import status_of
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.solvers.volume.route import Volume
 
-# Parameters ----------------------------------------------------------------------------------------------------------
+# Parameters
+# ----------------------------------------------------------------------------------------------------------
 CONCRETE = vc.LinearElastic(E=2.0e10, nu=0.2, rho=2400.0)
 BAR = vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
 ALPHA, WARMER = 1.0e-5, 30.0  # [1/K], [K]
@@ -42,7 +45,8 @@ OUT = Path("results/warming")
 
 
 def slowly(comm: MPI.Comm) -> list[tuple[float, float, float, float]]:
-    """Return (warming [K], pressure [Pa] by the condensed route, by the whole body, by the closed form)."""
+    """Return (warming [K], pressure [Pa] by the condensed route, by the whole body, by the closed
+    form)."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(1.0, HEIGHT), divisions=(4, 12)), comm)
     sides = [
         fem.Prescribed(tags["bottom"], components=(1,)),
@@ -75,8 +79,9 @@ def pressure(dT: float) -> float:
 def at_once(
     comm: MPI.Comm, cells: int
 ) -> tuple[dict[str, tuple[float, float]], tuple[Any, Any, Any]]:
-    """Return (computed, exact) of a bar whose right end has the gap alpha dT L to a wall, and its histories: t over
-    the crossing T = L/c, pushes of the support and of the wall over their exact size."""
+    """Return (computed, exact) of a bar whose right end has the gap alpha dT L to a wall, and its
+    histories: t over the crossing T = L/c, pushes of the support and of the wall over their exact
+    size."""
     strain, speed = ALPHA * WARMER, float(np.sqrt(BAR.E / BAR.rho))
     crossing, push = LENGTH / speed, BAR.E * ALPHA * WARMER
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(cells,)), comm)
@@ -113,7 +118,8 @@ def at_once(
 
 
 def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
-    """Return (computed, exact) of a bar with a jump in the layer of cells behind its middle: free, and held."""
+    """Return (computed, exact) of a bar with a jump in the layer of cells behind its middle: free,
+    and held."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(8,)), comm)
     h = LENGTH / 8.0
     half = 0.5 * LENGTH
@@ -137,7 +143,8 @@ def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, tuple[float, float]]:
-    """Print and draw all comparisons (``quick``: a bar of 50 cells); return them as name -> (computed, exact)."""
+    """Print and draw all comparisons (``quick``: a bar of 50 cells); return them as name ->
+    (computed, exact)."""
     comm = MPI.COMM_WORLD
     pressures = slowly(comm)
     numbers = {f"pressure at {dT:g} K [Pa]": (one, exact) for dT, one, _, exact in pressures}
@@ -159,6 +166,7 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, tuple[float, float]]
     return numbers
 
 
-# Things to try: InitialStrain(lambda x, t: ALPHA * WARMER * x[:, 1] / HEIGHT) bends the wall; degree=2 follows it.
+# Things to try: InitialStrain(lambda x, t: ALPHA * WARMER * x[:, 1] / HEIGHT) bends the wall;
+# degree=2 follows it.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

@@ -1,6 +1,8 @@
-"""Read modules of the package: what is public, where it is defined, how it is called, what its docstring says.
+"""Read modules of the package: what is public, where it is defined, how it is called, what its
+docstring says.
 
-The source is parsed, never imported: signatures stand as they are written, and neither DOLFINx nor PETSc is needed.
+The source is parsed, never imported: signatures stand as they are written, and neither DOLFINx nor
+PETSc is needed.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ Def = ast.FunctionDef | ast.ClassDef
 
 @dataclass(frozen=True)
 class Module:
-    """The text and the syntax tree of one module; ``path`` is dotted and begins below the package."""
+    """The text and the syntax tree of one module; ``path`` is dotted and begins below the
+    package."""
 
     path: str
     text: str
@@ -47,7 +50,8 @@ class Module:
         return re.sub(r"\s+", " ", b"".join(given).decode()).replace("( ", "(").replace(", )", ")")
 
     def annotation(self, node: ast.expr) -> str:
-        """Return an annotation as it is written, without the quotes around names that come later."""
+        """Return an annotation as it is written, without the quotes around names that come
+        later."""
         return self.source(node).strip('"')
 
 
@@ -82,7 +86,8 @@ def assigned(where: Module, name: str) -> ast.expr | None:
 
 
 def homes(where: Module) -> dict[str, str]:
-    """Return name -> module of what a package hands on: by its stub, and what it imports from the package."""
+    """Return name -> module of what a package hands on: by its stub, and what it imports from the
+    package."""
     found = {}
     for node in where.tree.body:
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -97,13 +102,15 @@ def homes(where: Module) -> dict[str, str]:
 
 
 def stub_of(where: Module) -> Path:
-    """Return the stub beside a module, the list of a package's public names; other modules have none."""
+    """Return the stub beside a module, the list of a package's public names; other modules have
+    none."""
     return file_of(where.path).with_suffix(".pyi")
 
 
 @cache
 def contents(where: Module) -> dict[str, list[str]]:
-    """Return module -> names of the imports in the stub of a package; ``*`` stands for all public names of the part."""
+    """Return module -> names of the imports in the stub of a package; ``*`` stands for all public
+    names of the part."""
     stub = stub_of(where)
     found: dict[str, list[str]] = {}
     for node in ast.parse(stub.read_text(encoding="utf-8")).body if stub.is_file() else ():
@@ -119,7 +126,8 @@ def contents(where: Module) -> dict[str, list[str]]:
 
 
 def public(where: Module) -> list[str]:
-    """Return the public names of a package, or of a module without ``__all__``: what it defines and documents."""
+    """Return the public names of a package, or of a module without ``__all__``: what it defines and
+    documents."""
     if handed_on := contents(where):
         names = {name for part in handed_on.values() for name in part}
     elif (listed := assigned(where, "__all__")) is not None:
@@ -133,14 +141,16 @@ def public(where: Module) -> list[str]:
 
 
 def definition(where: Module, name: str) -> tuple[Module, ast.stmt]:
-    """Return the module and the statement that define a name, through the packages that hand it on."""
+    """Return the module and the statement that define a name, through the packages that hand it
+    on."""
     for node in where.tree.body:
         if (isinstance(node, Def) and node.name == name) or name in targets(node):
             return where, node
     home = homes(where).get(name)
     if home is None:
         raise SystemExit(
-            f"docs/make_api.py does not find {name} in vi_contact.{where.path}: is it spelt as there?"
+            f"docs/make_api.py does not find {name} in vi_contact.{where.path}: is it spelt as "
+            "there?"
         )
     return definition(module(home), name)
 
@@ -176,7 +186,8 @@ def function(where: Module, node: ast.FunctionDef, skip: int = 0) -> str:
 
 
 def default(where: Module, value: ast.expr | None) -> str | None:
-    """Return the default of a dataclass field as written; None when it must be given, '' when it is no argument."""
+    """Return the default of a dataclass field as written; None when it must be given, '' when it is
+    no argument."""
     if not (isinstance(value, ast.Call) and where.source(value.func) == "field"):
         return where.source(value) if value else None
     options = {one.arg: where.source(one.value) for one in value.keywords}
@@ -208,7 +219,8 @@ def fields(where: Module, node: ast.ClassDef) -> dict[str, str]:
 
 
 def constructor(where: Module, node: ast.ClassDef) -> str:
-    """Return ``Name(arguments)`` of a class; of a protocol, an error or a class without arguments the name alone."""
+    """Return ``Name(arguments)`` of a class; of a protocol, an error or a class without arguments
+    the name alone."""
     for one in node.body:
         if isinstance(one, ast.FunctionDef) and one.name == "__init__":
             return f"{node.name}({', '.join(parameters(where, one.args, 1))})"

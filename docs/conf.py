@@ -1,4 +1,5 @@
-"""Tell Sphinx how to build the site: ``bash docs/build.sh``. Its source is the clone: links to any file work."""
+"""Tell Sphinx how to build the site: ``bash docs/build.sh``. Its source is the clone: links to any
+file work."""
 
 import os
 import re
@@ -49,7 +50,8 @@ nb_execution_mode = "cache"
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_merge_streams = True
-nb_output_stderr = "show"  # vi_contact warns by logging, which readers must see; what libraries warn of is for authors:
+# vi_contact warns by logging, which readers must see; what libraries warn of is for authors:
+nb_output_stderr = "show"
 os.environ["PYTHONWARNINGS"] = (
     "ignore::DeprecationWarning,ignore::FutureWarning,ignore::UserWarning"
 )
@@ -75,7 +77,8 @@ _NAME = re.compile(rf"(vc|{'|'.join(re.escape(room) for room in ROOMS)})\.[\w.]+
 
 
 def link_names(app: Sphinx, document: nodes.document) -> None:
-    """Link what is written as `vc.simulate`, `Condensed()` or `fem.build_mesh(…)` to the page of that name."""
+    """Link what is written as `vc.simulate`, `Condensed()` or `fem.build_mesh(…)` to the page of
+    that name."""
     for node in list(document.findall(nodes.literal)):
         found = _NAME.match(node.astext())
         if found and not isinstance(node.parent, nodes.reference | pending_xref | nodes.title):

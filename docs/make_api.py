@@ -1,10 +1,12 @@
-"""Write docs/reference/api.md from the docstrings of the package. Run it after every change of a public docstring:
+"""Write docs/reference/api.md from the docstrings of the package. Run it after every change of a
+public docstring:
 
     python3 docs/make_api.py            # write the page
     python3 docs/make_api.py --check    # status 1 and one sentence when the page is not what the docstrings say
 
-It also puts the lines of every stub ``__init__.pyi``, the list of a room's public names, in order, and writes its
-``__all__``: the names are imported when they are first used, which checkers of types and editors see in the stub only.
+It also puts the lines of every stub ``__init__.pyi``, the list of a room's public names, in order,
+and writes its ``__all__``: the names are imported when they are first used, which checkers of types
+and editors see in the stub only.
 """
 
 from __future__ import annotations
@@ -79,12 +81,14 @@ Developers: `python3 docs/make_api.py` makes this page from the docstrings. Mend
 """
 STUB = (
     "# ruff: noqa",
-    "# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.",
+    "# The public names of this package: one line each, here only. docs/make_api.py sorts them and "
+    "writes __all__.",
 )
 
 
 def whole(node: Def) -> str:
-    """Return the whole docstring; its lists of arguments, attributes and results become lists of the page."""
+    """Return the whole docstring; its lists of arguments, attributes and results become lists of
+    the page."""
 
     def listed(found: re.Match[str]) -> str:
         items = re.sub(r"^ {4}(?! )", "- ", found[2], flags=re.MULTILINE)
@@ -106,7 +110,8 @@ def below(where: Module, node: ast.stmt) -> str:
 
 
 def first_paragraph(where: Module, node: Def) -> str:
-    """Return it on one line; where it refers to its module, after the first paragraph of the module."""
+    """Return it on one line; where it refers to its module, after the first paragraph of the
+    module."""
     words = documentation(node).split("\n\n")[0]
     for given in ("Step by the module's equations.", "Hold the settings."):
         if words.startswith(given):
@@ -115,7 +120,8 @@ def first_paragraph(where: Module, node: Def) -> str:
 
 
 def with_links(words: str) -> str:
-    """Return the words with a link to the glossary where a docstring says that a call is collective."""
+    """Return the words with a link to the glossary where a docstring says that a call is
+    collective."""
     return re.sub(r"(?<=[.:)] )Collective(?=[.;])", "[Collective](glossary.md#collective)", words)
 
 
@@ -154,7 +160,8 @@ def listed(
 
 
 def contract() -> Iterator[str]:
-    """Yield the protocols with every method, then the values they exchange, and the whole of every docstring."""
+    """Yield the protocols with every method, then the values they exchange, and the whole of every
+    docstring."""
     yield "## The contract\n"
     for where, node, heading in listed(CONTRACT):
         yield from (heading, f"{with_links(whole(node))}\n")
@@ -196,7 +203,8 @@ def page() -> str:
 
 
 def stub(where: Module) -> str:
-    """Return the stub of a package as it should be: its imports in order, and ``__all__`` of what they name."""
+    """Return the stub of a package as it should be: its imports in order, and ``__all__`` of what
+    they name."""
     imports = [
         line
         for line in stub_of(where).read_text(encoding="utf-8").splitlines()

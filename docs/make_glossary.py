@@ -1,4 +1,5 @@
-"""Write the two tables of docs/reference/glossary.md, German to English and French to English, from its entries.
+"""Write the two tables of docs/reference/glossary.md, German to English and French to English, from
+its entries.
 
     python3 docs/make_glossary.py            # write them: after every change of an entry
     python3 docs/make_glossary.py --check    # say whether they are up to date
@@ -27,7 +28,8 @@ _ENTRY = re.compile(
 
 @dataclass(frozen=True)
 class Entry:
-    """Hold one term: its words in German and French, its symbol, unit and names in the code, and what it means."""
+    """Hold one term: its words in German and French, its symbol, unit and names in the code, and
+    what it means."""
 
     term: str
     german: tuple[str, ...]

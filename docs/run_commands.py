@@ -5,16 +5,17 @@
     python3 docs/run_commands.py --only docs/guide/check.md README.md these alone
     python3 docs/run_commands.py --list                               what runs each command; runs none
 
-A command is a line of a ``sh`` block, an indented line that begins with the name of a program, or a span of code that
-does. Each page has a folder of its own, which looks like a clone: what the page's blocks say is in files there, and so
-are records under the names of the page. What is not run here is in ELSEWHERE, with what runs it or why nothing does.
-Where a page shows in a ``text`` block or a table what its commands print, the lines are compared. Without ``--only``
-the snippets of Python run too, in the length that the pages say. A run takes about an hour.
+A command is a line of a ``sh`` block, an indented line that begins with the name of a program, or a
+span of code that does. Each page has a folder of its own, which looks like a clone: what the page's
+blocks say is in files there, and so are records under the names of the page. What is not run here
+is in ELSEWHERE, with what runs it or why nothing does. Where a page shows in a ``text`` block or a
+table what its commands print, the lines are compared. Without ``--only`` the snippets of Python run
+too, in the length that the pages say. A run takes about an hour.
 
-docs/commands_run.txt keeps the commands that succeeded, with their seconds and a key of the files and commands of the
-page that they need. A command that fails loses its row. The suite does not trust this list:
-tests/house/test_commands.py runs each command of ``vi-contact`` in a short form, and looks for the tests that DEMOS,
-BENCHMARKS and SHORTER name for the others.
+docs/commands_run.txt keeps the commands that succeeded, with their seconds and a key of the files
+and commands of the page that they need. A command that fails loses its row. The suite does not
+trust this list: tests/house/test_commands.py runs each command of ``vi-contact`` in a short form,
+and looks for the tests that DEMOS, BENCHMARKS and SHORTER name for the others.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ ABOVE = (
 )  # pages of the site that stand above docs/
 NAME, BEGINNING = "the name of a command", "the beginning of a command"
 PROGRAM = (
-    r"(?:[A-Z_]+=\S+ )*(?:(?:bash|vi-contact|python3|mpirun|srun|sbatch|git|pip|sudo|apt|apt-get|docker|podman|"
+    r"(?:[A-Z_]+=\S+ "
+    r")*(?:(?:bash|vi-contact|python3|mpirun|srun|sbatch|git|pip|sudo|apt|apt-get|docker|podman|"
     r"apptainer|export|cd|\.venv/\S+|venv/\S+|\. venv/\S+)(?= )|/usr/bin/python3 )"
 )
 JOINED = re.compile(r"\s*\\\n\s*")  # lines that end with a backslash
@@ -52,28 +54,41 @@ FENCE = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here does
     # other programs of the project run these
-    r"bash demos/run\.sh \w+": "docs/gallery/make.py runs every demo and compares what it prints with its page; DEMOS",
-    r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/lint\.sh|bash \.ci/run": ".ci/run runs them",
+    r"bash demos/run\.sh "
+    r"\w+": "docs/gallery/make.py runs every demo and compares what it prints with its page; DEMOS",
+    r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/lint\.sh|bash "
+    r"\.ci/run": ".ci/run runs them",
     r"bash docs/build\.sh|bash install/\w+\.sh": ".ci/run builds the site and installs its tools",
-    r"python3 docs/make_api\.py": "tests/house/test_documents.py::test_the_page_of_names_is_what_the_docstrings_say",
-    r"python3 docs/make_schema\.py": "tests/studies/test_schema.py::test_the_schema_is_that_of_the_signatures",
-    r"python3 docs/make_glossary\.py": "tests/house/test_glossary.py::test_entries_are_in_order_and_tables_are_those_of_the_entries",
+    r"python3 "
+    r"docs/make_api\.py": "tests/house/test_documents.py::test_the_page_of_names_is_what_the_docstrings_say",
+    r"python3 "
+    r"docs/make_schema\.py": "tests/studies/test_schema.py::test_the_schema_is_that_of_the_signatures",
+    r"python3 "
+    r"docs/make_glossary\.py": "tests/house/test_glossary.py::test_entries_are_in_order_and_tables_are_those_of_the_entries",
     r"python3 docs/gallery/make\.py( --index| --only NAME)?": "docs/build.sh runs it",
-    r"python3 docs/notebooks/run\.py": "tests/house/test_notebooks.py::test_a_notebook_runs_in_jupyter",
-    r"PYTHONPATH=\. vi-contact run wall\.toml --allow mine .*": "tests/house/test_extend.py::test_the_command_computes_the_same",
+    r"python3 "
+    r"docs/notebooks/run\.py": "tests/house/test_notebooks.py::test_a_notebook_runs_in_jupyter",
+    r"PYTHONPATH=\. vi-contact run wall\.toml --allow mine "
+    r".*": "tests/house/test_extend.py::test_the_command_computes_the_same",
     r"git (diff|tag|archive) .*": "a step of a release",
     r"python3 docs/run_commands\.py.*": "this program",
     r"bash tests/fuzz\.sh .*": "as many runs of fuzz tests as asked for; "
     "tests/house/test_fuzz_support.py::test_the_script_asks_for_a_seed",
-    r"python3 -m venv build/griffe|build/griffe/bin/.*|pip install 'dolfinx-solver-real.*": "asks a package index",
+    r"python3 -m venv build/griffe|build/griffe/bin/.*|pip install "
+    r"'dolfinx-solver-real.*": "asks a package index",
     # these need what a test has not
-    r"git clone ADDRESS .*|cd vi_contact": "the address is the reader's own; done by hand in fresh trees",
-    r"python3 -m venv .*|pip install (--no-deps )?\.|venv/bin/pip install \.|venv/bin/vi-contact .*|"
+    r"git clone ADDRESS .*|cd "
+    r"vi_contact": "the address is the reader's own; done by hand in fresh trees",
+    r"python3 -m venv .*|pip install (--no-deps )?\.|venv/bin/pip install \.|venv/bin/vi-contact "
+    r".*|"
     r"\. venv/bin/activate": "tests/house/test_install.py::test_pip_installs_the_command",
-    r"pip install (h5py|pyvista|\"vi-contact\[report\]\")|\.venv/site/bin/pip .*": "asks a package index",
+    r"pip install (h5py|pyvista|\"vi-contact\[report\]\")|\.venv/site/bin/pip "
+    r".*": "asks a package index",
     r"\.venv/site/bin/jupyter notebook .*": "stays open, with a browser",
-    r"\.venv/report/bin/python .*|\.venv/site/bin/jupytext .*": "needs what install/report.sh or install/site.sh makes",
-    r"(srun|sbatch) .*|.*\$SLURM_\w+.*": "needs Slurm; without it: tests/run/test_wall_time.py::test_the_batch_script_of_the_guide",
+    r"\.venv/report/bin/python .*|\.venv/site/bin/jupytext "
+    r".*": "needs what install/report.sh or install/site.sh makes",
+    r"(srun|sbatch) "
+    r".*|.*\$SLURM_\w+.*": "needs Slurm; without it: tests/run/test_wall_time.py::test_the_batch_script_of_the_guide",
     r"mpirun -n 64 .*|XDG_CACHE_HOME=\$HOME/forms .*": "needs a cluster",
     r"(docker|apptainer) .*": "needs a container program",
     r"vi-contact report \S+ --out \S+\.html": "needs what install/report.sh brings; "
@@ -84,14 +99,19 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     "test_our_rows_are_measured, tests/benchmarks/test_peers.py::"
     "test_a_peer_that_is_not_there_becomes_rows_that_say_so",
     r"python3 benchmarks/(peers/)?(?!wall_schemes)\w+\.py.*": "minutes to hours; BENCHMARKS",
-    r"bash demos/run\.sh (-n 2 )?raft --size .*": "minutes and up to 30 GB; docs/gallery/make.py runs the small one",
-    r"vi-contact ida wall\.toml --motions records .*": "hours; the page's small one: tests/studies/test_ida.py::test_the_example_gives_a_tidy_table",
+    r"bash demos/run\.sh (-n 2 )?raft --size "
+    r".*": "minutes and up to 30 GB; docs/gallery/make.py runs the small one",
+    r"vi-contact ida wall\.toml --motions records "
+    r".*": "hours; the page's small one: tests/studies/test_ida.py::test_the_example_gives_a_tidy_table",
 }
 NAMES = (  # commands of ours that are named on a page and not given there
-    r"vi-contact (run|new|report|film|ida|post|plot|post checks|run --check|run CASE --solver|report --refine|"
+    r"vi-contact (run|new|report|film|ida|post|plot|post checks|run --check|run CASE "
+    r"--solver|report --refine|"
     r"ida --fragility COLUMN:WAY=LIMIT|motion info|motion spectrum|(new|motion) \w+(\|\w+)+)"
 )
-DEMOS = {  # the test that runs a demo in its short form, main(quick=True), on two ranks too where it is not serial
+# the test that runs a demo in its short form, main(quick=True), on two ranks too where it is not
+# serial
+DEMOS = {
     "wall": "house/test_demos.py::test_the_wall_demo",
     "channel": "house/test_demos_channel.py::test_the_channel_demo",
     "raft": "house/test_demo_raft.py::test_the_raft_demo",
@@ -127,24 +147,36 @@ BENCHMARKS = {  # the test that runs a benchmark, or one of its rows, with small
     "peers/thrown_reference": "benchmarks/test_peers.py::test_thrown_reference_is_its_command_s",
 }
 SMALL = "benchmarks/test_small.py::test_a_benchmark_runs_with_small_sizes"  # the others
-SHORTER = {  # commands that run here and take longer than a test may: a test that gives them, or less of the same
-    r"mpirun -n 3 python3 .*": "house/test_documents.py::test_first_example_prints_what_readme_says",
+# commands that run here and take longer than a test may: a test that gives them, or less of the
+# same
+SHORTER = {
+    r"mpirun -n 3 python3 "
+    r".*": "house/test_documents.py::test_first_example_prints_what_readme_says",
     r"mpirun -n 3 vi-contact run .*": "house/test_commands.py::test_a_run_on_several_ranks",
     r"bash demos/run\.sh -n 3 wall --case b": "house/test_demos.py::test_the_wall_demo",
-    r"bash demos/run\.sh wall --case b .*": "house/test_demos.py::test_the_command_line_of_the_wall_demo",
+    r"bash demos/run\.sh wall --case b "
+    r".*": "house/test_demos.py::test_the_command_line_of_the_wall_demo",
     r"bash demos/run\.sh channel --.*": "models/test_channel.py::test_the_command",
     r"bash demos/run\.sh beam_statements --json": "beam/test_beam_statements.py::test_the_demo",
     r"python3 form\.py": "house/test_ten_minutes.py::test_your_form",
-    r"python3 docs/notebooks/run\.py bouncing_bar": "house/test_notebooks.py::test_the_quick_ones_run_as_programs",
-    r"python3 docs/theory/figures\.py step .*": "house/test_commands.py::test_a_figure_of_the_theory",
-    r"python3 meshes .*|vi-contact run demos/cases/raft\.toml .*": "house/test_demo_raft.py::test_the_case_of_the_raft",
-    r"vi-contact ida wall\.toml --motions motion_1.at2 .*": "studies/test_ida.py::test_the_example_gives_a_tidy_table",
+    r"python3 docs/notebooks/run\.py "
+    r"bouncing_bar": "house/test_notebooks.py::test_the_quick_ones_run_as_programs",
+    r"python3 docs/theory/figures\.py step "
+    r".*": "house/test_commands.py::test_a_figure_of_the_theory",
+    r"python3 meshes .*|vi-contact run demos/cases/raft\.toml "
+    r".*": "house/test_demo_raft.py::test_the_case_of_the_raft",
+    r"vi-contact ida wall\.toml --motions motion_1.at2 "
+    r".*": "studies/test_ida.py::test_the_example_gives_a_tidy_table",
     r"vi-contact report (\S+)": "plots/test_report.py::test_commands",
-    r"vi-contact report (\S+) --refine": "studies/test_refinement.py::test_both_columns_and_their_difference",
+    r"vi-contact report (\S+) "
+    r"--refine": "studies/test_refinement.py::test_both_columns_and_their_difference",
     r"vi-contact run pounding/pounding\.toml.*": "studies/test_starters.py::test_two_frames_pound",
-    r"vi-contact run pier/pier\.toml": "studies/test_practice.py::test_from_new_to_report_in_four_commands",
-    r"vi-contact run (wall/wall|dam)\.toml --check": "studies/test_practice.py::test_starter_is_written_and_checked",
-    r"vi-contact run channel --check": "studies/test_description.py::test_the_page_shows_what_the_command_tells",
+    r"vi-contact run "
+    r"pier/pier\.toml": "studies/test_practice.py::test_from_new_to_report_in_four_commands",
+    r"vi-contact run (wall/wall|dam)\.toml "
+    r"--check": "studies/test_practice.py::test_starter_is_written_and_checked",
+    r"vi-contact run channel "
+    r"--check": "studies/test_description.py::test_the_page_shows_what_the_command_tells",
 }
 TEMPLATES = {
     "post checks DIR": "post checks results/checks",
@@ -226,7 +258,8 @@ def commands(page: Path) -> tuple[str, ...]:
 
 
 def elsewhere(command: str) -> str | None:
-    """Return what runs a command instead of this program, or why nothing does; None if this program runs it."""
+    """Return what runs a command instead of this program, or why nothing does; None if this program
+    runs it."""
     if re.fullmatch(NAMES, command):
         return NAME
     return next((why for form, why in ELSEWHERE.items() if re.fullmatch(form, command)), None)
@@ -242,7 +275,8 @@ def shorter(command: str) -> str | None:
 
 
 def key(command: str) -> str:
-    """Return a hash of the command and of what the pages with this command have in their folders before it."""
+    """Return a hash of the command and of what the pages with this command have in their folders
+    before it."""
     told = hashlib.sha256(to_run(command).encode())
     for page in pages():
         name = page.relative_to(ROOT).as_posix()
@@ -252,7 +286,8 @@ def key(command: str) -> str:
 
 
 def environment(bin_folder: Path, tree: Path) -> dict[str, str]:
-    """Return the environment of install/setup.sh, in which ``vi-contact`` is the command of the tree."""
+    """Return the environment of install/setup.sh, in which ``vi-contact`` is the command of the
+    tree."""
     asked = ["bash", "-c", '. "$0/install/setup.sh"; vi_setup >&2; env -0', str(tree)]
     said = subprocess.run(asked, capture_output=True, check=True)
     found = dict(one.split("=", 1) for one in said.stdout.decode().split("\0") if "=" in one)
@@ -270,7 +305,8 @@ def environment(bin_folder: Path, tree: Path) -> dict[str, str]:
 
 
 def furnish(folder: Path, page: Path, tree: Path) -> None:
-    """Make the folder of a page: links to what is in a clone, records, and files of what its blocks say."""
+    """Make the folder of a page: links to what is in a clone, records, and files of what its blocks
+    say."""
     folder.mkdir(parents=True)
     for one in tree.iterdir():
         if one.name not in ("results", "build"):  # of commands that write into the clone
@@ -317,7 +353,8 @@ def to_run(command: str) -> str:
 def run(
     page: Path, folder: Path, tree: Path, env: dict[str, str]
 ) -> tuple[dict[str, float | None], list[str]]:
-    """Run the commands of a page: (seconds of each that succeeded, None for the others; what failed)."""
+    """Run the commands of a page: (seconds of each that succeeded, None for the others; what
+    failed)."""
     name, wrong, printed = page.relative_to(ROOT).as_posix(), [], [""]
     told: dict[str, float | None] = {}
     asked = [one for one in commands(page) if elsewhere(one) is None]
@@ -382,7 +419,8 @@ def missing(page: Path, printed: Sequence[str]) -> list[str]:
 
 
 def run_snippets(env: dict[str, str]) -> list[str]:
-    """Run what tests/house/test_snippets.py runs of Python, in its whole length; return what failed."""
+    """Run what tests/house/test_snippets.py runs of Python, in its whole length; return what
+    failed."""
     command = [
         "/usr/bin/python3",
         "-m",
@@ -412,7 +450,8 @@ def recorded() -> dict[str, tuple[str, str]]:
 
 
 def keep(told: dict[str, float | None]) -> None:
-    """Write the list: what succeeded when it was last run, of the commands that pages still have."""
+    """Write the list: what succeeded when it was last run, of the commands that pages still
+    have."""
     now = {one for page in pages() for one in commands(page) if elsewhere(one) is None}
     every = recorded()
     for command, seconds in told.items():

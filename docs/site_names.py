@@ -1,6 +1,8 @@
-"""Write the pages of names that only the site has: one a room, with an entry of the index for each name and method.
+"""Write the pages of names that only the site has: one a room, with an entry of the index for each
+name and method.
 
-``docs/conf.py`` calls it before each build. The pages are not kept; ``docs/reference/api.md`` tells the same in short.
+``docs/conf.py`` calls it before each build. The pages are not kept; ``docs/reference/api.md`` tells
+the same in short.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ FOLDER = ROOT / "docs" / "reference" / "names"
 
 
 def directive(kind: str, signature: str, text: str, *options: str) -> str:
-    """Return a directive of Sphinx's Python domain, in MyST's words, with more colons than what it holds."""
+    """Return a directive of Sphinx's Python domain, in MyST's words, with more colons than what it
+    holds."""
     colons = ":" * (
         3 + max((len(found) - 2 for found in re.findall(r"^:{3,}", text, re.MULTILINE)), default=0)
     )
@@ -35,7 +38,8 @@ def directive(kind: str, signature: str, text: str, *options: str) -> str:
 
 
 def described(text: str) -> str:
-    """Return a docstring as Markdown: examples in blocks, links to documents, dollar signs as they are."""
+    """Return a docstring as Markdown: examples in blocks, links to documents, dollar signs as they
+    are."""
     text = re.sub(r"(?ms)^>>> .*?(?=\n\n|\Z)", lambda example: f"```pycon\n{example[0]}\n```", text)
     text = re.sub(r"(?<![\w`/])(?:docs/\w+/\w+|README)\.md", r"[\g<0>](../../../\g<0>)", text)
     return text.replace("$", r"\$")
@@ -56,7 +60,8 @@ def members(where: Module, node: ast.ClassDef) -> Iterator[str]:
 
 
 def entry(name: str, where: Module, short: bool) -> str:
-    """Return the entry of a public name of a room; where ``vc.`` has it too, links to that name lead here as well."""
+    """Return the entry of a public name of a room; where ``vc.`` has it too, links to that name
+    lead here as well."""
     there, node = definition(where, name)
     options = [f":canonical: vi_contact.{name}"] if short else []
     if not isinstance(node, Def):
@@ -89,7 +94,8 @@ def overview() -> str:
     rows = (f"| [vi_contact.{name}]({name}.myst) | {text} |" for name, text in told.items())
     head = "# Every name, room by room\n"
     more = (
-        "These pages are for users who write Python and look up a name: its arguments, units, errors and sources. "
+        "These pages are for users who write Python and look up a name: its arguments, units, "
+        "errors and sources. "
         "They are made from the docstrings. {ref}`The index <genindex>` has all names.\n"
     )
     table = ["| room | what it holds |", "|---|---|", *rows, ""]

@@ -1,9 +1,10 @@
-"""Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or strikes a plane.
+"""Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or
+strikes a plane.
 
-The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z = 0 are planes of
-symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical groups: cells "ball"; boundary "surface"
-(the sphere), "foot" (its part near the origin: the contact side), "side_x" (x = 0), "side_z" (z = 0) and, of the
-eighth, "cut" (y = R).
+The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z
+= 0 are planes of symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical
+groups: cells "ball"; boundary "surface" (the sphere), "foot" (its part near the origin: the contact
+side), "side_x" (x = 0), "side_z" (z = 0) and, of the eighth, "cut" (y = R).
 """
 
 import math
@@ -35,10 +36,10 @@ _SIZES = {  # the size field alone decides
 class BallMesh:
     """Describe a mesh of a ball of `radius` [m].
 
-    Cells have about `size` [m] within the distance `foot` [m] of the origin. Farther away they have about `size` plus
-    `growth` times the distance from the foot, but at most `coarsest` (a quarter of the radius unless given). The sphere
-    becomes a polyhedron inside it: volume and mass are too small by about 0.35 (coarsest/radius)². Raises InputError
-    for sizes that make no ball.
+    Cells have about `size` [m] within the distance `foot` [m] of the origin. Farther away they have
+    about `size` plus `growth` times the distance from the foot, but at most `coarsest` (a quarter
+    of the radius unless given). The sphere becomes a polyhedron inside it: volume and mass are too
+    small by about 0.35 (coarsest/radius)². Raises InputError for sizes that make no ball.
     """
 
     radius: float
@@ -52,8 +53,10 @@ class BallMesh:
         attributes(self, positive=("radius", "size", "foot", "growth"))
         if not (self.size <= self.foot < self.radius and self.size <= self._largest <= self.radius):
             raise InputError(
-                f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m, coarsest"
-                f" cell {self._largest} m: they must be size <= foot < radius, size <= coarsest <= radius"
+                f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m, "
+                "coarsest"
+                f" cell {self._largest} m: they must be size <= foot < radius, size <= coarsest <= "
+                "radius"
             )
         cells = (self.foot / self.size) ** 3 + (self.radius / self._largest) ** 3
         counted("ball", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
@@ -75,14 +78,16 @@ class BallMesh:
         _add_foot(model, sphere, self.foot)
 
     def _size_field(self) -> str:
-        """Return min(coarsest, size + growth max(0, distance - foot)), written with abs: MathEval has neither."""
+        """Return min(coarsest, size + growth max(0, distance - foot)), written with abs: MathEval
+        has neither."""
         beyond = f"(sqrt(x^2+y^2+z^2)-{self.foot!r})"
         wanted = f"({self.size!r}+{0.5 * self.growth!r}*({beyond}+abs({beyond})))"
         return f"0.5*({self._largest!r}+{wanted}-abs({self._largest!r}-{wanted}))"
 
 
 def _add_ball(model: Any, radius: float, eighth: bool) -> int:
-    """Add the part of the ball, its parametric poles on the x axis: away from the foot, where cells are finest."""
+    """Add the part of the ball, its parametric poles on the x axis: away from the foot, where cells
+    are finest."""
     turn = 0.5 * math.pi
     ball: int = model.occ.addSphere(
         0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn

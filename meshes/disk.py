@@ -1,7 +1,9 @@
-"""Mesh a disk by triangles of one size, its left half the mirror image of the right one: a ball in the plane.
+"""Mesh a disk by triangles of one size, its left half the mirror image of the right one: a ball in
+the plane.
 
-The disk touches the line y = 0 at the origin, its centre is (0, R). Physical groups: cells "disk"; boundary "foot" (the
-arc within an angle of the lowest point: the contact side) and "rest". Symmetric loads leave it exactly symmetric.
+The disk touches the line y = 0 at the origin, its centre is (0, R). Physical groups: cells "disk";
+boundary "foot" (the arc within an angle of the lowest point: the contact side) and "rest".
+Symmetric loads leave it exactly symmetric.
 """
 
 import math
@@ -26,8 +28,9 @@ _LINE, _TRIANGLE = 1, 2  # Gmsh's numbers
 class DiskMesh:
     """Describe a mesh of a disk of `radius` [m] with cells of about `size` [m].
 
-    `foot` [rad] is half the angle of the contact side, less than a right angle. The circle becomes a polygon inside it:
-    the area is too small by (size/radius)²/6. Raises InputError for sizes that make no disk.
+    `foot` [rad] is half the angle of the contact side, less than a right angle. The circle becomes
+    a polygon inside it: the area is too small by (size/radius)²/6. Raises InputError for sizes that
+    make no disk.
     """
 
     radius: float
@@ -37,7 +40,8 @@ class DiskMesh:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and 0.0 < self.size <= 0.5 * self.radius):
             raise InputError(
-                f"disk of radius {self.radius} m with cells of {self.size} m: give a positive radius and"
+                f"disk of radius {self.radius} m with cells of {self.size} m: give a positive "
+                "radius and"
                 " cells of at most half of it"
             )
         counted(
@@ -79,7 +83,8 @@ class DiskMesh:
 
 
 def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
-    """Add the mirror images of all nodes off the axis to a surface; return image[tag], the tag itself on the axis."""
+    """Add the mirror images of all nodes off the axis to a surface; return image[tag], the tag
+    itself on the axis."""
     tags, points, _ = model.mesh.getNodes()
     tags, points = np.asarray(tags, dtype=int), np.reshape(points, (-1, 3))
     off = points[:, 0] > 1e-9 * float(np.max(points[:, 0]))
@@ -93,7 +98,8 @@ def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
 def _mirrored(
     model: Any, dimension: int, entity: int, kind: int, image: npt.NDArray[np.int_]
 ) -> int:
-    """Add an entity with the mirror images of the cells of another, turned round so that they stay positive."""
+    """Add an entity with the mirror images of the cells of another, turned round so that they stay
+    positive."""
     _, nodes = model.mesh.getElementsByType(kind, entity)
     cells = image[np.asarray(nodes, dtype=int).reshape(-1, dimension + 1)][:, ::-1]
     left: int = model.addDiscreteEntity(dimension)

@@ -1,9 +1,11 @@
-"""Mesh a building on a raft that stands on a box of soil, by tetrahedra: two bodies, each meshed for itself.
+"""Mesh a building on a raft that stands on a box of soil, by tetrahedra: two bodies, each meshed
+for itself.
 
-The building is one body: a raft, a hollow core of walls on it and a slab over every storey. The soil's surface is z = 0
-with the middle of the raft at the origin. Physical groups: cells "building", "soil"; boundary "raft_bottom" and, facing
-it, "soil_foot", which reaches a cell further; "soil_surface" around that; "soil_bottom", "soil_left", "soil_right" (x),
-"soil_back", "soil_front" (y), opposite ones divided alike so that they can be tied; "roof".
+The building is one body: a raft, a hollow core of walls on it and a slab over every storey. The
+soil's surface is z = 0 with the middle of the raft at the origin. Physical groups: cells
+"building", "soil"; boundary "raft_bottom" and, facing it, "soil_foot", which reaches a cell
+further; "soil_surface" around that; "soil_bottom", "soil_left", "soil_right" (x), "soil_back",
+"soil_front" (y), opposite ones divided alike so that they can be tied; "roof".
 """
 
 import sys
@@ -25,12 +27,13 @@ from vi_contact.core.errors import InputError
 class RaftMesh:
     """Describe a building on soil; all lengths in metres.
 
-    `raft` has the lengths of the raft along x and y, and its thickness. `core` has x and y of the middle of the core,
-    and its outer lengths along x and y; `wall` is the thickness of its walls. `storeys` has the heights of the storeys.
-    `slab` is the thickness of the floors, which are as wide as the raft and lie in the upper part of each storey.
-    `soil` has the lengths of the soil along x and y, and its depth. Cells of the building have about `size`; cells of
-    the soil have about `soil_size` under the raft and `far` at the outer edges. Raises InputError for sizes that make
-    no such building.
+    `raft` has the lengths of the raft along x and y, and its thickness. `core` has x and y of the
+    middle of the core, and its outer lengths along x and y; `wall` is the thickness of its walls.
+    `storeys` has the heights of the storeys. `slab` is the thickness of the floors, which are as
+    wide as the raft and lie in the upper part of each storey. `soil` has the lengths of the soil
+    along x and y, and its depth. Cells of the building have about `size`; cells of the soil have
+    about `soil_size` under the raft and `far` at the outer edges. Raises InputError for sizes that
+    make no such building.
     """
 
     raft: tuple[float, ...] = (12.0, 9.0, 1.5)
@@ -55,15 +58,18 @@ class RaftMesh:
         )
         if not (thick > 0.0 and inside and min(self.storeys, default=0.0) > self.slab):
             raise InputError(
-                f"a core {cx} x {cy} m at ({x}, {y}), walls {self.wall}, storeys {self.storeys}, slabs "
-                f"{self.slab} m on a raft {lx} x {ly} x {thick} m: it needs room inside, storeys higher "
+                f"a core {cx} x {cy} m at ({x}, {y}), walls {self.wall}, storeys {self.storeys}, "
+                "slabs "
+                f"{self.slab} m on a raft {lx} x {ly} x {thick} m: it needs room inside, storeys "
+                "higher "
                 "than their slabs, and the raft under all of it"
             )
         if not (
             depth > 0.0 and lx + 4.0 * self.soil_size < wide and ly + 4.0 * self.soil_size < deep
         ):
             raise InputError(
-                f"soil {wide} x {deep} x {depth} m: give depth, and two cells of {self.soil_size} m more "
+                f"soil {wide} x {deep} x {depth} m: give depth, and two cells of {self.soil_size} "
+                "m more "
                 f"than a raft {lx} x {ly} m on every side"
             )
         cells = 6.0 * lx * ly * (thick / self.size**3 + min(depth, lx) / self.soil_size**3)

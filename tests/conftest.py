@@ -1,8 +1,10 @@
-"""One verdict for all ranks: the suite under mpirun fails as a whole, reports once, and never hangs.
+"""One verdict for all ranks: the suite under mpirun fails as a whole, reports once, and never
+hangs.
 
-Ranks meet after collection and after every phase (setup, call, teardown) of every test, on a communicator of their own.
-A phase that failed on one rank is failed on all, so that all go on with the same next test. A rank that does not come
-to the meeting is stuck in a collective call the others never made: the run is then aborted with the reports known.
+Ranks meet after collection and after every phase (setup, call, teardown) of every test, on a
+communicator of their own. A phase that failed on one rank is failed on all, so that all go on with
+the same next test. A rank that does not come to the meeting is stuck in a collective call the
+others never made: the run is then aborted with the reports known.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ from typing import Any, TextIO
 
 import pytest
 
-# What programs print is compared with texts: it must not depend on the terminal or the language of who runs the tests.
+# What programs print is compared with texts: it must not depend on the terminal or the language of
+# who runs the tests.
 os.environ |= {
     "COLUMNS": "100",
     "PYTHON_COLORS": "0",
@@ -47,8 +50,10 @@ ABOVE = (
     "house",
 )  # what they are made of runs on three ranks, they on two
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
-WATCH_SECONDS = 30  # how long one watch over the tests stands: a new one for each would wait for a thread to end
-MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
+# how long one watch over the tests stands: a new one for each would wait for a thread to end
+WATCH_SECONDS = 30
+# patience of a rank that has failed: the others are probably waiting for it in a collective call
+MEETING_SECONDS = 30
 SLOWEST_FILES = 10  # told at the end of a run
 
 _stderr = pytest.StashKey[TextIO]()
@@ -71,8 +76,9 @@ def _patience(seconds: float) -> float:
 def _meet(
     config: pytest.Config, mine: str, *, where: str, seconds: float, dull: bool = False
 ) -> list[str]:
-    """Return the texts of all ranks, in rank order; none where `mine` is `dull` on all of them: nearly always, so that
-    a meeting takes one small reduction. Aborts the run if some rank does not come within `seconds`."""
+    """Return the texts of all ranks, in rank order; none where `mine` is `dull` on all of them:
+    nearly always, so that a meeting takes one small reduction. Aborts the run if some rank does not
+    come within `seconds`."""
     comm, some = _comm(), array("i", [0])
     request = comm.Iallreduce(array("i", [not dull]), some)
     deadline, pause = time.monotonic() + seconds, 1e-5
@@ -111,13 +117,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _second_half(config: pytest.Config) -> bool:
-    """Whether this is every other process of several: those begin to collect from behind. In a fresh tree asserts are
-    rewritten, which takes longer than to import, and so the processes meet in the middle, where they find it done."""
+    """Whether this is every other process of several: those begin to collect from behind. In a
+    fresh tree asserts are rewritten, which takes longer than to import, and so the processes meet
+    in the middle, where they find it done."""
     return bool(int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2)
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
-    """Files that are left out as a whole are not even imported: that takes longer than many of their tests."""
+    """Files that are left out as a whole are not even imported: that takes longer than many of
+    their tests."""
     if SIZE == 1 or collection_path.suffix != ".py":
         return None
     if SIZE > 2 and collection_path.parent.name in ABOVE:
@@ -129,16 +137,16 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 
 
 def _left_out(item: pytest.Item) -> bool:
-    """Serial tests on several ranks; on three and more, which seldom have a core each, also those that are slow and
-    those that say that two ranks show what they show."""
+    """Serial tests on several ranks; on three and more, which seldom have a core each, also those
+    that are slow and those that say that two ranks show what they show."""
     return any(item.get_closest_marker(marker) for marker in LEFT_OUT)
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Of every function, on two ranks so many tests that each value of each parameter occurs, on three, which seldom
-    have a core each, one; of validation, whose parts are tested in the rooms, one on two ranks too, unless ranks are in
-    its name. Their combinations run on one rank, where a law, a scheme or a shape takes the path that it takes on
-    several."""
+    """Of every function, on two ranks so many tests that each value of each parameter occurs, on
+    three, which seldom have a core each, one; of validation, whose parts are tested in the rooms,
+    one on two ranks too, unless ranks are in its name. Their combinations run on one rank, where a
+    law, a scheme or a shape takes the path that it takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
@@ -161,8 +169,8 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
 
 
 def _paired(items: list[pytest.Item]) -> set[pytest.Item]:
-    """All tests, but of a function with three lists of parameters or more so many that every two values of different
-    lists meet: what three do together has not been seen to matter."""
+    """All tests, but of a function with three lists of parameters or more so many that every two
+    values of different lists meet: what three do together has not been seen to matter."""
     kept = set(items)
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
@@ -235,8 +243,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 
 def _load_forms_once() -> None:
-    """FFCx lists its cache of thousands of files whenever a form is made, also one whose module is loaded already, to
-    find a file whose name it knows."""
+    """FFCx lists its cache of thousands of files whenever a form is made, also one whose module is
+    loaded already, to find a file whose name it knows."""
     jit = sys.modules.get("ffcx.codegeneration.jit")
     if jit is None:
         return
@@ -256,7 +264,8 @@ def _load_forms_once() -> None:
 
 
 def _do_not_print_options(ffcx: Any) -> None:
-    """FFCx of DOLFINx 0.5 merges its options twice for every form, and formats them for a log that nobody reads."""
+    """FFCx of DOLFINx 0.5 merges its options twice for every form, and formats them for a log that
+    nobody reads."""
     if not hasattr(ffcx, "get_parameters"):
         return
     merge, known = ffcx.get_parameters, dict[str, dict[str, Any]]()
@@ -317,7 +326,8 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
 
 
 def _agree(config: pytest.Config, report: pytest.TestReport) -> None:
-    """Make a phase that did not end alike on all ranks a failure on all ranks, told with the failing ranks' texts."""
+    """Make a phase that did not end alike on all ranks a failure on all ranks, told with the
+    failing ranks' texts."""
     failed = report.outcome == "failed"
     mine = report.outcome + ("\n" + report.longreprtext if failed else "")
     patience = _patience(MEETING_SECONDS if failed else TEST_SECONDS)
@@ -375,7 +385,8 @@ def comm() -> Any:
 
 @pytest.fixture
 def shared_tmp(comm: Any) -> Iterator[Path]:
-    """A temporary directory, the same on all ranks. Removed at the end: the ranks have met after the call phase."""
+    """A temporary directory, the same on all ranks. Removed at the end: the ranks have met after
+    the call phase."""
     path = comm.bcast(tempfile.mkdtemp(prefix="vi_contact-") if comm.rank == 0 else None, root=0)
     yield Path(path)
     if comm.rank == 0:

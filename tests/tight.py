@@ -1,9 +1,12 @@
-"""A pytest plugin that lists the assertions within a factor 3 of their bound: which processor will break them?
+"""A pytest plugin that lists the assertions within a factor 3 of their bound: which processor will
+break them?
 
-    VI_CONTACT_TIGHT=list.txt PYTHONPYCACHEPREFIX=/tmp/tight OPENBLAS_CORETYPE=Haswell VI_CONTACT_RANKS=1 \\
+    VI_CONTACT_TIGHT=list.txt PYTHONPYCACHEPREFIX=/tmp/tight OPENBLAS_CORETYPE=Haswell
+    VI_CONTACT_RANKS=1 \\
         bash tests/run.sh -p tests.tight -o enable_assertion_pass_hook=true
 
-Looks at what is left of round-off: bounds below SMALL, and tolerances below SMALL of the number they surround.
+Looks at what is left of round-off: bounds below SMALL, and tolerances below SMALL of the number
+they surround.
 """
 
 from __future__ import annotations
@@ -40,7 +43,8 @@ def number(node: ast.expr) -> float:
 
 
 def shares(explanation: str) -> Iterator[float]:
-    """How much of each small bound is used up, from what pytest tells of an assertion with its values put in."""
+    """How much of each small bound is used up, from what pytest tells of an assertion with its
+    values put in."""
     for value, middle, tolerance in AROUND.findall(explanation):
         if 0.0 < float(tolerance) < SMALL * abs(float(middle)):
             yield abs(float(value) - float(middle)) / float(tolerance)
@@ -60,7 +64,8 @@ def shares(explanation: str) -> Iterator[float]:
 
 
 def share(value: ast.expr, bound: ast.expr) -> float:
-    """How much of the bound is used up, or of what is added to something else: now <= before + 1e-12 * first."""
+    """How much of the bound is used up, or of what is added to something else: now <= before +
+    1e-12 * first."""
     before = 0.0
     if isinstance(bound, ast.BinOp) and isinstance(bound.op, ast.Add):
         before, bound = number(bound.left), bound.right
@@ -70,7 +75,8 @@ def share(value: ast.expr, bound: ast.expr) -> float:
 
 
 def pytest_assertion_pass(item: pytest.Item, lineno: int, orig: str, expl: str) -> None:
-    """Write down what is tight; leave a test alone that asserts in every step, for explanations are slow."""
+    """Write down what is tight; leave a test alone that asserts in every step, for explanations are
+    slow."""
     seen[item.nodeid] += 1
     if seen[item.nodeid] == ENOUGH:
         util._assertion_pass = None

@@ -1,8 +1,8 @@
 """vi_contact: dynamic unilateral contact of elastic structures, certified step by step.
 
-The names most runs need, imported when they are first used: ``import vi_contact`` needs numpy and scipy only.
-All else has a room: ``vi_contact.fem`` (meshes, assembly, surfaces), ``solvers``, ``laws``, ``ground_motion``,
-``soil``, ``engineering``, ``bem``, ``studies``, ``plots``."""
+The names most runs need, imported when they are first used: ``import vi_contact`` needs numpy and
+scipy only. All else has a room: ``vi_contact.fem`` (meshes, assembly, surfaces), ``solvers``,
+``laws``, ``ground_motion``, ``soil``, ``engineering``, ``bem``, ``studies``, ``plots``."""
 
 from .core.lazy import lazy
 

@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .core import AnalyticGap as AnalyticGap
 from .core import Certificate as Certificate
 from .core import ContactProblem as ContactProblem

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Run the peers of this folder, one process a row, and print the comparison. `bash benchmarks/peers/run.sh` calls it.
+"""Run the peers of this folder, one process a row, and print the comparison. `bash
+benchmarks/peers/run.sh` calls it.
 
 python3 benchmarks/peers/compare.py NAME…           # rows of these peers, with the interpreter that runs this
 python3 benchmarks/peers/compare.py --join FILE…    # the table of stored rows; --json FILE stores them as one

@@ -1,4 +1,5 @@
-"""Solve the three problems with CalculiX: wedges or bricks one layer deep, *CONTACT PAIR with a fixed brick below."""
+"""Solve the three problems with CalculiX: wedges or bricks one layer deep, *CONTACT PAIR with a
+fixed brick below."""
 
 import subprocess
 from typing import Any
@@ -174,7 +175,8 @@ def controls(way: str) -> list[str]:
 
 
 def dynamic(way: str, data: dict[str, Any]) -> list[str]:
-    """Return the step of a motion with what is printed, by default in increments that may be smaller than dt."""
+    """Return the step of a motion with what is printed, by default in increments that may be
+    smaller than dt."""
     dt, end, points = data["dt"], data["dt"] * data["steps"], ""
     deck = [f"*STEP,INC={100 * data['steps']}"]
     if way == "best":

@@ -1,4 +1,5 @@
-"""Solve the three problems with GetFEM, from its user documentation and the help texts of its Python interface."""
+"""Solve the three problems with GetFEM, from its user documentation and the help texts of its
+Python interface."""
 
 from typing import Any
 
@@ -53,7 +54,8 @@ def version() -> str:
 
 
 def square(n: int) -> Any:
-    """Return mesh with its regions, displacement space, integration and the number of every unknown in our order."""
+    """Return mesh with its regions, displacement space, integration and the number of every unknown
+    in our order."""
     gf.util_trace_level(0)
     ours = problems.Square(n)
     mesh = gf.Mesh("ptND", ours.points.T, ours.triangles.T)
@@ -103,7 +105,8 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def inertia(model: Any, mim: Any, space: Any, mesh: Any, rho: float, low: Any) -> Any:
-    """Add time scheme and mass bricks, return the mass matrix. `low`: elements of the two layers next to the foot."""
+    """Add time scheme and mass bricks, return the mass matrix. `low`: elements of the two layers
+    next to the foot."""
     body = np.setdiff1d(np.arange(mesh.nbcvs()), np.concatenate(low))
     model.add_Newmark_scheme("u", 0.25, 0.5)
     total = gf.Spmat("empty", space.nbdof(), space.nbdof())

@@ -1,4 +1,5 @@
-"""Solve the three problems with Kratos: mortar contact by augmented Lagrangian (ALM) with a fixed strip below."""
+"""Solve the three problems with Kratos: mortar contact by augmented Lagrangian (ALM) with a fixed
+strip below."""
 
 import json
 from typing import Any
@@ -56,7 +57,8 @@ def version() -> str:
 
 
 class Run(StructuralMechanicsAnalysis):
-    """Run an analysis whose model is made by nodes, cells and foot; keep what its nodes tell at every step."""
+    """Run an analysis whose model is made by nodes, cells and foot; keep what its nodes tell at
+    every step."""
 
     def __init__(
         self, way: str, body: tuple[Any, Any], foot: list[int], data: dict[str, Any], **given: Any
@@ -164,7 +166,8 @@ def settings(way: str, data: dict[str, Any]) -> dict[str, Any]:
 def model_files(
     points: Any, cells: Any, foot: list[int], data: dict[str, Any], given: dict[str, Any]
 ) -> None:
-    """Write model.mdpa and materials.json: the body, and below it a strip of cells as wide as the foot's."""
+    """Write model.mdpa and materials.json: the body, and below it a strip of cells as wide as the
+    foot's."""
     h = points[foot[1], 0] - points[foot[0], 0]
     edge = np.arange(-1, len(foot) + 1) * h
     ground = [(x, y - data.get("gap", 0.0)) for y in (-h, 0.0) for x in edge]

@@ -1,4 +1,5 @@
-"""Solve the three problems with NGSolve: forms of penalty at the ground, its Newton iterations and its time steps."""
+"""Solve the three problems with NGSolve: forms of penalty at the ground, its Newton iterations and
+its time steps."""
 
 from collections.abc import Callable
 from typing import Any
@@ -248,7 +249,8 @@ def march(
 
 
 def root(data: dict[str, Any]) -> float:
-    """Return the root of the first energy: NGSolve's tolerance is absolute, the root of residual times correction."""
+    """Return the root of the first energy: NGSolve's tolerance is absolute, the root of residual
+    times correction."""
     return float(
         np.sqrt(
             0.5 * data["rho"] * data["speed"] ** 2

@@ -1,4 +1,5 @@
-"""Solve the three problems with OpenSeesPy: elements tri31 and Truss, springs without tension or with a gap."""
+"""Solve the three problems with OpenSeesPy: elements tri31 and Truss, springs without tension or
+with a gap."""
 
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -136,7 +137,8 @@ def bar(way: str) -> dict[str, Any]:
 
 
 def plane(mesh: Square, E: float, nu: float, rho: float = 0.0) -> int:
-    """Make the square of plane strain and a fixed node below each of its ground's nodes; return the first of these."""
+    """Make the square of plane strain and a fixed node below each of its ground's nodes; return the
+    first of these."""
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 2)
     ops.nDMaterial("ElasticIsotropic", 1, E, nu)
@@ -183,7 +185,8 @@ def march(
     normal: int,
     data: dict[str, Any],
 ) -> Any:
-    """Run all steps; return displacements and velocities of the nodes and the forces of the ground, one row a step."""
+    """Run all steps; return displacements and velocities of the nodes and the forces of the ground,
+    one row a step."""
     with TemporaryDirectory() as folder:
         for what in ("disp", "vel"):
             ops.recorder(

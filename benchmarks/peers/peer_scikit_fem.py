@@ -1,4 +1,5 @@
-"""Solve the three problems with scikit-fem: it assembles, contact and time steps are written by hand."""
+"""Solve the three problems with scikit-fem: it assembles, contact and time steps are written by
+hand."""
 
 from typing import Any
 
@@ -44,7 +45,8 @@ def version() -> str:
 
 
 def square(n: int) -> Any:
-    """Return the basis of the displacements, and the mesh as it is given and as scikit-fem keeps it."""
+    """Return the basis of the displacements, and the mesh as it is given and as scikit-fem keeps
+    it."""
     ours = problems.Square(n)
     mesh = skfem.MeshTri(ours.points.T, ours.triangles.T)
     return ours, mesh, skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1()))

@@ -1,4 +1,5 @@
-"""Solve the three problems with Siconos, written from the help texts of its Python interface and its manual."""
+"""Solve the three problems with Siconos, written from the help texts of its Python interface and
+its manual."""
 
 from typing import Any
 

@@ -20,11 +20,13 @@ WAYS = {
     },
     "thrown": {
         "best": "simulate, no option (the default): trapezoidal rule, mass redistributed, as the guide advises here",
-        "never gains": "ContactStabilisedNewmark, which the guide names for energy that must never grow",
+        "never "
+        "gains": "ContactStabilisedNewmark, which the guide names for energy that must never grow",
     },
     "bar": {
         "best": "simulate, no option (the default): trapezoidal rule, mass redistributed, as the guide advises here",
-        "never gains": "ContactStabilisedNewmark, which the guide names for energy that must never grow",
+        "never "
+        "gains": "ContactStabilisedNewmark, which the guide names for energy that must never grow",
     },
 }
 STOPS = {

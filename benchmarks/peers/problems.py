@@ -1,7 +1,8 @@
-"""Hold the three problems on which programs are compared: meshes, data, reference answers and measures.
+"""Hold the three problems on which programs are compared: meshes, data, reference answers and
+measures.
 
-Only numpy and scipy are used, so that no program that is compared judges itself. SI units throughout. A peer's
-file (`peer_NAME.py` in this folder) defines
+Only numpy and scipy are used, so that no program that is compared judges itself. SI units
+throughout. A peer's file (`peer_NAME.py` in this folder) defines
 
     INSTALL   {"pip": [...]} or {"apt": [...]}: what the program consists of; {"system": []} for this project's stack
     TITLE     its name in the tables
@@ -72,12 +73,14 @@ class Square:
         return np.arange(self.n + 1) * (self.n + 1)
 
 
-# The static square: E, nu, plane strain; u_x = 0 on the left, rigid frictionless ground below, t_y on the top.
+# The static square: E, nu, plane strain; u_x = 0 on the left, rigid frictionless ground below, t_y
+# on the top.
 SIGNORINI = {"E": 1.0e9, "nu": 0.3}
 
 
 def traction(x: Any) -> Any:
-    """Return t_y [Pa] on the top of the static square: it presses on the left and pulls on the right."""
+    """Return t_y [Pa] on the top of the static square: it presses on the left and pulls on the
+    right."""
     return -1.0e6 * (1.2 - 2.0 * np.asarray(x))
 
 
@@ -93,8 +96,9 @@ THROWN = {
     "steps": 400,
 }
 
-# The bouncing bar of Doyen, Ern and Piperno (2011), upright, foot at x = 0, released above the ground under gravity.
-# Period 16/3 s with two bounces in it; one step is one crossing of an element (Courant number 1).
+# The bouncing bar of Doyen, Ern and Piperno (2011), upright, foot at x = 0, released above the
+# ground under gravity. Period 16/3 s with two bounces in it; one step is one crossing of an element
+# (Courant number 1).
 BAR = {"length": 10.0, "E": 900.0, "rho": 1.0, "gravity": 10.0, "height": 5.0, "elements": 100, "dt": 1.0 / 300.0,
        "steps": 8000, "bounces": 10}  # fmt: skip
 
@@ -135,7 +139,8 @@ def _assemble(mesh: Square, local: Any) -> Any:
 
 
 def traction_load(mesh: Square) -> Any:
-    """Return the nodal forces (2N,) [N/m] of the traction, which is linear: its integrals with P1 are exact."""
+    """Return the nodal forces (2N,) [N/m] of the traction, which is linear: its integrals with P1
+    are exact."""
     force, h = np.zeros(2 * len(mesh.points)), 1.0 / mesh.n
     t = traction(mesh.points[mesh.top, 0])
     force[2 * mesh.top[:-1] + 1] += h * (2.0 * t[:-1] + t[1:]) / 6.0
@@ -144,10 +149,11 @@ def traction_load(mesh: Square) -> Any:
 
 
 def signorini_reference(n: int) -> tuple[Any, Any]:
-    """Return u (2N,) [m] and contact forces r (n + 1,) [N/m] of the static square's discrete problem, to round-off.
+    """Return u (2N,) [m] and contact forces r (n + 1,) [N/m] of the static square's discrete
+    problem, to round-off.
 
-    The displacements of all but the ground's nodes are eliminated; the linear complementarity problem of the rest,
-    S y - g = r >= 0, y >= 0, y·r = 0, is solved by active sets.
+    The displacements of all but the ground's nodes are eliminated; the linear complementarity
+    problem of the rest, S y - g = r >= 0, y >= 0, y·r = 0, is solved by active sets.
     """
     from scipy.sparse import linalg
 
@@ -167,7 +173,8 @@ def signorini_reference(n: int) -> tuple[Any, Any]:
 
 
 def complementarity(S: Any, g: Any) -> tuple[Any, Any]:
-    """Return y and r of S y - g = r >= 0, y >= 0, y·r = 0, by the active set of a projected step, S >= 0.
+    """Return y and r of S y - g = r >= 0, y >= 0, y·r = 0, by the active set of a projected step, S
+    >= 0.
 
     Raises RuntimeError when the sets return to one that was there before.
     """
@@ -188,7 +195,8 @@ def complementarity(S: Any, g: Any) -> tuple[Any, Any]:
 
 
 def bar_reference() -> Any:
-    """Return the exact bouncing bar, with force(t) [Pa], displacement(x, t) [m] and energy [J/m²]."""
+    """Return the exact bouncing bar, with force(t) [Pa], displacement(x, t) [m] and energy
+    [J/m²]."""
     sys.path.insert(0, str(HERE.parents[1]))
     from demos.exact.bouncing_bar import BouncingBar
 
@@ -200,16 +208,20 @@ def thrown_reference() -> dict[str, Any]:
     return dict(json.loads((HERE / "thrown_reference.json").read_text(encoding="utf-8")))
 
 
-# Measures -----------------------------------------------------------------------------------------------------------
+# Measures
+# -----------------------------------------------------------------------------------------------------------
 def measure(problem: str, answer: dict[str, Any], n: int) -> dict[str, float]:
     """Return the measures of an answer, which holds, for
 
-    signorini: u (N, 2) [m], numbered as Square; r (n + 1,) [N/m], contact forces of Square.bottom, positive in
-        compression, or None when the program tells none (they are then the residual of the displacements);
-    thrown: t [s], force [N/m], energy (kinetic and strain) [J/m] and gap (smallest one) [m], one value a step; the
-        force is the one that the program reports for the step, the gap that at the end of the step;
-    bar: t [s], force [Pa], energy (kinetic, strain and weight, zero for the bar on the ground) [J/m²] and foot (its
-        height) [m], one value a step; u (101,) [m] at the end, from the foot. Divide by the section of a strip.
+    signorini: u (N, 2) [m], numbered as Square; r (n + 1,) [N/m], contact forces of Square.bottom,
+        positive in compression, or None when the program tells none (they are then the residual of
+        the displacements);
+    thrown: t [s], force [N/m], energy (kinetic and strain) [J/m] and gap (smallest one) [m], one
+        value a step; the force is the one that the program reports for the step, the gap that at
+        the end of the step;
+    bar: t [s], force [Pa], energy (kinetic, strain and weight, zero for the bar on the ground)
+        [J/m²] and foot (its height) [m], one value a step; u (101,) [m] at the end, from the foot.
+        Divide by the section of a strip.
     """
     return {"signorini": _signorini, "thrown": _thrown, "bar": _bar}[problem](answer, n)
 
@@ -222,7 +234,8 @@ def initial_energy(problem: str) -> float:
 
 
 def _signorini(answer: dict[str, Any], n: int) -> dict[str, float]:
-    """Compare with the discrete solution; the potential energy is that of the common matrix for all."""
+    """Compare with the discrete solution; the potential energy is that of the common matrix for
+    all."""
     mesh = Square(n)
     exact, forces = signorini_reference(n)
     K, f = stiffness(mesh, **SIGNORINI), traction_load(mesh)
@@ -278,7 +291,8 @@ def _bar(answer: dict[str, Any], n: int) -> dict[str, float]:
     }
 
 
-# One row ------------------------------------------------------------------------------------------------------------
+# One row
+# ------------------------------------------------------------------------------------------------------------
 def seconds() -> float:
     """Return the processor time [s] of this process and of its finished children, all threads."""
     both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -286,9 +300,11 @@ def seconds() -> float:
 
 
 def main(peer: dict[str, Any]) -> None:
-    """Answer `peer_NAME.py PROBLEM N WAY FILE`: run one row, store its answer and processor time in FILE.
+    """Answer `peer_NAME.py PROBLEM N WAY FILE`: run one row, store its answer and processor time in
+    FILE.
 
-    The time is that of the call: from the mesh to the answer, without imports. `version` alone prints the version.
+    The time is that of the call: from the mesh to the answer, without imports. `version` alone
+    prints the version.
     """
     if sys.argv[1:] == ["version"]:
         print(peer["version"]())
@@ -301,10 +317,11 @@ def main(peer: dict[str, Any]) -> None:
 
 
 def lines_of(path: Path, *wanted_names: str) -> int:
-    """Count the lines of code of a problem of a peer's file: its function and what it uses of the file, imports too.
+    """Count the lines of code of a problem of a peer's file: its function and what it uses of the
+    file, imports too.
 
-    What it takes of the assembly of this module counts too: a program that has no finite elements needs those lines.
-    Blank lines, comments and docstrings are not counted.
+    What it takes of the assembly of this module counts too: a program that has no finite elements
+    needs those lines. Blank lines, comments and docstrings are not counted.
     """
     source = path.read_text(encoding="utf-8")
     tree = ast.parse(source)

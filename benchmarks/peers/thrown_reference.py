@@ -3,14 +3,16 @@
 
     python3 benchmarks/peers/thrown_reference.py            # n = 64, 128, 256; a few minutes
 
-Central differences on lumped masses. The nodes at the ground have no mass in the normal direction; the nodes above them
-have it. Their normal displacements follow the rest statically: every step solves the complementarity problem of the
-ground's nodes, so that no impact of a mass disturbs the force. The energy at the end over the first is stored.
+Central differences on lumped masses. The nodes at the ground have no mass in the normal direction;
+the nodes above them have it. Their normal displacements follow the rest statically: every step
+solves the complementarity problem of the ground's nodes, so that no impact of a mass disturbs the
+force. The energy at the end over the first is stored.
 
-The impulse is that of the finest mesh; its difference from the next mesh is stored as its error. The largest force is
-exact: at touch-down the bottom starts a plane wave, of pressure rho c_P v, and waves from the free sides lower the
-force from then on. The force of every mesh overshoots there for a few crossings of an element; its mean over 2 ms is
-stored beside the exact value, which it approaches as the mesh is refined, until the fall of the force itself shows.
+The impulse is that of the finest mesh; its difference from the next mesh is stored as its error.
+The largest force is exact: at touch-down the bottom starts a plane wave, of pressure rho c_P v, and
+waves from the free sides lower the force from then on. The force of every mesh overshoots there for
+a few crossings of an element; its mean over 2 ms is stored beside the exact value, which it
+approaches as the mesh is refined, until the fall of the force itself shows.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ def speed() -> float:
 
 
 def run(n: int) -> dict[str, float]:
-    """Return impulse [N s/m], largest mean force [N/m], times of contact [s], energy at the end over the first."""
+    """Return impulse [N s/m], largest mean force [N/m], times of contact [s], energy at the end
+    over the first."""
     mesh = Square(n)
     K = stiffness(mesh, THROWN["E"], THROWN["nu"])
     M = np.asarray(mass(mesh, THROWN["rho"]).sum(axis=1)).ravel()

@@ -1,4 +1,5 @@
-"""Compute rod and Timoshenko beam of Ahn (2012): contact and friction at the tip, with numpy and scipy only.
+"""Compute rod and Timoshenko beam of Ahn (2012): contact and friction at the tip, with numpy and
+scipy only.
 
 ``run_beam`` follows the source; demos/beam/contract.py makes of both problems for any scheme and solver:
 docs/theory/beam.md.

@@ -1,13 +1,15 @@
-"""March the beam with friction at its tip under a given normal force, by Algorithm 10 of Ahn (2012), block elimination.
+"""March the beam with friction at its tip under a given normal force, by Algorithm 10 of Ahn
+(2012), block elimination.
 
 Midpoint rule (5.4), (5.5) for y = (theta, u), w = y', with the stiffness S and C = a2 S:
 
     P y1 = Q y0 + (2/dt) M w0 + f(t0) - e_m R,     P = 2/dt² M + (a2/dt + ½) S,   Q = 2/dt² M + (a2/dt - ½) S      (7.7)
     w1 = (2/dt) (y1 - y0) - w0                                                                                (7.11)
 
-R is the friction force of the step at the tip, with the limit mu(t0, |w0_m|) |r_N(t0)|: force and coefficient are those
-of the *old* time, as in the source. Solved for the increment d = y1 - y0, as Q = P - S: the same equations with less
-round-off. With P split at the tip into T, p and P_mm, T is factorised once, and
+R is the friction force of the step at the tip, with the limit mu(t0, |w0_m|) |r_N(t0)|: force and
+coefficient are those of the *old* time, as in the source. Solved for the increment d = y1 - y0, as
+Q = P - S: the same equations with less round-off. With P split at the tip into T, p and P_mm, T is
+factorised once, and
 
     P d = r - e_m R,    r = (2/dt) M w0 - S y0 + f
     c = P_mm - pᵀT⁻¹p,    g = r_m - pᵀT⁻¹r     leave the scalar equation  c s - g + R(s) = 0  of tip.py        (7.8)
@@ -54,7 +56,8 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Hold the beam at a time: rows theta, omega, u, v at all nodes, the clamped one included, shape (4, m + 1)."""
+    """Hold the beam at a time: rows theta, omega, u, v at all nodes, the clamped one included,
+    shape (4, m + 1)."""
 
     t: float
     values: Array
@@ -64,9 +67,10 @@ class Snapshot:
 class BeamRun:
     """Hold what a run recorded: columns of shape (steps + 1,) and, when asked for, snapshots.
 
-    history: t [s]; u_tip [m], v_tip [m/s]; friction_force [N] and slip [m] of the step that led there; normal_force [N]
-    and mu [-] of that step; newton: updates; energy_kinetic, energy_strain, work_input, loss_damping, loss_friction and
-    energy_defect [J] (works and losses since the start).
+    history: t [s]; u_tip [m], v_tip [m/s]; friction_force [N] and slip [m] of the step that led
+    there; normal_force [N] and mu [-] of that step; newton: updates; energy_kinetic, energy_strain,
+    work_input, loss_damping, loss_friction and energy_defect [J] (works and losses since the
+    start).
     """
 
     x: Array
@@ -93,8 +97,9 @@ class BeamRun:
 
 @dataclass(frozen=True)
 class BeamStepper:
-    """Describe a beam and what acts on it. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) ->
-    coefficient; ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0."""
+    """Describe a beam and what acts on it. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip
+    rate [m/s] >= 0) -> coefficient; ``load``: t -> uniform force along the beam [N/m], or None.
+    InputError for dt <= 0."""
 
     beam: TimoshenkoBeam
     elements: Elements
@@ -136,9 +141,11 @@ class BeamStepper:
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
-    """March ``steps`` steps from ``start`` and keep the ledger; ``every``: steps between snapshots, 0 for none.
+    """March ``steps`` steps from ``start`` and keep the ledger; ``every``: steps between snapshots,
+    0 for none.
 
-    Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation is not solved.
+    Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation
+    is not solved.
     """
     instance("run_beam", "stepper", stepper, BeamStepper, "give BeamStepper(...)")
     instance("run_beam", "start", start, Start, "give Start(...)")
@@ -169,7 +176,8 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
 def _states(
     stepper: BeamStepper, y: Array, w: Array
 ) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
-    """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after every step."""
+    """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after
+    every step."""
     dt, viscosity = stepper.dt, stepper.beam.viscosity
     M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
 
@@ -197,7 +205,8 @@ def _states(
         work, viscous = f * float(uniform @ moved), viscosity / dt * float(moved @ (S @ moved))
         if not np.isfinite(kinetic + strain + work):
             raise StepFailure(
-                f"{at}: the beam's motion or its energy is no finite number; check the loads and the "
+                f"{at}: the beam's motion or its energy is no finite number; check the loads and "
+                "the "
                 "state at the start"
             )
         yield (

@@ -1,18 +1,22 @@
-"""Make contact problems of rod and beam, with the exact inequalities, for ``march`` and ``simulate``.
+"""Make contact problems of rod and beam, with the exact inequalities, for ``march`` and
+``simulate``.
 
-The tip is one contact point: its normal unknown is the displacement along the axis, v_n <= gap, its tangential one the
-deflection u_m. With ``Midpoint()`` the rod's step is (5.1)-(5.3) of Ahn (2012), midpoint rule in the bulk and the
-complementarity at the end of the step, and the beam's is (5.4), (5.5) with the inequality (2.8), (2.9) itself:
+The tip is one contact point: its normal unknown is the displacement along the axis, v_n <= gap, its
+tangential one the deflection u_m. With ``Midpoint()`` the rod's step is (5.1)-(5.3) of Ahn (2012),
+midpoint rule in the bulk and the complementarity at the end of the step, and the beam's is (5.4),
+(5.5) with the inequality (2.8), (2.9) itself:
 
     Algorithm 10 -> this    for eps -> 0, with |r_N| of the same step
 
-Three problems: the rod alone; the beam under a given normal force, which presses a point mass against the wall; the
-beam that rubs with the contact force of its own rod, the coupling that the paper leaves out. Along the axis and across
-nothing else is coupled (small displacements): the rod moves as it would alone.
+Three problems: the rod alone; the beam under a given normal force, which presses a point mass
+against the wall; the beam that rubs with the contact force of its own rod, the coupling that the
+paper leaves out. Along the axis and across nothing else is coupled (small displacements): the rod
+moves as it would alone.
 
-Problems with a beam are solved with its consistent mass: the redistribution of mass away from contact points knows no
-rotations. The forces of ``Midpoint`` ring with the mass of the tip while it touches or sticks, by turns above and below
-their mean; those of ``MoreauJean`` and ``ContactStabilisedNewmark`` do not.
+Problems with a beam are solved with its consistent mass: the redistribution of mass away from
+contact points knows no rotations. The forces of ``Midpoint`` ring with the mass of the tip while it
+touches or sticks, by turns above and below their mean; those of ``MoreauJean`` and
+``ContactStabilisedNewmark`` do not.
 """
 
 import math
@@ -42,7 +46,8 @@ History = Callable[[float], float]
 
 
 def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
-    """Set up the rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when None."""
+    """Set up the rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when
+    None."""
     _check("rod_problem", elements, (start,), rod=rod)
     x = elements.nodes(rod.length)
     start = start or Start()
@@ -58,10 +63,11 @@ def beam_problem(
     start: Start | None = None,
     load: History | None = None,
 ) -> ContactProblem:
-    """Set up the beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l held by the wall.
+    """Set up the beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l
+    held by the wall.
 
-    ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads: ``Midpoint`` at t + dt/2,
-    Algorithm 10 at t. ``load``: uniform, across [N/m].
+    ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads:
+    ``Midpoint`` at t + dt/2, Algorithm 10 at t. ``load``: uniform, across [N/m].
     """
     _check("beam_problem", elements, (start,), load, beam=beam, friction=friction)
     function(
@@ -87,13 +93,15 @@ def rubbing_problem(
     start: Start | None = None,
     load: History | None = None,
 ) -> ContactProblem:
-    """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for two lengths."""
+    """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for
+    two lengths."""
     _check(
         "rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction
     )
     if rod.length != beam.length:
         raise InputError(
-            f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give "
+            f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, "
+            "give "
             "one length"
         )
     x = elements.nodes(beam.length)
@@ -105,7 +113,8 @@ def rubbing_problem(
 
 @dataclass(frozen=True)
 class StepForces:
-    """Hold forces [N], one per step of dt [s], as a function of the time in a step; InputError for times of no step."""
+    """Hold forces [N], one per step of dt [s], as a function of the time in a step; InputError for
+    times of no step."""
 
     dt: float
     forces: tuple[float, ...]
@@ -120,7 +129,8 @@ class StepForces:
         if not 0 <= step < len(self.forces):
             end = len(self.forces) * self.dt
             raise InputError(
-                f"the rod's forces are known for 0 <= t < {end:g} s, not at {t:g} s: let it run as long"
+                f"the rod's forces are known for 0 <= t < {end:g} s, not at {t:g} s: let it run as "
+                "long"
             )
         return self.forces[step]
 
@@ -134,10 +144,12 @@ def rod_forces(
     start: Start | None = None,
     scheme: Scheme | None = None,
 ) -> StepForces:
-    """Return |r_N| of every step of the rod [N], for Algorithm 10. ``scheme``: Midpoint(), the source's, when None.
+    """Return |r_N| of every step of the rod [N], for Algorithm 10. ``scheme``: Midpoint(), the
+    source's, when None.
 
-    The force r_N^k of (5.1) acts in the step from t_k to t_k+1, and (7.1) of the same step rubs with it. The rod does
-    not feel the beam: rod first, beam second is no approximation, with ``ExactFriction`` it is ``rubbing_problem``.
+    The force r_N^k of (5.1) acts in the step from t_k to t_k+1, and (7.1) of the same step rubs
+    with it. The rod does not feel the beam: rod first, beam second is no approximation, with
+    ``ExactFriction`` it is ``rubbing_problem``.
     """
     dt = number("rod_forces", "dt", dt, positive=True, unit="s")
     steps = whole("rod_forces", "steps", steps, least=1)
@@ -148,8 +160,9 @@ def rod_forces(
 
 @dataclass(frozen=True)
 class _Part:
-    """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across; C = viscosity K.
-    ``inertia`` [kg]: the force when unknowns and clamped node are accelerated together by one."""
+    """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across;
+    C = viscosity K. ``inertia`` [kg]: the force when unknowns and clamped node are accelerated
+    together by one."""
 
     M: Any
     K: Any
@@ -196,7 +209,8 @@ class _Part:
 
 
 def _given(name: str, history: History, unit: str) -> History:
-    """The function; InputError, naming the time, where it returns no finite number, or a negative normal force."""
+    """The function; InputError, naming the time, where it returns no finite number, or a negative
+    normal force."""
     pressing = name == "normal_force"
     return lambda t: number(
         "beam", f"{name}({t:.6g} s)", history(t), not_negative=pressing, unit=unit

@@ -1,16 +1,20 @@
-"""Assemble piecewise linear elements for rod and beam, with the last rotation function of Ahn (2012, section 7).
+"""Assemble piecewise linear elements for rod and beam, with the last rotation function of Ahn
+(2012, section 7).
 
-On an element s = (x - x_left)/h runs from 0 to 1. Deflection and rotation are linear; the shear energy is
+On an element s = (x - x_left)/h runs from 0 to 1. Deflection and rotation are linear; the shear
+energy is
 
     ½ K A G ∫ (u_x - theta)² dx      by one point per element (reduced_shear), or exactly
 
-Exact integration locks: a slender beam bends too little until h is small beside its *depth*. One point removes that.
+Exact integration locks: a slender beam bends too little until h is small beside its *depth*. One
+point removes that.
 
-``published_end``: on the last element Ahn multiplies the tip's rotation by -s³ + s² + s, whose slope is zero at
-the tip, in order to satisfy theta_x(l) = 0. But its neighbour 1 - s keeps the slope -1/h, and both together do not
-reproduce a constant: equal rotations at both nodes cost energy. With the tip's rotation eliminated the last element is
-a spring 2 E I/(17 h) on the rotation of its left node, so that h -> 0 clamps the rotation: theta(l) = 0 instead of
-theta_x(l) = 0. It is here to reproduce the source; theta_x(l) = 0 is natural and needs no special function.
+``published_end``: on the last element Ahn multiplies the tip's rotation by -s³ + s² + s, whose
+slope is zero at the tip, in order to satisfy theta_x(l) = 0. But its neighbour 1 - s keeps the
+slope -1/h, and both together do not reproduce a constant: equal rotations at both nodes cost
+energy. With the tip's rotation eliminated the last element is a spring 2 E I/(17 h) on the rotation
+of its left node, so that h -> 0 clamps the rotation: theta(l) = 0 instead of theta_x(l) = 0. It is
+here to reproduce the source; theta_x(l) = 0 is natural and needs no special function.
 """
 
 from dataclasses import dataclass
@@ -32,10 +36,11 @@ S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
 
 @dataclass(frozen=True)
 class Elements:
-    """Describe ``count`` equal elements. ``reduced_shear``: shear energy by one point; ``published_end``: see above.
+    """Describe ``count`` equal elements. ``reduced_shear``: shear energy by one point;
+    ``published_end``: see above.
 
-    The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer than two elements, and
-    for a published end with reduced shear, which the source does not have.
+    The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer
+    than two elements, and for a published end with reduced shear, which the source does not have.
     """
 
     count: int = 100
@@ -53,19 +58,22 @@ class Elements:
         attributes(self, flags=("reduced_shear", "published_end"))
         if self.published_end and self.reduced_shear:
             raise InputError(
-                "Elements: the published end function goes with reduced_shear=False, as in the source"
+                "Elements: the published end function goes with reduced_shear=False, as in the "
+                "source"
             )
 
     def nodes(self, length: float) -> Array:
-        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
+        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,)
+        [m]."""
         return np.linspace(
             0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
         )[1:]
 
 
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
-    """Assemble (M, S, unit of distributed force [N/m]) of y = (theta_1 … theta_m, u_1 … u_m), sparse: ½ wᵀMw and ½ yᵀSy
-    are energies [J], C = a2 S; from M1, M2, K1, K2, L1 of section 7 with their coefficients."""
+    """Assemble (M, S, unit of distributed force [N/m]) of y = (theta_1 … theta_m, u_1 … u_m),
+    sparse: ½ wᵀMw and ½ yᵀSy are energies [J], C = a2 S; from M1, M2, K1, K2, L1 of section 7 with
+    their coefficients."""
     m, h = elements.count, beam.length / elements.count
     lines, slopes = _lines(S), _line_slopes(S) / h
     turn, bend = lines, slopes
@@ -79,7 +87,8 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     ends = (lines, turn), (slopes, bend)
 
     def matrix(left: Any, right: Any, weights: Array) -> Any:
-        """∫ left_i right_j over all elements: a pair of tables for the inner elements and the last one."""
+        """∫ left_i right_j over all elements: a pair of tables for the inner elements and the last
+        one."""
         inner, last = (h * (a * weights) @ b.T for a, b in zip(left, right, strict=True))
         return _assembled(inner, last, m)
 
@@ -124,7 +133,8 @@ def _uniform(m: int, h: float) -> Array:
 
 
 def _assembled(inner: Array, last: Array, m: int) -> Any:
-    """The (m, m) matrix of m element matrices (2, 2), all ``inner`` but the last; node 0 is clamped."""
+    """The (m, m) matrix of m element matrices (2, 2), all ``inner`` but the last; node 0 is
+    clamped."""
     middle = np.full(m, inner[1, 1] + inner[0, 0])
     middle[-2:] = inner[1, 1] + last[0, 0], last[1, 1]
     below, above = (np.append(np.full(m - 2, inner[at]), last[at]) for at in ((1, 0), (0, 1)))

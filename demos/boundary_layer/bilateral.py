@@ -1,15 +1,18 @@
-"""Compute motions under equality constraints, to compare with the layer (b-geometry, ENOC 2017, equations 29 to 34).
+"""Compute motions under equality constraints, to compare with the layer (b-geometry, ENOC 2017,
+equations 29 to 34).
 
-Every constraint phi^R(q) = 0 with a^R = d phi^R brings one coordinate lambda^R of a manifold of its own:
+Every constraint phi^R(q) = 0 with a^R = d phi^R brings one coordinate lambda^R of a manifold of its
+own:
 
     M v̇ + Γ(v, v) - f = sum_R [(m̄_R λ̇^R)˙ + c̄_R λ̇^R + k̄_R λ^R - f̄_R] a^R                                        (31)
     (m̄_R φ̇^R)˙ + c̄_R φ̇^R + k̄_R φ^R = 0                                                                          (34)
     m̄ = c·M c,  c̄ = -c·(∂f/∂v) c,  k̄ = -c·(∂f/∂q) c,  f̄ = c·f,  with a·c = 1                                (32, 33)
 
-n + k ordinary differential equations for q and lambda, no algebraic ones. CHOSEN: c_R = M⁻¹a_R/(a_R M⁻¹ a_R), the
-direction that the boundary's B of (20) has, so that m̄ is g_11 of the layer; (33) leaves it open. The derivatives of
-(32) are read as those of the forces along c, from the authors' earlier papers: the text prints them incompletely. They
-decide how an error in phi fades, not the motion. The bracket is the reaction along a^R [N], of either sign.
+n + k ordinary differential equations for q and lambda, no algebraic ones. CHOSEN: c_R = M⁻¹a_R/(a_R
+M⁻¹ a_R), the direction that the boundary's B of (20) has, so that m̄ is g_11 of the layer; (33)
+leaves it open. The derivatives of (32) are read as those of the forces along c, from the authors'
+earlier papers: the text prints them incompletely. They decide how an error in phi fades, not the
+motion. The bracket is the reaction along a^R [N], of either sign.
 """
 
 from collections.abc import Sequence
@@ -31,7 +34,8 @@ from vi_contact.core.errors import InputError, StepFailure
 
 @dataclass(frozen=True)
 class BilateralMotion:
-    """Hold times t (m,); q, v (m, n); constraint values phi, coordinates lambda and reactions (m, k)."""
+    """Hold times t (m,); q, v (m, n); constraint values phi, coordinates lambda and reactions (m,
+    k)."""
 
     t: Array
     q: Array
@@ -46,10 +50,11 @@ def bilateral_motion(
 ) -> BilateralMotion:
     """Compute the motion with phi^R = 0 held, at the given times (the first is the start).
 
-    systems: one for each constraint, its ``rho`` and ``gradient`` being phi and a; mass and forces are those of the
-    first. lambda starts from 0, at rest. v must be the rates of q.
+    systems: one for each constraint, its ``rho`` and ``gradient`` being phi and a; mass and forces
+    are those of the first. lambda starts from 0, at rest. v must be the rates of q.
 
-    Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the integrator stops.
+    Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the
+    integrator stops.
     """
     owner, k = (
         "bilateral_motion",
@@ -59,7 +64,8 @@ def bilateral_motion(
         instance(owner, "a system", system, ConstrainedSystem, "give ConstrainedSystem(...)")
     if not systems or any(system.rates is not None for system in systems):
         raise InputError(
-            f"{owner}: bilateral constraints need at least one system, whose velocities are the rates of "
+            f"{owner}: bilateral constraints need at least one system, whose velocities are the "
+            "rates of "
             "q; give one for each constraint"
         )
     q, v, times = (
@@ -68,7 +74,8 @@ def bilateral_motion(
     )
     if len(times) < 2 or np.any(np.diff(times) <= 0.0):
         raise InputError(
-            f"{owner}: times are {shown(times)}; give two or more that increase, the first the start"
+            f"{owner}: times are {shown(times)}; give two or more that increase, the first the "
+            "start"
         )
     check_tolerance(owner, rtol)
     for system in systems:
@@ -88,7 +95,8 @@ def bilateral_motion(
     with one_sentence():
         if not np.all(np.isfinite(rates(float(times[0]), y0))):
             raise StepFailure(
-                f"the accelerations at t = {times[0]:.6g} s are not finite: check what the systems' "
+                f"the accelerations at t = {times[0]:.6g} s are not finite: check what the "
+                "systems' "
                 "functions return there, and that the constraints are independent"
             )
         found = solve_ivp(

@@ -1,21 +1,24 @@
-"""Give the boundary layer as a contact law of finite elements: the reaction of a node over one time step.
+"""Give the boundary layer as a contact law of finite elements: the reaction of a node over one time
+step.
 
-Per unit area of the contact boundary, rho = gap > 0, y = ln rho (b-geometry with the blended metric, see ``Metric``):
+Per unit area of the contact boundary, rho = gap > 0, y = ln rho (b-geometry with the blended
+metric, see ``Metric``):
 
     p = delta(rho)/rho · b² [k - (c/V) ẏ - gamma ÿ],        ÿ = ρ̈/rho - ρ̇²/rho²
 
-gamma [kg/m²] is g_11 per area: -gamma b² ÿ/rho is the reaction of the metric, -ĝ_11 (ρ̈ - ρ̇²/rho). At rest p = k b²/rho:
-the law is a logarithmic barrier, and tends to the exact inequality 0 <= p ⊥ rho >= 0 as b -> 0. The mean over a step
-from rho_0 to rho_1 is that of the midpoint rule in y:
+gamma [kg/m²] is g_11 per area: -gamma b² ÿ/rho is the reaction of the metric, -ĝ_11 (ρ̈ - ρ̇²/rho).
+At rest p = k b²/rho: the law is a logarithmic barrier, and tends to the exact inequality 0 <= p ⊥
+rho >= 0 as b -> 0. The mean over a step from rho_0 to rho_1 is that of the midpoint rule in y:
 
     p̄ = (Y_1 - Y_0)/(rho_1 - rho_0) · b² [k - (c/V)(y_1 - y_0)/dt - gamma (w_1 - w_0)/dt],   Y' = delta/rho, Y(b) = 0
     (w_0 + w_1)/2 = (y_1 - y_0)/dt,    w_0 = ẏ = ρ̇/rho where the step begins outside the layer, carried on inside it
 
-Order 2. Energy: the part with k does exactly the work of a potential -k b² Y; the part with gamma, where delta = 1,
-that of a kinetic energy ½ gamma b² w²; the part with c never gives any. Where the metric is cut off the part with gamma
-gives ½ gamma (ẋ_in² - ẋ_out²) to a body that returns more slowly than it came: nothing to a stiff body without loss,
-O(b) with gamma = O(b). However large the step, p̄ is unbounded as rho_1 -> 0: the gap stays open. w is carried because
-ρ̇/rho from the velocities of the body would leave order 1.
+Order 2. Energy: the part with k does exactly the work of a potential -k b² Y; the part with gamma,
+where delta = 1, that of a kinetic energy ½ gamma b² w²; the part with c never gives any. Where the
+metric is cut off the part with gamma gives ½ gamma (ẋ_in² - ẋ_out²) to a body that returns more
+slowly than it came: nothing to a stiff body without loss, O(b) with gamma = O(b). However large the
+step, p̄ is unbounded as rho_1 -> 0: the gap stays open. w is carried because ρ̇/rho from the
+velocities of the body would leave order 1.
 """
 
 from dataclasses import dataclass, replace
@@ -46,11 +49,12 @@ SHORT_STEP = (
 class ContactLayer:
     """Describe the law of a contact boundary: pressure as a function of the gap and its rate.
 
-    Attributes:
-        layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s] must be given.
-        mass: gamma >= 0 [kg/m²] of the metric's terms: for a stiff body its mass over its contact area; 0: without
+    Attributes: layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s]
+        must be given. mass: gamma >= 0 [kg/m²] of the metric's terms: for a stiff body its mass
+        over its contact area; 0: without
             them, a potential and a damper, which never give energy.
-    InputError for values outside their range, a layer without V or without a transition from a to b.
+    InputError for values outside their range, a layer without V or without a transition from a to
+    b.
     """
 
     layer: Layer
@@ -64,11 +68,13 @@ class ContactLayer:
             sized("ContactLayer", "the law's mass per area", self.mass, "kg/m²")
         if self.layer.speed is None:
             raise InputError(
-                "a contact law needs the layer's speed V: give Layer(speed=...), the speed of approach"
+                "a contact law needs the layer's speed V: give Layer(speed=...), the speed of "
+                "approach"
             )
         if self.layer.a >= self.layer.width:
             raise InputError(
-                "a contact law needs a force that fades out: give the layer a start a below its width b"
+                "a contact law needs a force that fades out: give the layer a start a below its "
+                "width b"
             )
 
     @cached_property
@@ -84,7 +90,8 @@ class ContactLayer:
         return CubicHermiteSpline(y, Y - Y[-1], delta)
 
     def set_back(self, surface: ContactSurface) -> ContactSurface:
-        """Return the surface with its obstacle moved back by b: a body that touched it now touches the layer's edge."""
+        """Return the surface with its obstacle moved back by b: a body that touched it now touches
+        the layer's edge."""
         instance(
             "ContactLayer.set_back", "surface", surface, ContactSurface, "give a contact surface"
         )
@@ -99,7 +106,8 @@ class ContactLayer:
         )
 
     def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
-        """Return (p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays (m,)."""
+        """Return (p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap
+        ``rho``; arrays (m,)."""
         layer, gamma = self.layer, self.mass
         squared, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
@@ -117,8 +125,8 @@ class ContactLayer:
         return quotient * bracket, slope * bracket - quotient * squared * damper / rho
 
     def rebound(self, mass: float, speed: float) -> float:
-        """Return e of a rigid body that enters with this speed, by one equation in time. mass: of the body [kg/m²]; a
-        law with metric knows one, its own, and InputError for another."""
+        """Return e of a rigid body that enters with this speed, by one equation in time. mass: of
+        the body [kg/m²]; a law with metric knows one, its own, and InputError for another."""
         sized("ContactLayer.rebound", "mass", mass, "kg/m²")
         sized("ContactLayer.rebound", "speed", speed, "m/s")
         if self.mass not in (0.0, mass):
@@ -138,10 +146,12 @@ def contact_layer(
     strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
-    """Find the law that returns a rigid body of ``mass`` [kg/m²] with e times its ``speed`` [m/s], 0.001 <= e <= 1.
+    """Find the law that returns a rigid body of ``mass`` [kg/m²] with e times its ``speed`` [m/s],
+    0.001 <= e <= 1.
 
-    strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when None. metric: BLENDED,
-    gamma = mass, or FLAT, gamma = 0. InputError for another and for values outside their range.
+    strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when
+    None. metric: BLENDED, gamma = mass, or FLAT, gamma = 0. InputError for another and for values
+    outside their range.
     """
     for name, value, unit in (
         ("mass per area", mass, "kg/m²"),

@@ -1,10 +1,11 @@
-"""Describe the layer before an obstacle: its width, cut-off and force (b-geometry, ENOC 2017, equation 25).
+"""Describe the layer before an obstacle: its width, cut-off and force (b-geometry, ENOC 2017,
+equation 25).
 
     f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V,    x = rho(q) > 0 the distance function
     delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z)),  f(z) = exp(-1/z) for z > 0, else 0
 
-x > 0 is admissible, x = 0 is the obstacle; a positive f̂_1 pushes away from it. The layer reaches from 0 to b; the force
-is complete up to a and fades out smoothly between a and b.
+x > 0 is admissible, x = 0 is the obstacle; a positive f̂_1 pushes away from it. The layer reaches
+from 0 to b; the force is complete up to a and fades out smoothly between a and b.
 """
 
 from dataclasses import dataclass, replace
@@ -25,14 +26,13 @@ LARGEST, LARGEST_FORCE = (
 
 @dataclass(frozen=True)
 class Layer:
-    """Describe the law by its parameters; the distance x is in metres here (k, c have other units for other rho).
+    """Describe the law by its parameters; the distance x is in metres here (k, c have other units
+    for other rho).
 
-    Attributes:
-        width: b [m], where the layer begins.
-        k: [N/m] >= 0, spring-like: k x is what is left of it in the normal equation divided by (b/x)².
-        c: [N] >= 0, damper-like.
-        speed: V [m/s] of ĉ = c b²/V; None: the speed at which the layer is entered, as in the source.
-        start: a [m], 0 < a <= b, where the force is complete; None: a = b, no transition.
+    Attributes: width: b [m], where the layer begins. k: [N/m] >= 0, spring-like: k x is what is
+        left of it in the normal equation divided by (b/x)². c: [N] >= 0, damper-like. speed: V
+        [m/s] of ĉ = c b²/V; None: the speed at which the layer is entered, as in the source. start:
+        a [m], 0 < a <= b, where the force is complete; None: a = b, no transition.
 
     Raises InputError for a parameter outside its range, and when k and c are both zero.
     """
@@ -62,7 +62,8 @@ class Layer:
                 )
         if self.k == 0.0 and self.c == 0.0:
             raise InputError(
-                "layer parameters k and c are both zero: nothing would push the body back, give k > 0"
+                "layer parameters k and c are both zero: nothing would push the body back, give k "
+                "> 0"
             )
         optional(sized, "Layer", "the layer speed V", self.speed, "m/s")
         if (
@@ -70,7 +71,8 @@ class Layer:
             and sized("Layer", "the layer start a", self.start, "m") > self.width
         ):
             raise InputError(
-                f"Layer: the layer start a is {self.start}; give a length up to the width {self.width} m"
+                f"Layer: the layer start a is {self.start}; give a length up to the width "
+                f"{self.width} m"
             )
 
     @property
@@ -112,6 +114,7 @@ def sized(owner: str, meaning: str, value: Any, unit: str, *, most: float = LARG
     found = number(owner, meaning, value, positive=True, unit=unit)
     if not 1.0 / most <= found <= most:
         raise InputError(
-            f"{owner}: {meaning} is {found:g}; give a number from {1.0 / most:g} to {most:g} in {unit}"
+            f"{owner}: {meaning} is {found:g}; give a number from {1.0 / most:g} to {most:g} in "
+            f"{unit}"
         )
     return found

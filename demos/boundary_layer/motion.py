@@ -1,13 +1,15 @@
-"""Describe systems with one frictionless contact by ordinary differential equations (b-geometry, ENOC 2017, 26 to 28).
+"""Describe systems with one frictionless contact by ordinary differential equations (b-geometry,
+ENOC 2017, 26 to 28).
 
 In velocities v (of coordinates q, or quasi-velocities) with M = [g_IJ(q)] and A = d rho:
 
     q̇ = rates(q, v),    M v̇ = f(t, q, v) - Γ(q)(v, v) + Aᵀ lambda,    lambda = 0 outside the layer
     ρ̈ = A v̇ + Ȧ v,    lambda of metric.Metric inside it: a spring, a damper and the metric's own terms
 
-Aᵀ lambda is (28): every component is a projection of the one normal equation. Γ is the covariant part of (23) by the
-affinities of M, [Γ(v, v)]_I = Ṁ_IJ v_J - ½ ∂M_JK/∂q_I v_J v_K; a constant M has none. The distance rho >= 0 is the
-caller's; where it is no length the law's parameters have its units.
+Aᵀ lambda is (28): every component is a projection of the one normal equation. Γ is the covariant
+part of (23) by the affinities of M, [Γ(v, v)]_I = Ṁ_IJ v_J - ½ ∂M_JK/∂q_I v_J v_K; a constant M has
+none. The distance rho >= 0 is the caller's; where it is no length the law's parameters have its
+units.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,14 +34,12 @@ DIFFERENCE_STEP = (
 class ConstrainedSystem:
     """Describe a configuration manifold with boundary, and the forces on it.
 
-    Attributes:
-        mass: M, (n, n) [kg], constant or a function of q.
-        rho: q -> distance to the boundary, > 0 inside.
-        gradient: q -> A (n,), ρ̇ = A v.
-        force: (t, q, v) -> f (n,): applied forces and, for quasi-velocities, gyroscopic ones; None: no forces.
-        rates: (q, v) -> q̇; None: v are the rates of q.
-        gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to ten digits.
-        scale: a typical size of the coordinates, which central differences are taken over 6e-6 of.
+    Attributes: mass: M, (n, n) [kg], constant or a function of q. rho: q -> distance to the
+        boundary, > 0 inside. gradient: q -> A (n,), ρ̇ = A v. force: (t, q, v) -> f (n,): applied
+        forces and, for quasi-velocities, gyroscopic ones; None: no forces. rates: (q, v) -> q̇;
+        None: v are the rates of q. gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to
+        ten digits. scale: a typical size of the coordinates, which central differences are taken
+        over 6e-6 of.
     """
 
     mass: Array | Callable[[Array], Array]
@@ -60,7 +60,8 @@ class ConstrainedSystem:
                 function(owner, name, getattr(self, name), "give a function, see its docstring")
 
     def check(self, q: Array, v: Array, t: float = 0.0) -> None:
-        """Raise InputError for functions that return, at this state, other shapes, texts, NaN or infinity."""
+        """Raise InputError for functions that return, at this state, other shapes, texts, NaN or
+        infinity."""
         owner, n = "ConstrainedSystem", len(v)
         if self.rates is None and len(q) != n:
             raise InputError(
@@ -136,7 +137,8 @@ class ConstrainedSystem:
 
 
 class Evaluations:
-    """Count what an integration in time spends, so that no motion goes on for ever; t: the time it has come to [s]."""
+    """Count what an integration in time spends, so that no motion goes on for ever; t: the time it
+    has come to [s]."""
 
     def __init__(self) -> None:
         self.spent, self.t = 0, 0.0
@@ -153,12 +155,14 @@ class Evaluations:
 
 @contextmanager
 def one_sentence() -> Iterator[None]:
-    """Raise StepFailure for numbers that leave their range and matrices that become singular on the way."""
+    """Raise StepFailure for numbers that leave their range and matrices that become singular on the
+    way."""
     try:
         yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise StepFailure(
-            f"the motion could not be integrated, its numbers left their range ({error}): check forces, "
+            f"the motion could not be integrated, its numbers left their range ({error}): check "
+            "forces, "
             "masses and the state at the start"
         ) from error
 

@@ -1,18 +1,21 @@
-"""Solve the impact of a particle on a wall in closed form (b-geometry, ENOC 2017, equations 35 to 38).
+"""Solve the impact of a particle on a wall in closed form (b-geometry, ENOC 2017, equations 35 to
+38).
 
-With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ = -V:
+With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ
+= -V:
 
     x(t) = a exp(beta),   beta = kappa [(1 + s) T² phi(s T) - T],   ẋ = (V/a) x [(1 + s) T psi(s T) - 1]           (36)
     s = c/(a k),  kappa = m V²/(k a²),  T = a k t/(m V),  phi(z) = (exp(-z) - 1 + z)/z²,  psi(z) = (1 - exp(-z))/z
 
-(this form of (36) has no difference of large numbers as c -> 0). Consequences, with h(z) = (z - ln(1 + z))/z²:
+(this form of (36) has no difference of large numbers as c -> 0). Consequences, with h(z) = (z -
+ln(1 + z))/z²:
 
     compression ends at t_c = m V/(a k) ln(1 + s)/s,    x_min = a exp(-kappa h(s))
     e = V'/V is the root of e² h(-s e) = h(s), that is e = tau/s - 1, tau = 1 + s + W0(-(1 + s) exp(-(1 + s)))
     contact ends at t_f = (1 + e) m V/(a k)
 
-e depends on s alone: e = 1 - 2/3 s + ... for small s, and tends to 1/s for large s. A speed V of the law that is not
-the particle's own U changes s to c U/(a k V).
+e depends on s alone: e = 1 - 2/3 s + ... for small s, and tends to 1/s for large s. A speed V of
+the law that is not the particle's own U changes s to c U/(a k V).
 """
 
 from dataclasses import dataclass
@@ -34,7 +37,8 @@ LEAST = 1e-9  # least restitution that is asked for
 class ParticleImpact:
     """Describe a particle of ``mass`` m [kg] that reaches x = a of the layer with ``speed`` [m/s].
 
-    k must be positive: without it no particle leaves the layer. InputError for values outside their range.
+    k must be positive: without it no particle leaves the layer. InputError for values outside their
+    range.
     """
 
     layer: Layer
@@ -104,12 +108,14 @@ class ParticleImpact:
 
     @property
     def poisson(self) -> float:
-        """Return e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle: equal to Newton's e_v."""
+        """Return e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle: equal to
+        Newton's e_v."""
         return float(self.velocity(self.duration) / self.speed)
 
     @property
     def poisson_covector(self) -> float:
-        """Return e_p with f = f̂_1 in (38), the force in the covector space of the boundary: a little above e_v."""
+        """Return e_p with f = f̂_1 in (38), the force in the covector space of the boundary: a
+        little above e_v."""
         t_c, t_f = self.compression_time, self.duration
         pushed = quad(self.boundary_force, 0.0, t_c, epsabs=0.0, epsrel=1e-12)[0]
         returned = quad(self.boundary_force, t_c, t_f, epsabs=1e-12 * abs(pushed), epsrel=1e-12)[0]
@@ -131,7 +137,8 @@ def damping_ratio(e: float) -> float:
     """Return s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
     if not LEAST <= number("damping_ratio", "the restitution coefficient e", e) <= 1.0:
         raise InputError(
-            f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1"
+            f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to "
+            "1"
         )
     if e == 1.0:
         return 0.0
@@ -148,13 +155,16 @@ def layer_for(
     start: float | None = None,
     deepest: float = 0.5,
 ) -> Layer:
-    """Return the layer from which this mass [kg] with this speed [m/s] returns with e times its speed (dominant terms).
+    """Return the layer from which this mass [kg] with this speed [m/s] returns with e times its
+    speed (dominant terms).
 
-    ``deepest``: x_min/a, left of the distance a at the greatest compression. InputError unless 0 < e <= 1, deepest < 1.
+    ``deepest``: x_min/a, left of the distance a at the greatest compression. InputError unless 0 <
+    e <= 1, deepest < 1.
     """
     if not 0.0 < number("layer_for", "deepest", deepest) < 1.0:
         raise InputError(
-            f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 and 1"
+            f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 "
+            "and 1"
         )
     given = (
         ("the mass", mass, "kg"),

@@ -1,14 +1,16 @@
-"""Model a rigid body that hits a plane without friction (b-geometry, ENOC 2017, "Spatial collision", 39 to 53).
+"""Model a rigid body that hits a plane without friction (b-geometry, ENOC 2017, "Spatial
+collision", 39 to 53).
 
-Coordinates q = (r_c, p): mass centre and unit quaternion p = (p_0, p_1, p_2, p_3), R(p) from body to space.
-Velocities v = (ṙ_c, Omega), Omega in the body frame (39); M = diag(m 1, J) (40) is constant. The plane is n·x = d, the
-body before it, n·x > d; P is the body's point next to the plane, l_P in the body frame:
+Coordinates q = (r_c, p): mass centre and unit quaternion p = (p_0, p_1, p_2, p_3), R(p) from body
+to space. Velocities v = (ṙ_c, Omega), Omega in the body frame (39); M = diag(m 1, J) (40) is
+constant. The plane is n·x = d, the body before it, n·x > d; P is the body's point next to the
+plane, l_P in the body frame:
 
     rho = n·(r_c + R l_P) - d,    A = (n; l_P x Rᵀn)    (45, 46),    M v̇ = (F; T - Omega x J Omega) + Aᵀ lambda
     ṗ = ½ p ∘ (0, Omega)
 
-The impact map, which the motion through a thin layer tends to: v⁺ = v⁻ - M⁻¹Aᵀ g_11 (1 + e) ρ̇⁻, with the loss
-½ g_11 (1 - e²) ρ̇⁻² and all momenta orthogonal to A unchanged.
+The impact map, which the motion through a thin layer tends to: v⁺ = v⁻ - M⁻¹Aᵀ g_11 (1 + e) ρ̇⁻,
+with the loss ½ g_11 (1 - e²) ρ̇⁻² and all momenta orthogonal to A unchanged.
 """
 
 from dataclasses import dataclass
@@ -25,8 +27,9 @@ from vi_contact.core.errors import InputError
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """Find the point of an ellipsoid with semi-axes ``axes`` [m] (along the body axes, about the mass centre) next to a
-    plane: l = -D² nu/|D nu|, D = diag(axes), nu the plane's normal in the body frame."""
+    """Find the point of an ellipsoid with semi-axes ``axes`` [m] (along the body axes, about the
+    mass centre) next to a plane: l = -D² nu/|D nu|, D = diag(axes), nu the plane's normal in the
+    body frame."""
 
     axes: tuple[float, float, float]
 
@@ -43,10 +46,9 @@ class Ellipsoid:
 class RigidBody:
     """Describe a rigid body before a plane.
 
-    Attributes:
-        mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body frame [kg m²].
-        point: l_P (3,) [m], or a function of the plane's normal in the body frame that returns it (``Ellipsoid``).
-        normal: n, of the plane, towards the body. offset: d [m].
+    Attributes: mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body
+        frame [kg m²]. point: l_P (3,) [m], or a function of the plane's normal in the body frame
+        that returns it (``Ellipsoid``). normal: n, of the plane, towards the body. offset: d [m].
         gravity: acceleration of free fall in space (3,) [m/s²].
     InputError for a mass or an inertia that is not positive, or a normal of length zero.
     """

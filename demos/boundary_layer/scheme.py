@@ -3,13 +3,14 @@
     u1 - u0 = ½ dt (v0 + v1)
     M (v1 - v0)/dt + ½ C (v0 + v1) + ½ K (u0 + u1) = f(t0 + ½ dt) - B_nᵀ r̄_n,    r̄_n = weight · p̄(gap1; gap0, rate0)
 
-p̄ is ``ContactLayer.mean_pressure``. The contact points' part is solved first, by Newton's method in their gaps on the
-compliance G = B A⁻¹ Bᵀ; its reactions are loads of the step, which then goes to the solver as any other. The exact
-inequality stays on behind the layer as a guard and never closes: the certificate certifies the equilibrium, with the
-layer's reactions, and an open gap.
+p̄ is ``ContactLayer.mean_pressure``. The contact points' part is solved first, by Newton's method
+in their gaps on the compliance G = B A⁻¹ Bᵀ; its reactions are loads of the step, which then goes
+to the solver as any other. The exact inequality stays on behind the layer as a guard and never
+closes: the certificate certifies the equilibrium, with the layer's reactions, and an open gap.
 
-Order 2. Energy: r̄_n does the work of a potential, of the damper (never positive) and of the metric's inertia, all of it
-booked as contact work; what the layer holds at a time comes back when the gap opens.
+Order 2. Energy: r̄_n does the work of a potential, of the damper (never positive) and of the
+metric's inertia, all of it booked as contact work; what the layer holds at a time comes back when
+the gap opens.
 """
 
 from dataclasses import dataclass, replace
@@ -44,9 +45,11 @@ class LayeredStep(StepProblem):
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryLayer(Midpoint):
-    """Step without friction, on rigid supports at rest, with mass at the contact nodes: the module's equations.
+    """Step without friction, on rigid supports at rest, with mass at the contact nodes: the
+    module's equations.
 
-    InputError for anything else, and a start outside the admissible set; StepFailure where Newton's method fails.
+    InputError for anything else, and a start outside the admissible set; StepFailure where Newton's
+    method fails.
     """
 
     law: ContactLayer
@@ -68,7 +71,8 @@ class BoundaryLayer(Midpoint):
             )
         if surface.some(surface.bilateral | (surface.compliance != 0.0)):
             raise InputError(
-                "BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out"
+                "BoundaryLayer needs unilateral contact on rigid supports: leave held points, "
+                "springs out"
             )
         if surface.motion is not None:
             raise InputError(
@@ -79,13 +83,15 @@ class BoundaryLayer(Midpoint):
         )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state as it is; InputError where the layer would have to begin behind the obstacle."""
+        """Return the state as it is; InputError where the layer would have to begin behind the
+        obstacle."""
         surface = problem.surface
         gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
         if len(gap) and not gap.min() > 0.0:
             where = int(np.argmin(gap))
             raise InputError(
-                f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of "
+                f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible "
+                "set of "
                 "the layer, gap > 0: move the obstacle back by the layer's width, for example with "
                 "ContactLayer.set_back(surface)"
             )
@@ -105,7 +111,8 @@ class BoundaryLayer(Midpoint):
         )
         if not closed < 0.0:
             raise StepFailure(
-                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a rounding "
+                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a "
+                "rounding "
                 f"error beside displacements of {away:.1e} m: make the layer wider"
             )
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
@@ -137,7 +144,8 @@ class BoundaryLayer(Midpoint):
     def _pressure(
         self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float
     ) -> Array:
-        """p̄ (m,): gap = free + G p̄(gap) by Newton's method, in steps that leave a tenth of every gap at least."""
+        """p̄ (m,): gap = free + G p̄(gap) by Newton's method, in steps that leave a tenth of every
+        gap at least."""
         law = self.law
         rho = old * np.maximum(1.0 + dt * rate, 0.2)
         p, slope = law.mean_pressure(rho, old, rate, dt)
@@ -168,7 +176,8 @@ class BoundaryLayer(Midpoint):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the midpoint's state; its reactions are the layer's, its active points those inside the layer."""
+        """Return the midpoint's state; its reactions are the layer's, its active points those
+        inside the layer."""
         new = super().finish(problem, state, step, result, dt)
         reaction = step.layer if isinstance(step, LayeredStep) else None
         if reaction is None:

@@ -1,4 +1,5 @@
-"""Integrate in time from flight to layer and back, with an event at every crossing of the layer's edge rho = b."""
+"""Integrate in time from flight to layer and back, with an event at every crossing of the layer's
+edge rho = b."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from vi_contact.core.errors import InputError, StepFailure
 
 @dataclass(frozen=True)
 class LayerContact:
-    """Describe a passage through the layer: times [s], normal rates [m/s], the least distance [m] and its time [s]."""
+    """Describe a passage through the layer: times [s], normal rates [m/s], the least distance [m]
+    and its time [s]."""
 
     start: float
     end: float
@@ -43,7 +45,8 @@ class LayerContact:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Hold times (m,), coordinates (m, n_q), velocities (m, n), distances, reactions (m,) [N]; completed contacts."""
+    """Hold times (m,), coordinates (m, n_q), velocities (m, n), distances, reactions (m,) [N];
+    completed contacts."""
 
     t: Array
     q: Array
@@ -67,11 +70,12 @@ def layer_motion(
 ) -> Trajectory:
     """Compute the motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
 
-    ``metric``: the reading of the law. ``rtol``: relative tolerance of the integration by Dormand and Prince's method
-    of order 8; ``refine``: rows of the trajectory for each of its steps, which are large, by its own interpolation.
+    ``metric``: the reading of the law. ``rtol``: relative tolerance of the integration by Dormand
+    and Prince's method of order 8; ``refine``: rows of the trajectory for each of its steps, which
+    are large, by its own interpolation.
 
-    Raises:
-        InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is not known; a
+    Raises: InputError: the start is not inside the admissible set (rho > 0), or in the layer while
+        V is not known; a
             function of the system returns no finite numbers there.
         StepFailure: the integrator stopped, or did not come to an end; the message names the time.
     """
@@ -94,7 +98,8 @@ def layer_motion(
     rho = float(system.rho(q))
     if not rho > 0.0:
         raise InputError(
-            f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0"
+            f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at "
+            "rho > 0"
         )
     passages = _Passages(system, layer, metric, rtol, refine)
     inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
@@ -111,7 +116,8 @@ def layer_motion(
 def passage(
     layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1
 ) -> Trajectory:
-    """Return how ``mass`` [kg] on a line crosses the layer, entered with ``speed`` [m/s]; InputError if it stays."""
+    """Return how ``mass`` [kg] on a line crosses the layer, entered with ``speed`` [m/s];
+    InputError if it stays."""
     particle = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
     found = layer_motion(
         particle,
@@ -132,7 +138,8 @@ def passage(
 class _Passages:
     """Flights and passages through the layer one after the other.
 
-    The unknowns are v and q - q_start since the last crossing, over the time since: 1e-8 m is resolved beside 1 m.
+    The unknowns are v and q - q_start since the last crossing, over the time since: 1e-8 m is
+    resolved beside 1 m.
     """
 
     def __init__(
@@ -171,7 +178,8 @@ class _Passages:
             rho = float(system.rho(q + y[:n]))
             if not np.isfinite(rho):
                 raise StepFailure(
-                    f"the distance rho(q) is {rho:g} at t = {start + t:.6g} s: return a finite number"
+                    f"the distance rho(q) is {rho:g} at t = {start + t:.6g} s: return a finite "
+                    "number"
                 )
             return rho - width
 
@@ -183,7 +191,8 @@ class _Passages:
         way = width if inside else max(width, float(np.max(np.abs(q))))
         if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
             raise StepFailure(
-                f"the velocities or accelerations at t = {start:.6g} s are not finite: check what the "
+                f"the velocities or accelerations at t = {start:.6g} s are not finite: check what "
+                "the "
                 "system's functions return there"
             )
         most = float(np.max(np.abs(self._acceleration(start, q, v, layer, inside)[0])))
@@ -204,7 +213,8 @@ class _Passages:
         )
         if found.status < 0:
             raise StepFailure(
-                f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
+                f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho "
+                "= "
                 f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
             )
         places, speeds = q + found.y[:n].T, found.y[n:].T
@@ -230,7 +240,8 @@ class _Passages:
     def _acceleration(
         self, t: float, q: Array, v: Array, layer: Layer, inside: bool
     ) -> tuple[Array, float]:
-        """(v̇, lambda); NaN where a trial stage has left the admissible set, which makes the integrator step back."""
+        """(v̇, lambda); NaN where a trial stage has left the admissible set, which makes the
+        integrator step back."""
         free, along, g, normal = self._system.accelerations(t, q, v)
         if not inside:
             return free, 0.0

@@ -3,10 +3,11 @@
     rho u_tt = E u_xx - rho g,   u_x(length, t) = 0 or u(length, t) = 0,
     y = height + u(0, t) >= 0,   p = -E u_x(0, t) >= 0,   y p = 0
 
-u(x, t) [m] is positive upwards and counted from the stress-free bar whose foot is `height` above the wall; y is the
-height of the foot, p the pressure of the wall on it. c = sqrt(E/rho); crossing T = length / c. All arguments are SI,
-forces and energies per unit of section. Methods take arrays x in [0, length] and t >= 0 whose shapes broadcast; where a
-velocity, strain or pressure jumps they return one of the two values.
+u(x, t) [m] is positive upwards and counted from the stress-free bar whose foot is `height` above
+the wall; y is the height of the foot, p the pressure of the wall on it. c = sqrt(E/rho); crossing T
+= length / c. All arguments are SI, forces and energies per unit of section. Methods take arrays x
+in [0, length] and t >= 0 whose shapes broadcast; where a velocity, strain or pressure jumps they
+return one of the two values.
 """
 
 import math
@@ -31,7 +32,8 @@ _PERIOD_THREE = 0.5 * np.array(
 
 @dataclass(frozen=True)
 class UprightBar:
-    """Hold what upright bars have in common: length, height above the wall [m], E [Pa], rho [kg/m³]."""
+    """Hold what upright bars have in common: length, height above the wall [m], E [Pa], rho
+    [kg/m³]."""
 
     length: float = 10.0
     E: float = 900.0
@@ -51,12 +53,14 @@ class UprightBar:
 
 @dataclass(frozen=True)
 class ThrownBar(UprightBar):
-    """Describe a bar thrown at the wall with `speed` v0, no gravity; defaults: Doyen, Ern, Piperno (2011), first test.
+    """Describe a bar thrown at the wall with `speed` v0, no gravity; defaults: Doyen, Ern, Piperno
+    (2011), first test.
 
         u = -height - v0 min(x/c, T - |s - T|),   s = t - height/v0,   p = rho c v0 for 0 < s < 2T,
 
-    which contains the rigid motions with -v0 before the contact and +v0 after it. length, height [m]; speed [m/s];
-    E [Pa]; rho [kg/m³]. Raises InputError unless all are finite and positive (height may be 0).
+    which contains the rigid motions with -v0 before the contact and +v0 after it. length, height
+    [m]; speed [m/s]; E [Pa]; rho [kg/m³]. Raises InputError unless all are finite and positive
+    (height may be 0).
     """
 
     speed: float = 10.0
@@ -107,7 +111,8 @@ class ThrownBar(UprightBar):
         return self.pressure * ((t > self.contact_start) & (t < self.contact_end))
 
     def contacts(self, until: float) -> Array:
-        """Return start and end of the contacts before `until` [s], one row each, clipped there; (1, 2) or (0, 2)."""
+        """Return start and end of the contacts before `until` [s], one row each, clipped there; (1,
+        2) or (0, 2)."""
         times = np.array([[self.contact_start, self.contact_end]])
         return np.minimum(times[times[:, 0] < until], until)
 
@@ -120,10 +125,12 @@ class ThrownBar(UprightBar):
 
 @dataclass(frozen=True)
 class PeriodicBar:
-    """Describe a bar of length = E = rho = 1, top clamped, foot released at the wall from u = (1 - x)/2; no gravity.
+    """Describe a bar of length = E = rho = 1, top clamped, foot released at the wall from u = (1 -
+    x)/2; no gravity.
 
-    Period 3: released, in contact (p = 1/2), expanding, one unit of time each. With s = t mod 1, u is linear in x and s
-    in the four zones between s = x and s = 1 - x (Dabaghi, Petrov, Pousin, Renard; Chouly, Hild, Renard).
+    Period 3: released, in contact (p = 1/2), expanding, one unit of time each. With s = t mod 1, u
+    is linear in x and s in the four zones between s = x and s = 1 - x (Dabaghi, Petrov, Pousin,
+    Renard; Chouly, Hild, Renard).
     """
 
     length: ClassVar[float] = 1.0
@@ -151,7 +158,8 @@ class PeriodicBar:
         return 0.5 * (phase == 1.0)
 
     def contacts(self, until: float) -> Array:
-        """Return start and end of the contacts before `until` [s], one row each, clipped there; shape (m, 2)."""
+        """Return start and end of the contacts before `until` [s], one row each, clipped there;
+        shape (m, 2)."""
         starts = np.arange(1.0, until, 3.0)
         return np.minimum(np.stack([starts, starts + 1.0], axis=1), until)
 

@@ -3,14 +3,16 @@
     rho u_tt = E u_xx - rho g,   u_x(length, t) = 0,   u = u_t = 0 at t = 0,
     y = height + u(0, t) >= 0,   p = -E u_x(0, t) >= 0,   y p = 0
 
-u(x, t) [m] is positive upwards. With c = sqrt(E/rho), T = length/c and F(s) = 0 for s <= 0 every solution is
+u(x, t) [m] is positive upwards. With c = sqrt(E/rho), T = length/c and F(s) = 0 for s <= 0 every
+solution is
 
     u(x, t) = -g t²/2 + F(t - x/c) + F(t - 2T + x/c),   p(t) = rho c (F'(t) - F'(t - 2T)).
 
-Let a(t) = -g t + 2 F'(t - 2T), the velocity of a free foot, known 2T ahead. Where the foot touches and a < 0 it stays
-(y' = 0, p = -rho c a), else it is free (p = 0, y' = a): F is quadratic between events, and these are roots of
-quadratics, so that the solution is exact to round-off. A periodic motion costs a few pieces per bounce; in others their
-number multiplies with every bounce, a thousand or so after five.
+Let a(t) = -g t + 2 F'(t - 2T), the velocity of a free foot, known 2T ahead. Where the foot touches
+and a < 0 it stays (y' = 0, p = -rho c a), else it is free (p = 0, y' = a): F is quadratic between
+events, and these are roots of quadratics, so that the solution is exact to round-off. A periodic
+motion costs a few pieces per bounce; in others their number multiplies with every bounce, a
+thousand or so after five.
 """
 
 import math
@@ -25,17 +27,20 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import attributes
 from vi_contact.core.errors import InputError
 
-COINCIDENT = 1e-12  # events and piece ends closer than this, relative to the problem's own scales, are the same
+# events and piece ends closer than this, relative to the problem's own scales, are the same
+COINCIDENT = 1e-12
 
 
 @dataclass(frozen=True)
 class BouncingBar(UprightBar):
-    """Describe a bar released at rest `height` above the wall; defaults: Doyen, Ern, Piperno (2011), second test.
+    """Describe a bar released at rest `height` above the wall; defaults: Doyen, Ern, Piperno
+    (2011), second test.
 
-    The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f, and the first
-    contact, of length 2T, has p = rho c g (t_f + r), r the time since touch-down; the second has it in reverse.
-    length, height [m]; E [Pa]; rho [kg/m³]; gravity [m/s²]. Raises InputError unless all are finite and positive
-    (height may be 0). Methods take t >= 0; where velocity and pressure jump they return the later value.
+    The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f,
+    and the first contact, of length 2T, has p = rho c g (t_f + r), r the time since touch-down; the
+    second has it in reverse. length, height [m]; E [Pa]; rho [kg/m³]; gravity [m/s²]. Raises
+    InputError unless all are finite and positive (height may be 0). Methods take t >= 0; where
+    velocity and pressure jump they return the later value.
     """
 
     gravity: float = 10.0
@@ -50,18 +55,21 @@ class BouncingBar(UprightBar):
 
     @property
     def period(self) -> float:
-        """Return 4T + 4t_f [s]. Raises InputError unless t_f/T is an integer >= 3: no other period is known."""
+        """Return 4T + 4t_f [s]. Raises InputError unless t_f/T is an integer >= 3: no other period
+        is known."""
         ratio = self.fall_time / self.crossing
         if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 3:
             raise InputError(
-                f"BouncingBar: fall time over crossing time is {ratio:.6g}, which gives no known period; "
+                f"BouncingBar: fall time over crossing time is {ratio:.6g}, which gives no known "
+                "period; "
                 "choose a height for which it is an integer of at least 3"
             )
         return 4.0 * (self.crossing + self.fall_time)
 
     @property
     def energy(self) -> float:
-        """Return rho length g height [J/m²] at any time, zero for the undeformed bar at rest on the wall."""
+        """Return rho length g height [J/m²] at any time, zero for the undeformed bar at rest on the
+        wall."""
         return self.rho * self.length * self.gravity * self.height
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
@@ -89,7 +97,8 @@ class BouncingBar(UprightBar):
         return self.height + self.displacement(0.0, t)
 
     def contacts(self, until: float) -> Array:
-        """Return start and end of the contacts before `until` [s], one row each, clipped there; shape (m, 2)."""
+        """Return start and end of the contacts before `until` [s], one row each, clipped there;
+        shape (m, 2)."""
         start, _, closed = self._history(until)
         change = np.flatnonzero(np.diff(closed, append=0.0))
         times = np.append(start, math.inf)[change + 1].reshape(-1, 2)
@@ -115,13 +124,15 @@ class BouncingBar(UprightBar):
         return t, at(np.asarray(t - delay)), at(np.asarray(t - 2.0 * self.crossing + delay))
 
     def _history(self, until: float) -> tuple[Array, Array, Array]:
-        """Return pieces of F: starts (m,) [s]; value, slope, curvature there (m, 3); 1.0 in contact (m,)."""
+        """Return pieces of F: starts (m,) [s]; value, slope, curvature there (m, 3); 1.0 in contact
+        (m,)."""
         return _pieces(self, 1 + math.ceil(until / (2.0 * self.crossing)))
 
 
 @lru_cache(maxsize=8)
 def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
-    """Return the pieces of F from -2T to at least `round_trips` · 2T, as BouncingBar._history returns them."""
+    """Return the pieces of F from -2T to at least `round_trips` · 2T, as BouncingBar._history
+    returns them."""
     trip, g = 2.0 * bar.crossing, bar.gravity
     near = COINCIDENT * (bar.height + g * trip**2)
     slow = COINCIDENT * g * (bar.fall_time + trip)
@@ -156,7 +167,8 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
 
 
 def first_root(y: float, a: float, a1: float) -> float:
-    """Return the first s > 0 at which y + a s + a1 s²/2, positive before, is zero; infinite if there is none."""
+    """Return the first s > 0 at which y + a s + a1 s²/2, positive before, is zero; infinite if
+    there is none."""
     disc = a * a - 2.0 * a1 * y
     if disc < 0.0 or (a1 >= 0.0 and a >= 0.0):
         return math.inf

@@ -2,10 +2,11 @@
 
     energy = ∫ (1 - d)² ½ E eps² + Gc/2 (d²/l + l |∇d|²),    d >= its values before
 
-Homogeneous: d = E eps² / (E eps² + Gc/l), stress (1 - d)² E eps, largest at eps_c = sqrt(Gc / (3 l E)) where d = 1/4
-and the stress is 9/16 E eps_c; unloading goes back along the secant, d stays. A crack, d = 1 at x = 0, has the profile
-exp(-|x|/l) and the energy Gc per area. (K. Pham, H. Amor, J.-J. Marigo, C. Maurini, Int. J. Damage Mech. 20, 2011;
-C. Miehe, M. Hofacker, F. Welschinger, CMAME 199, 2010.) Here E = Gc = 1 and l is given.
+Homogeneous: d = E eps² / (E eps² + Gc/l), stress (1 - d)² E eps, largest at eps_c = sqrt(Gc / (3 l
+E)) where d = 1/4 and the stress is 9/16 E eps_c; unloading goes back along the secant, d stays. A
+crack, d = 1 at x = 0, has the profile exp(-|x|/l) and the energy Gc per area. (K. Pham, H. Amor,
+J.-J. Marigo, C. Maurini, Int. J. Damage Mech. 20, 2011; C. Miehe, M. Hofacker, F. Welschinger,
+CMAME 199, 2010.) Here E = Gc = 1 and l is given.
 """
 
 from __future__ import annotations

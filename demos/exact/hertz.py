@@ -1,10 +1,12 @@
-"""Solve Hertz contact of spheres and the quasi-static impact of one, without friction (Johnson 1985, ch. 4 and 11).
+"""Solve Hertz contact of spheres and the quasi-static impact of one, without friction (Johnson
+1985, ch. 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
 
     1/E* = sum over i of (1 - nu_i²)/E_i,   1/R = sum over i of 1/R_i.
 
-Pressures are positive in compression. Lengths [m], pressures and moduli [Pa], forces [N], or any consistent units.
+Pressures are positive in compression. Lengths [m], pressures and moduli [Pa], forces [N], or any
+consistent units.
 """
 
 import math
@@ -97,12 +99,13 @@ class HertzPoint:
 
 @dataclass(frozen=True)
 class HertzImpact:
-    """Describe a mass m that strikes with v on a Hertz spring, m d'' = -(4/3) E* sqrt(R) d^(3/2) (quasi-static):
+    """Describe a mass m that strikes with v on a Hertz spring, m d'' = -(4/3) E* sqrt(R) d^(3/2)
+    (quasi-static):
 
         d_max = (15 m v²/(16 E* sqrt(R)))^(2/5),   duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 
-    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass [kg], speed v [m/s], modulus E* [Pa],
-    radius R [m]. Raises InputError unless all are finite and positive.
+    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass [kg], speed v [m/s],
+    modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.
     """
 
     mass: float

@@ -1,7 +1,8 @@
 """Solve the rocking of a rigid block on a rigid base (Housner, Bull. Seism. Soc. Am. 53, 1963).
 
-Uniform block of width 2b and height 2h, no sliding, no bouncing. With R = sqrt(b² + h²), alpha = atan(b/h),
-p² = 3g/(4R) and phi = theta/alpha, rocking about the edge on the side to which the block leans obeys
+Uniform block of width 2b and height 2h, no sliding, no bouncing. With R = sqrt(b² + h²), alpha =
+atan(b/h), p² = 3g/(4R) and phi = theta/alpha, rocking about the edge on the side to which the block
+leans obeys
 
     theta'' = -p² sin(alpha - theta)   for theta > 0, mirrored for theta < 0;   slender: phi'' = p² (phi - 1).
 
@@ -26,8 +27,9 @@ REST = 1e-30  # phi below which the rest of the motion lasts less than round-off
 class HousnerBlock:
     """Describe a block of width 2b and height 2h [m] (the full lengths) under gravity [m/s²].
 
-    "Slender" is said of what uses the linearised equation; theta0 is the angle of release at rest, in (0, alpha).
-    Raises InputError unless all are finite and positive, and for blocks that do not rock on after an impact (e <= 0).
+    "Slender" is said of what uses the linearised equation; theta0 is the angle of release at rest,
+    in (0, alpha). Raises InputError unless all are finite and positive, and for blocks that do not
+    rock on after an impact (e <= 0).
     """
 
     width: float
@@ -38,7 +40,8 @@ class HousnerBlock:
         attributes(self, positive=("width", "height", "gravity"))
         if self.restitution <= 0.0:
             raise InputError(
-                f"HousnerBlock: width {self.width} is too large for height {self.height}, the first "
+                f"HousnerBlock: width {self.width} is too large for height {self.height}, the "
+                "first "
                 "impact stops the block; give a width below sqrt(2) times the height"
             )
 
@@ -69,7 +72,8 @@ class HousnerBlock:
 
     @property
     def onset_acceleration(self) -> float:
-        """Return g tan(alpha) = g b/h [m/s²]: a horizontal base acceleration above it starts rocking."""
+        """Return g tan(alpha) = g b/h [m/s²]: a horizontal base acceleration above it starts
+        rocking."""
         return self.gravity * self.width / self.height
 
     def period(self, theta0: float) -> float:
@@ -84,14 +88,16 @@ class HousnerBlock:
         return self.alpha * self._amplitudes(theta0, impacts)
 
     def impact_times(self, theta0: float, impacts: int) -> Array:
-        """Return times of the first impacts (impacts,), slender [s]: a quarter period, half ones of phi_1, ..."""
+        """Return times of the first impacts (impacts,), slender [s]: a quarter period, half ones of
+        phi_1, ..."""
         halves = 0.5 * _period(self._amplitudes(theta0, impacts)[:-1]) / self.p
         return np.cumsum(halves) - 0.5 * halves[:1]
 
     def free_rocking(self, theta0: float, t: ArrayLike) -> Array:
         """Return theta(t) [rad] after release at t = 0, slender, with impacts; shape of t [s] >= 0.
 
-        phi = ±(1 - (1 - phi_n) cosh(p (t - t_n))), t_n the time of the n-th amplitude; 0 after the rest time.
+        phi = ±(1 - (1 - phi_n) cosh(p (t - t_n))), t_n the time of the n-th amplitude; 0 after the
+        rest time.
         """
         t = np.asarray(t, dtype=float)
         impacts = math.ceil(
@@ -107,14 +113,17 @@ class HousnerBlock:
         return self.alpha * np.where(n < len(peaks), np.where(n % 2, -lean, lean), 0.0)
 
     def overturning_time(self, acceleration: float) -> float:
-        """Return the shortest rectangular pulse of the base acceleration [m/s²] that overturns, slender [s].
+        """Return the shortest rectangular pulse of the base acceleration [m/s²] that overturns,
+        slender [s].
 
-        ln(A/(A - 1))/p, A = acceleration/(g alpha). Raises InputError unless A > 1: below that nothing moves.
+        ln(A/(A - 1))/p, A = acceleration/(g alpha). Raises InputError unless A > 1: below that
+        nothing moves.
         """
         excess = acceleration / (self.gravity * self.alpha)
         if not excess > 1.0:
             raise InputError(
-                f"HousnerBlock: an acceleration of {acceleration!r} does not lift the block; give more "
+                f"HousnerBlock: an acceleration of {acceleration!r} does not lift the block; give "
+                "more "
                 f"than {self.gravity * self.alpha:.6g}"
             )
         return -math.log1p(-1.0 / excess) / self.p
@@ -122,7 +131,8 @@ class HousnerBlock:
     def _phi(self, theta0: float) -> float:
         if not 0.0 < theta0 < self.alpha:
             raise InputError(
-                f"HousnerBlock: theta0 is {theta0!r}; give one between 0 and alpha = {self.alpha:.6g}"
+                f"HousnerBlock: theta0 is {theta0!r}; give one between 0 and alpha = "
+                f"{self.alpha:.6g}"
             )
         return theta0 / self.alpha
 

@@ -1,12 +1,14 @@
 """Give the solution of a membrane over a ball, the obstacle problem on a square.
 
--Δu >= 0, u >= psi and one of them an equality, on (-2, 2)²; psi is the upper half of the unit ball, continued outside
-of r = 0.9 by its tangent cone so that it has a value everywhere. With the boundary values of
+-Δu >= 0, u >= psi and one of them an equality, on (-2, 2)²; psi is the upper half of the unit ball,
+continued outside of r = 0.9 by its tangent cone so that it has a value everywhere. With the
+boundary values of
 
     u = psi for r <= a,    u = -A log(r / 2) for r >= a,    A = a² / sqrt(1 - a²)
 
-the membrane leaves the ball smoothly at the radius a where u is continuous: a² (1 - log(a / 2)) = 1. The force between
-ball and membrane is 2 pi A. (E. Bueler, PETSc for Partial Differential Equations, SIAM 2020, section 12.1.)
+the membrane leaves the ball smoothly at the radius a where u is continuous: a² (1 - log(a / 2)) =
+1. The force between ball and membrane is 2 pi A. (E. Bueler, PETSc for Partial Differential
+Equations, SIAM 2020, section 12.1.)
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Give closed forms for beams and plates that touch a rigid stop or the rigid ground.
 
-A body that a load presses on a stop at the distance g carries there P = (w0 - g)/f, where w0 is the deflection of that
-point under the load alone and f the deflection under a unit force at it. Deflections of plates: S. Timoshenko, S.
-Woinowsky-Krieger, Theory of Plates and Shells (1959), sections 16, 19, 30 and 34. The beam on the ground and the disk
-on the ground solve EI w'''' = -q and D ∇⁴ w = q where they do not touch; where they begin to touch deflection, slope
-and moment are those of the ground.
+A body that a load presses on a stop at the distance g carries there P = (w0 - g)/f, where w0 is the
+deflection of that point under the load alone and f the deflection under a unit force at it.
+Deflections of plates: S. Timoshenko, S. Woinowsky-Krieger, Theory of Plates and Shells (1959),
+sections 16, 19, 30 and 34. The beam on the ground and the disk on the ground solve EI w'''' = -q
+and D ∇⁴ w = q where they do not touch; where they begin to touch deflection, slope and moment are
+those of the ground.
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ from vi_contact.core.algebra import Array
 
 
 def stop_force(w0: float, gap: float, flexibility: float) -> float:
-    """Return the force of a stop [N]: w0 [m] under the load alone, gap [m], flexibility [m/N]; 0 where w0 < gap."""
+    """Return the force of a stop [N]: w0 [m] under the load alone, gap [m], flexibility [m/N]; 0
+    where w0 < gap."""
     return max(w0 - gap, 0.0) / flexibility
 
 
 def arm_flexibility(height: float, arm: float, *, EA: float, EI: float) -> Array:
-    """Return F (2, 2) [m/N] of the end of an arm [m] on a clamped column of this height [m]: u = F p, along and up."""
+    """Return F (2, 2) [m/N] of the end of an arm [m] on a clamped column of this height [m]: u = F
+    p, along and up."""
     xx, xy = height**3 / (3.0 * EI) + arm / EA, -(height**2) * arm / (2.0 * EI)
     yy = (arm**3 / 3.0 + arm**2 * height) / EI + height / EA
     return np.array([[xx, xy], [xy, yy]])
@@ -31,9 +34,11 @@ def arm_flexibility(height: float, arm: float, *, EA: float, EI: float) -> Array
 
 @dataclass(frozen=True)
 class LiftedBeam:
-    """Describe a heavy beam on the rigid ground whose end is pulled up: EI [N m²], weight q [N/m], force P [N].
+    """Describe a heavy beam on the rigid ground whose end is pulled up: EI [N m²], weight q [N/m],
+    force P [N].
 
-    Over the length a = 2 P/q from the end it is off the ground, as w = w' = w'' = 0 where it begins to touch.
+    Over the length a = 2 P/q from the end it is off the ground, as w = w' = w'' = 0 where it begins
+    to touch.
     """
 
     EI: float
@@ -57,8 +62,8 @@ class LiftedBeam:
 
 
 def square_plate() -> tuple[float, float]:
-    """Return the deflection of the middle of a simply supported square plate under a uniform load, in units of q a⁴/D,
-    and under a unit force there, in units of a²/D; a is the side."""
+    """Return the deflection of the middle of a simply supported square plate under a uniform load,
+    in units of q a⁴/D, and under a unit force there, in units of a²/D; a is the side."""
     m = np.arange(1, 60, 2)
     b = 0.5 * np.pi * m
     load = (
@@ -79,10 +84,12 @@ def clamped_disk() -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class DiskOnGround:
-    """Hold a clamped disk (radius a = 1, D = 1, q = 1) that the load presses on flat ground at a distance g below.
+    """Hold a clamped disk (radius a = 1, D = 1, q = 1) that the load presses on flat ground at a
+    distance g below.
 
-    It lies on the ground for r <= b; elsewhere w = r⁴/64 + c1 + c2 r² + c3 ln r + c4 r² ln r, with w = w' = 0 at r = 1
-    and w = g, w' = w'' = 0 at r = b. The ground carries q inside and a line load on the circle r = b.
+    It lies on the ground for r <= b; elsewhere w = r⁴/64 + c1 + c2 r² + c3 ln r + c4 r² ln r, with
+    w = w' = 0 at r = 1 and w = g, w' = w'' = 0 at r = b. The ground carries q inside and a line
+    load on the circle r = b.
     """
 
     gap: float

@@ -23,8 +23,9 @@ def plot_bounces(
 ) -> Path:
     """Draw a row per scheme: foot, force, energy; ``exact`` (of demos.exact) in grey behind each.
 
-    histories: name -> history with u_?_foot, contact_resultant, energy_kinetic and energy_strain of a bar of that
-    section; all of the same times. Forces beyond three times the exact one leave the panel and are written in it.
+    histories: name -> history with u_?_foot, contact_resultant, energy_kinetic and energy_strain of
+    a bar of that section; all of the same times. Forces beyond three times the exact one leave the
+    panel and are written in it.
     """
     t = next(iter(histories.values()))["t"]
     fine = np.linspace(t[0], t[-1], 4000)

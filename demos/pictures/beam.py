@@ -1,4 +1,5 @@
-"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012), contact at the tip, and the limit of the regularisation."""
+"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012), contact at the tip, and the limit of the
+regularisation."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ _QUANTITIES = (
 
 
 def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
-    """Draw energies of several runs over time, above; losses by friction, below (Fig. 8.1). Dashed: no losses."""
+    """Draw energies of several runs over time, above; losses by friction, below (Fig. 8.1). Dashed:
+    no losses."""
     figure, (top, bottom) = panels(2, (9.0, 7.0), height_ratios=(3, 2))
     for label, run in runs.items():
         (line,) = top.plot(run.history["t"], run.energy, lw=1.1, label=label)
@@ -59,8 +61,9 @@ def plot_shapes(
     count: int = 7,
     near: float = 0.2,
 ) -> Path:
-    """Draw rotation, angular speed, displacement and velocity along the beam at ``count`` times of a span [s] (Figs.
-    8.4 to 8.9): the last part ``near`` of the beam above, the whole below. The run needs snapshots in the span."""
+    """Draw rotation, angular speed, displacement and velocity along the beam at ``count`` times of
+    a span [s] (Figs. 8.4 to 8.9): the last part ``near`` of the beam above, the whole below. The
+    run needs snapshots in the span."""
     from matplotlib import colormaps
 
     figure, axes = canvas(2, 4, (13.0, 6.5))
@@ -90,9 +93,11 @@ def plot_shapes(
 
 
 def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:
-    """Draw gap, contact force with the friction it allows, and motion of the tip across, of ``rubbing_problem``.
+    """Draw gap, contact force with the friction it allows, and motion of the tip across, of
+    ``rubbing_problem``.
 
-    history: with the columns of ``Contact`` and of a ``Probe`` labelled "tip". gap: of the rod at rest [m].
+    history: with the columns of ``Contact`` and of a ``Probe`` labelled "tip". gap: of the rod at
+    rest [m].
     """
     figure, (top, middle, bottom) = panels(3, (9.0, 8.0))
     t, force = history["t"], history["contact_resultant"]
@@ -131,7 +136,8 @@ def plot_regularisation(
     tips: Mapping[str, tuple[Array, Array]],
     path: str | Path,
 ) -> Path:
-    """Draw the largest difference of the tip from the exact law over eps, left; tips (t, u) of some runs, right."""
+    """Draw the largest difference of the tip from the exact law over eps, left; tips (t, u) of some
+    runs, right."""
     figure, ((left, right),) = canvas(1, 2, (11.0, 4.5))
     for label, values in errors.items():
         left.loglog(eps, values, "o-", ms=4, lw=1.1, label=label)

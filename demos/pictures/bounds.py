@@ -1,4 +1,5 @@
-"""Draw what the demos of bounds on a field show: a membrane over a ball, a bar in torsion, a bar that cracks."""
+"""Draw what the demos of bounds on a field show: a membrane over a ball, a bar in torsion, a bar
+that cracks."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from vi_contact.plots.histories import canvas, plain_numbers, save
 
 
 def gathered(function: Any) -> tuple[Any, Any] | None:
-    """Return (points (n, 3), values (n,)) of a scalar Function on rank 0, None on the others. Collective."""
+    """Return (points (n, 3), values (n,)) of a scalar Function on rank 0, None on the others.
+    Collective."""
     space = function.function_space
     n = space.dofmap.index_map.size_local
     parts = space.mesh.comm.gather(
@@ -29,7 +31,8 @@ def plot_membrane(
     errors: Mapping[str, Sequence[float]],
     path: str | Path,
 ) -> Path:
-    """Draw the membrane along y = 0, the nodes that lie on the ball, and errors against the cell size."""
+    """Draw the membrane along y = 0, the nodes that lie on the ball, and errors against the cell
+    size."""
     figure, axes = canvas(1, 3, (13.0, 4.0))
     section, plan, order = axes[0]
     known = Membrane()
@@ -80,7 +83,8 @@ def plot_torsion(
 ) -> Path:
     """Draw the stress function and the plastic zone of sections, and torque against twist.
 
-    ``fields``: name -> (points (n, 3), u (n,), plastic (n,)); ``curves``: name -> (twists, torques / limit torque).
+    ``fields``: name -> (points (n, 3), u (n,), plastic (n,)); ``curves``: name -> (twists, torques
+    / limit torque).
     """
     figure, axes = canvas(1, len(fields) + 1, (4.6 * (len(fields) + 1), 4.0), lattice=False)
     for axis, (name, (points, values, plastic)) in zip(axes[0], fields.items(), strict=False):
@@ -108,8 +112,9 @@ def plot_crack(
     profile: tuple[Any, Any],
     path: str | Path,
 ) -> Path:
-    """Draw stress against strain of the bar that stays homogeneous (strain, stress, exact strain, exact stress), the
-    energies of the one that breaks against how far it is pulled, and its damage along the axis beside the exact one."""
+    """Draw stress against strain of the bar that stays homogeneous (strain, stress, exact strain,
+    exact stress), the energies of the one that breaks against how far it is pulled, and its damage
+    along the axis beside the exact one."""
     figure, axes = canvas(1, 3, (13.0, 4.0))
     stress, energy, damage = axes[0]
     stress.plot(law[2], law[3], color="0.6", lw=3.0, label="closed form")

@@ -1,4 +1,5 @@
-"""Draw what the demo of the buried channel shows beside its run: layout, moments, runs beside a reference."""
+"""Draw what the demo of the buried channel shows beside its run: layout, moments, runs beside a
+reference."""
 
 from __future__ import annotations
 
@@ -111,8 +112,9 @@ def plot_moments(
     title: str,
     magnified: float,
 ) -> Path:
-    """Draw a row per run (name -> folder), a column per time [s]: the bodies around the channel, their displacements
-    less the channel's mean drawn ``magnified`` times; contact points coloured by their pressure, open ones white."""
+    """Draw a row per run (name -> folder), a column per time [s]: the bodies around the channel,
+    their displacements less the channel's mean drawn ``magnified`` times; contact points coloured
+    by their pressure, open ones white."""
     runs = {name: read_bodies(folder) for name, folder in folders.items()}
     colours = Colours.of(
         np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times])
@@ -143,7 +145,8 @@ def plot_beside(
     title: str,
     points: Sequence[str] = ("1", "19"),
 ) -> Path:
-    """Draw Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference`` grey and thick."""
+    """Draw Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference``
+    grey and thick."""
     columns = [
         (f"u_{axis}_{label}", f"$u_{axis}$, point {label}") for label in points for axis in "xy"
     ]

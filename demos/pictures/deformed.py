@@ -25,10 +25,12 @@ def plot_snapshots(
     support: Callable[[float], float],
     magnified: float = 1.0,
 ) -> Path:
-    """Draw a row per run (name -> folder), a column per time [s]: the deformed mesh and the contact tractions on it.
+    """Draw a row per run (name -> folder), a column per time [s]: the deformed mesh and the contact
+    tractions on it.
 
-    Cells are coloured by von Mises stress, tractions drawn as arrows with one scale for all. ``support``: height y [m]
-    of the rigid support at a time; displacements (not ``support``) are drawn ``magnified`` times.
+    Cells are coloured by von Mises stress, tractions drawn as arrows with one scale for all.
+    ``support``: height y [m] of the rigid support at a time; displacements (not ``support``) are
+    drawn ``magnified`` times.
     """
     runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
     shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
@@ -122,9 +124,11 @@ def _draw_support(axis: Any, height: float, size: float) -> None:
 def plot_tractions(
     folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str
 ) -> Path:
-    """Draw contact pressure p_n and shear traction p_t over x: a column per run, a curve per time [s].
+    """Draw contact pressure p_n and shear traction p_t over x: a column per run, a curve per time
+    [s].
 
-    The shear is that of the support on the body and positive along +x, as in the pictures of boundary elements.
+    The shear is that of the support on the body and positive along +x, as in the pictures of
+    boundary elements.
     """
     from matplotlib import colormaps
 

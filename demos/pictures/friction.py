@@ -1,4 +1,5 @@
-"""Draw friction from recorded histories: force against slip, and where and when points stick or slip."""
+"""Draw friction from recorded histories: force against slip, and where and when points stick or
+slip."""
 
 from __future__ import annotations
 
@@ -29,11 +30,13 @@ def plot_hysteresis(
     tangent: int = 0,
     title: str = "Friction force and slip",
 ) -> Path:
-    """Draw the tangential force of the body on its support along an axis, against the mean slip of all contact points.
+    """Draw the tangential force of the body on its support along an axis, against the mean slip of
+    all contact points.
 
-    ``axis``: x, y or z, where the force varies most when None; ``tangent``: which component of the slip. The slip's
-    sign is that of the axis for work that is done on the support, so that the loop runs clockwise and its area is the
-    work of friction where all points slide alike. InputError without records of friction.
+    ``axis``: x, y or z, where the force varies most when None; ``tangent``: which component of the
+    slip. The slip's sign is that of the axis for work that is done on the support, so that the loop
+    runs clockwise and its area is the work of friction where all points slide alike. InputError
+    without records of friction.
     """
     force, name = _force(history, axis)
     slip = _slip(history)[:, :, tangent].mean(axis=1)
@@ -63,7 +66,8 @@ def plot_states(
     axis_label: str = "position [m]",
     title: str = "Open, sticking and slipping points",
 ) -> Path:
-    """Map the states of the contact points over position and time. ``position``: (m,) of the points.
+    """Map the states of the contact points over position and time. ``position``: (m,) of the
+    points.
 
     InputError without records of friction.
     """
@@ -122,6 +126,7 @@ def _force(history: History, axis: str | None) -> tuple[Array, str]:
         axis = max(names, key=lambda one: float(np.ptp(history[names[one]])))
     if axis not in names:
         raise InputError(
-            f"plot_hysteresis: no friction force is along {axis!r}, choose one of {', '.join(names)}"
+            f"plot_hysteresis: no friction force is along {axis!r}, choose one of "
+            f"{', '.join(names)}"
         )
     return 0.0 - history[names[axis]], axis

@@ -2,8 +2,8 @@
 
     python3 demos/pictures/practice.py RESULTS [NAMES]
 
-RESULTS holds the run folders wall, dam, pier, pounding and culvert, or those that are named; the pictures are written
-beside them.
+RESULTS holds the run folders wall, dam, pier, pounding and culvert, or those that are named; the
+pictures are written beside them.
 """
 
 import math

@@ -1,4 +1,5 @@
-"""Draw what the demo of the building on a raft shows beside its contact faces: histories, moments over rotations."""
+"""Draw what the demo of the building on a raft shows beside its contact faces: histories, moments
+over rotations."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ CORNERS = {
 
 
 def instants(history: History) -> list[float]:
-    """Return the last time [s] before the largest uplift at which a twentieth of it was open, half of it, and that of
-    the largest."""
+    """Return the last time [s] before the largest uplift at which a twentieth of it was open, half
+    of it, and that of the largest."""
     uplift = history["uplift_raft"]
     widest = int(np.argmax(uplift))
     below = [np.flatnonzero(uplift[: widest + 1] <= part * uplift[widest]) for part in (0.05, 0.5)]
@@ -29,7 +30,8 @@ def instants(history: History) -> list[float]:
 
 
 def plot_motions(history: History, path: str | Path, *, weight: float, mu: float) -> Path:
-    """Draw ground and roof, the force of the soil on the raft over the ``weight`` [N], what is open, and the slip."""
+    """Draw ground and roof, the force of the soil on the raft over the ``weight`` [N], what is
+    open, and the slip."""
     t = history["t"]
     figure, axes = panels(5, (8.5, 11.0))
     for axis, panel in zip("xy", axes, strict=False):
@@ -68,7 +70,8 @@ def plot_motions(history: History, path: str | Path, *, weight: float, mu: float
 
 
 def rotations(history: History, sides: Sequence[float]) -> dict[str, Array]:
-    """Return the rotations [rad] of the raft about x and y from the heights of its corners; ``sides`` of it [m]."""
+    """Return the rotations [rad] of the raft about x and y from the heights of its corners;
+    ``sides`` of it [m]."""
     corner = {name: history[f"u_z_{name}"] for name in CORNERS}
     about_x = (
         corner["right_front"] + corner["left_front"] - corner["right_back"] - corner["left_back"]
@@ -82,10 +85,11 @@ def rotations(history: History, sides: Sequence[float]) -> dict[str, Array]:
 def plot_moments(
     history: History, path: str | Path, *, weight: float, sides: Sequence[float]
 ) -> Path:
-    """Draw the moment of the raft on the soil over its rotation and over its rotation against the soil, about x and y.
+    """Draw the moment of the raft on the soil over its rotation and over its rotation against the
+    soil, about x and y.
 
-    Lines: the moments weight·B/6 and weight·B/2 of the side B [m] across; at the first a stiff raft on springs begins
-    to lift off, beyond the second it would overturn at rest.
+    Lines: the moments weight·B/6 and weight·B/2 of the side B [m] across; at the first a stiff raft
+    on springs begins to lift off, beyond the second it would overturn at rest.
     """
     figure, axes = canvas(1, 2, (10.0, 4.8), sharey=True)
     factor, unit = scale(

@@ -23,9 +23,10 @@ def plot_rocking(
 ) -> Path:
     """Draw rotation, corner reactions and mechanical energy of a released block against time.
 
-    history: with the columns of the recorders ``Rocking`` and ``Energy``. angle: unit of the rotation [rad], the angle
-    of overturning. exact: rotation of the rigid limit at history["t"] [rad]. energy: of the rigid limit at release and
-    after each impact [J], shape (n + 1,), the weight's potential included; impacts: their times [s], shape (n,).
+    history: with the columns of the recorders ``Rocking`` and ``Energy``. angle: unit of the
+    rotation [rad], the angle of overturning. exact: rotation of the rigid limit at history["t"]
+    [rad]. energy: of the rigid limit at release and after each impact [J], shape (n + 1,), the
+    weight's potential included; impacts: their times [s], shape (n,).
     """
     t = history["t"]
     figure, (top, middle, bottom) = panels(3, (9.0, 8.0))
@@ -78,9 +79,11 @@ def plot_pulses(
     angle: float,
     unit: float,
 ) -> Path:
-    """Draw slow pulses around the onset of rocking above, rectangular ones around overturning below; label -> history.
+    """Draw slow pulses around the onset of rocking above, rectangular ones around overturning
+    below; label -> history.
 
-    Each pair: base acceleration over ``unit``, g b/h [m/s²]; what the block does. angle: of overturning [rad].
+    Each pair: base acceleration over ``unit``, g b/h [m/s²]; what the block does. angle: of
+    overturning [rad].
     """
     figure, axes = panels(4, (9.0, 9.0), height_ratios=(1, 2, 1, 2))
     for axis, runs in ((axes[0], onset), (axes[2], overturning)):

@@ -1,4 +1,5 @@
-"""Draw what the demo of structures shows: beams, a frame and plates in contact, their errors, two of them thrown."""
+"""Draw what the demo of structures shows: beams, a frame and plates in contact, their errors, two
+of them thrown."""
 
 from __future__ import annotations
 
@@ -20,9 +21,10 @@ LARGER = 10.0  # how much larger displacements of the frame are drawn
 class Shown:
     """Hold what is drawn.
 
-    frame: nodes (k, 2), displacements (k, 2) [m], direction of the stop and its gap [m]; beam: x, heights [m], closed
-    form; disk: radii and deflections upwards [m] of its nodes, closed form and q a⁴/D [m]; errors: name -> (elements
-    along a side, relative errors); thrown: name -> (t [s], gap [m], energy over that at the start, time of touch [s]).
+    frame: nodes (k, 2), displacements (k, 2) [m], direction of the stop and its gap [m]; beam: x,
+    heights [m], closed form; disk: radii and deflections upwards [m] of its nodes, closed form and
+    q a⁴/D [m]; errors: name -> (elements along a side, relative errors); thrown: name -> (t [s],
+    gap [m], energy over that at the start, time of touch [s]).
     """
 
     frame: tuple[Array, Array, tuple[float, float], float] | None = None

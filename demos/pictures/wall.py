@@ -1,5 +1,6 @@
-"""Draw the wall of the boundary method: its data and numbered points (Fig. 2), a step as two structures (Fig. 1), and
-the deformed wall at two instants, which is the first picture of the documentation.
+"""Draw the wall of the boundary method: its data and numbered points (Fig. 2), a step as two
+structures (Fig. 1), and the deformed wall at two instants, which is the first picture of the
+documentation.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ DEPTH = 0.09  # of the height: how much of the ground is drawn
 
 
 def plot_data(wall: Wall, cases: Mapping[str, Sequence[int]], path: str | Path) -> Path:
-    """Draw the wall with its forty boundary points, the ground, and the points of each case that may touch it."""
+    """Draw the wall with its forty boundary points, the ground, and the points of each case that
+    may touch it."""
     figure, axes = canvas(1, len(cases), (4.9 * len(cases), 6.6), lattice=False, sharey=True)
     across, up = wall.width / 8.0, wall.height / 12.0
     for axis, (case, touching) in zip(axes[0], cases.items(), strict=True):
@@ -65,7 +67,8 @@ def plot_data(wall: Wall, cases: Mapping[str, Sequence[int]], path: str | Path) 
     _dimension(axes[0, 0], (2.2 * across, 0.0), (2.2 * across, wall.height), f"{wall.height:g} m")
     told = wall.material
     text = (
-        f"E = {told.E / 1e9:g} GPa\nν = {told.nu:g}\nd = {wall.thickness:.2f} m\nρ = {told.rho:g} kg/m³\n"
+        f"E = {told.E / 1e9:g} GPa\nν = {told.nu:g}\nd = {wall.thickness:.2f} m\nρ = {told.rho:g} "
+        "kg/m³\n"
         "plane stress"
     )
     for axis in axes[0]:
@@ -140,7 +143,8 @@ def _dimension(axis: Any, start: tuple[float, float], end: tuple[float, float], 
 
 
 def plot_decomposition(found: Decomposition, wall: Wall, path: str | Path) -> Path:
-    """Draw a step: the unilateral structure, that of the loads without reactions, and that of the reactions alone."""
+    """Draw a step: the unilateral structure, that of the loads without reactions, and that of the
+    reactions alone."""
     parts = (
         ("unilateral structure\n$u = \\tilde u_1 + \\tilde u_2$", found.u, True),
         ("loads without reactions, (34)\n$\\tilde u_1 = G(\\bar l)$", found.loaded, False),
@@ -201,7 +205,8 @@ def plot_decomposition(found: Decomposition, wall: Wall, path: str | Path) -> Pa
 
 
 def plot_frames(folder: str | Path, wall: Wall, times: Sequence[float], path: str | Path) -> float:
-    """Draw the wall of a run at times [s] that have a frame: displacements, stresses and pressures of the ground.
+    """Draw the wall of a run at times [s] that have a frame: displacements, stresses and pressures
+    of the ground.
 
     Return how many times larger than they are the displacements are drawn, the same in all panels.
     """

@@ -1,4 +1,5 @@
-"""Draw a wall that is warmed until it presses on a ceiling, and the waves in a bar that is warmed at once."""
+"""Draw a wall that is warmed until it presses on a ceiling, and the waves in a bar that is warmed
+at once."""
 
 from __future__ import annotations
 
@@ -17,9 +18,11 @@ def plot_warming(
     bar: tuple[Array, Array, Array],
     path: str | Path,
 ) -> Path:
-    """Draw pressures (warming [K], Pa) of the wall beside the closed form, and over time the pushes of a bar.
+    """Draw pressures (warming [K], Pa) of the wall beside the closed form, and over time the pushes
+    of a bar.
 
-    bar: time over the crossing of a wave, push of the support and push of the wall over E A alpha dT.
+    bar: time over the crossing of a wave, push of the support and push of the wall over E A alpha
+    dT.
     """
     figure, axes = canvas(1, 2, (11.0, 4.2))
     slow, quick = axes[0]

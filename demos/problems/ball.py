@@ -1,7 +1,9 @@
-"""Model a ball that is thrown on a rigid plane, as a quarter of tetrahedra with two planes of symmetry.
+"""Model a ball that is thrown on a rigid plane, as a quarter of tetrahedra with two planes of
+symmetry.
 
-It flies down along -y without gravity and strikes the plane with its lowest point. Forces, masses and energies of the
-model are a quarter of the ball's: times ``QUARTERS`` they compare with those of ``demos.exact.hertz``.
+It flies down along -y without gravity and strikes the plane with its lowest point. Forces, masses
+and energies of the model are a quarter of the ball's: times ``QUARTERS`` they compare with those of
+``demos.exact.hertz``.
 """
 
 import math
@@ -33,11 +35,12 @@ CELL_GROWTH = 1.2
 
 @dataclass(frozen=True)
 class Ball:
-    """Describe a ball of ``radius`` [m] at ``height`` [m] above the plane, with ``speed`` [m/s] towards it.
+    """Describe a ball of ``radius`` [m] at ``height`` [m] above the plane, with ``speed`` [m/s]
+    towards it.
 
-    The mesh has ``cells`` cells in the largest contact radius and about as many in the radius of the ball; from one
-    size to the other they grow by 1.2/cells of the distance: twice the number refines everything, everywhere.
-    InputError for fewer than 3 cells or height < 0.
+    The mesh has ``cells`` cells in the largest contact radius and about as many in the radius of
+    the ball; from one size to the other they grow by 1.2/cells of the distance: twice the number
+    refines everything, everywhere. InputError for fewer than 3 cells or height < 0.
     """
 
     radius: float = 0.01
@@ -51,7 +54,8 @@ class Ball:
     def __post_init__(self) -> None:
         if not self.cells >= 3.0 or not self.height >= 0.0:
             raise InputError(
-                f"Ball: {self.cells!r} cells in the contact radius, {self.height!r} m above the plane; "
+                f"Ball: {self.cells!r} cells in the contact radius, {self.height!r} m above the "
+                "plane; "
                 "give at least 3 cells and a height >= 0"
             )
 
@@ -76,7 +80,8 @@ class Ball:
 
 @dataclass(frozen=True)
 class BallModel:
-    """Hold the assembled quarter. ``mass`` [kg]: of the whole ball as the mesh has it, a little less than a sphere's.
+    """Hold the assembled quarter. ``mass`` [kg]: of the whole ball as the mesh has it, a little
+    less than a sphere's.
 
     ``exact``: the quasi-static impact of that mass.
     """
@@ -88,7 +93,8 @@ class BallModel:
 
     @property
     def exact(self) -> HertzImpact:
-        """Return the impact of the mesh's mass, so that what differs is the error of the mechanics."""
+        """Return the impact of the mesh's mass, so that what differs is the error of the
+        mechanics."""
         return self.ball.impact(self.mass)
 
     def time_step(self, steps: int = 200) -> float:
@@ -127,11 +133,13 @@ def build(ball: Ball, comm: Any) -> BallModel:
 
 
 def hertz_motion(exact: HertzImpact, t: ArrayLike) -> tuple[Array, Array]:
-    """Return (approach d [m], force F [N]) at times t [s] after the first touch, zero before it and after the contact:
+    """Return (approach d [m], force F [N]) at times t [s] after the first touch, zero before it and
+    after the contact:
 
         m d'' = -F(d),  energy: d' = v sqrt(1 - x),  x = (d/d_max)^(5/2)   =>   t/duration = ½ I_x(2/5, 1/2) until d_max
 
-    with the regularised incomplete beta function I, and the same backwards; F = F_max (d/d_max)^(3/2).
+    with the regularised incomplete beta function I, and the same backwards; F = F_max
+    (d/d_max)^(3/2).
     """
     phase = np.clip(np.asarray(t, dtype=float) / exact.duration, 0.0, 1.0)
     share = betaincinv(0.4, 0.5, 1.0 - np.abs(2.0 * phase - 1.0)) ** 0.4

@@ -4,9 +4,10 @@
         causes more oscillations"
     2   "In our numerical results, energy loss for friction seems to be negligible as compared to the viscosity damping"
 
-Statement 1 is asked of runs whose force is a hundredth, a tenth, the whole and ten times that of the reading. A run
-oscillates as often as its tip turns and then moves by more than eps: below eps, the slip at which the regularised
-friction saturates, a tip that sticks chatters from step to step. Statement 2 is asked of the whole force.
+Statement 1 is asked of runs whose force is a hundredth, a tenth, the whole and ten times that of
+the reading. A run oscillates as often as its tip turns and then moves by more than eps: below eps,
+the slip at which the regularised friction saturates, a tip that sticks chatters from step to step.
+Statement 2 is asked of the whole force.
 """
 
 from collections.abc import Sequence
@@ -37,8 +38,9 @@ NEGLIGIBLE = 0.1  # friction below this share of the viscous loss
 class Row:
     """Hold what a reading makes of both statements at one viscosity a2 [s].
 
-    turning_points, swings: how often the tip turns in 2 s at the forces FACTORS, all and those of more than EPS.
-    peak_contact_force [N], friction_loss, viscous_loss [J], ratio of these: at the force of the reading itself.
+    turning_points, swings: how often the tip turns in 2 s at the forces FACTORS, all and those of
+    more than EPS. peak_contact_force [N], friction_loss, viscous_loss [J], ratio of these: at the
+    force of the reading itself.
     """
 
     reading: str
@@ -56,7 +58,8 @@ class Row:
 
     @property
     def statement_1(self) -> bool:
-        """Say whether a tenfold force never gives fewer swings, and the largest more than the smallest."""
+        """Say whether a tenfold force never gives fewer swings, and the largest more than the
+        smallest."""
         return list(self.swings) == sorted(self.swings) and self.swings[-1] > self.swings[0]
 
     @property
@@ -87,7 +90,8 @@ class Row:
 
 
 HEAD = (
-    "| reading | a2 [s] | turning points, force x 0.01, 0.1, 1, 10 | swings above eps, same forces | peak contact "
+    "| reading | a2 [s] | turning points, force x 0.01, 0.1, 1, 10 | swings above eps, same forces "
+    "| peak contact "
     "force [N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | statement 2 |\n|"
     + "---|"
     * 10
@@ -95,7 +99,8 @@ HEAD = (
 
 
 def turning_points(u: Array, least: float = 0.0) -> int:
-    """Return how often u (n,) turns: where it moved by more than ``least`` before and does so after."""
+    """Return how often u (n,) turns: where it moved by more than ``least`` before and does so
+    after."""
     count, way, low, high = 0, 0, float(u[0]), float(u[0])
     for value in map(float, u[1:]):
         low, high = min(low, value), max(high, value)
@@ -108,7 +113,8 @@ def turning_points(u: Array, least: float = 0.0) -> int:
 def rubbed(
     a2: float, force: Force, factor: float = 1.0, *, count: int = 1000, dt: float = DT
 ) -> BeamRun:
-    """Run the source's beam for 2 s under ``factor`` times a normal force; ``count`` elements, steps of dt [s]."""
+    """Run the source's beam for 2 s under ``factor`` times a normal force; ``count`` elements,
+    steps of dt [s]."""
     stepper = BeamStepper(
         TimoshenkoBeam(viscosity=a2),
         published_elements(count),
@@ -128,7 +134,8 @@ def row(
     dt: float = DT,
     factors: Sequence[float] = FACTORS,
 ) -> Row:
-    """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s], of a run for each factor; 1 is one of them."""
+    """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s], of a run for each factor;
+    1 is one of them."""
     runs = {
         factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history
         for factor in factors

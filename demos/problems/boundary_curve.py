@@ -1,4 +1,5 @@
-"""Take the boundary of a plane finite element mesh as a mesh of boundary elements, the same on all ranks."""
+"""Take the boundary of a plane finite element mesh as a mesh of boundary elements, the same on all
+ranks."""
 
 import numpy as np
 import numpy.typing as npt
@@ -12,16 +13,18 @@ from vi_contact.fem.mesh import Facets, node_numbers
 
 
 def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]]:
-    """Return (boundary mesh, (n,) input number of each of its nodes) of groups that make up closed curves.
+    """Return (boundary mesh, (n,) input number of each of its nodes) of groups that make up closed
+    curves.
 
-    Label of an element = position of its group among the arguments. Raises InputError when the mesh is not plane, the
-    groups overlap or the curves are open. Collective.
+    Label of an element = position of its group among the arguments. Raises InputError when the mesh
+    is not plane, the groups overlap or the curves are open. Collective.
     """
     for group in facets:
         facets_of("boundary_curve", "a group", group, getattr(facets[0], "mesh", None))
     if not facets or facets[0].mesh.geometry.dim != 2:
         raise InputError(
-            "boundary_curve: give boundary groups of a plane mesh; boundary elements are two-dimensional"
+            "boundary_curve: give boundary groups of a plane mesh; boundary elements are "
+            "two-dimensional"
         )
     mesh = facets[0].mesh
     numbers, rows, labels = node_numbers(mesh), [], []

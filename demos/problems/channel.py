@@ -1,7 +1,8 @@
-"""Model the second example of the boundary method: a channel buried in soil on bedrock, shaken (Figs. 6 to 9).
+"""Model the second example of the boundary method: a channel buried in soil on bedrock, shaken
+(Figs. 6 to 9).
 
-The figures' data are not in the text: what is assumed is marked CHOSEN. Between channel and soil: contact on left wall,
-base and right wall; the two bottom corners touch with both their sides.
+The figures' data are not in the text: what is assumed is marked CHOSEN. Between channel and soil:
+contact on left wall, base and right wall; the two bottom corners touch with both their sides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,7 +50,8 @@ class Channel:
     """Describe geometry and materials, in SI units. CHOSEN throughout; the text says neither.
 
     shape: a layer of 24 x 8 m and a channel of 4 x 3 m, walls and slab 0.5 m thick, cells of 0.5 m.
-    soil: 100 MPa, 1800 kg/m³, shear waves at 146 m/s. concrete: 20 GPa, 2400 kg/m³. Plane strain, per metre.
+    soil: 100 MPa, 1800 kg/m³, shear waves at 146 m/s. concrete: 20 GPa, 2400 kg/m³. Plane strain,
+    per metre.
     """
 
     shape: ChannelMesh = field(default_factory=ChannelMesh)
@@ -60,9 +62,11 @@ class Channel:
     damping: Damping = field(default_factory=NoDamping)
 
     def point(self, number: int) -> tuple[float, float]:
-        """Return the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom corners.
+        """Return the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom
+        corners.
 
-        Evenly spaced: 1-7 base from left to right, 8-13 right wall and 14-19 left wall, upwards to the surface.
+        Evenly spaced: 1-7 base from left to right, 8-13 right wall and 14-19 left wall, upwards to
+        the surface.
         """
         if not 1 <= number <= POINTS:
             raise InputError(
@@ -85,14 +89,15 @@ class Channel:
         return 1.0 / 80.0
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Return bottom corners and middle (1, 7, 4), middle of the walls (10, 16), their tops (13, 19): always nodes
-        but for the middles of irregular meshes."""
+        """Return bottom corners and middle (1, 7, 4), middle of the walls (10, 16), their tops (13,
+        19): always nodes but for the middles of irregular meshes."""
         return {str(number): self.point(number) for number in (1, 4, 7, 10, 13, 16, 19)}
 
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """Hold the assembled channel and soil; ``surface``: base, left, right wall in contact, with its normals."""
+    """Hold the assembled channel and soil; ``surface``: base, left, right wall in contact, with its
+    normals."""
 
     channel: Channel
     mesh: Any
@@ -109,12 +114,12 @@ class ChannelModel:
         impact: ImpactLaw | None = Inelastic(ImpulseUpdate()),
         mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up channel and soil under the harmonic motion, sliding freely; inelastic impulses, consistent mass.
+        """Set up channel and soil under the harmonic motion, sliding freely; inelastic impulses,
+        consistent mass.
 
-        Args:
-            friction: Coulomb(mu) for instance.
-            bilateral: soil and channel cannot part, but slide as before: the linear comparison run of Fig. 9.
-            impact, mass: schemes with massless contact nodes take no impact law: give impact=None, and leave mass to
+        Args: friction: Coulomb(mu) for instance. bilateral: soil and channel cannot part, but slide
+            as before: the linear comparison run of Fig. 9. impact, mass: schemes with massless
+            contact nodes take no impact law: give impact=None, and leave mass to
                 them. An impact law runs on consistent mass unless another is given.
         """
         return ContactProblem(
@@ -127,7 +132,8 @@ class ChannelModel:
         )
 
     def recorders(self) -> tuple[Recorder, ...]:
-        """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings."""
+        """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil,
+        ...), openings."""
         probes = self.channel.probes()
         soil = SoilProbe({f"{label}_soil": point for label, point in probes.items()})
         return Energy(), Contact(), Probe(probes), soil, Openings(self.sides)
@@ -142,13 +148,15 @@ class ChannelModel:
 
 @dataclass
 class SoilProbe(Probe):
-    """Record, as `Probe` does, at the nodes of the soil that touch these points of the channel in the undeformed mesh.
+    """Record, as `Probe` does, at the nodes of the soil that touch these points of the channel in
+    the undeformed mesh.
 
     InputError for a point that is not at the interface.
     """
 
     def _found(self, problem: ContactProblem, points: Array) -> Indices:
-        """Numbers of the nodes of side 2 that face those of side 1 (the nearest where divisions differ)."""
+        """Numbers of the nodes of side 2 that face those of side 1 (the nearest where divisions
+        differ)."""
         nodes, surface = super()._found(problem, points).tolist(), problem.surface
         faced: dict[int, int] = {}
         for part in surface.parts if isinstance(surface, FemSurface) else ():
@@ -160,7 +168,8 @@ class SoilProbe(Probe):
                     faced |= dict(zip(numbers.tolist(), partners.tolist(), strict=True))
         if not faced.keys() >= set(nodes):
             raise InputError(
-                "a soil probe is not at the interface with the channel: give points of the channel's "
+                "a soil probe is not at the interface with the channel: give points of the "
+                "channel's "
                 "outline"
             )
         return np.array([faced[node] for node in nodes], dtype=np.int64)
@@ -168,7 +177,8 @@ class SoilProbe(Probe):
 
 @dataclass(frozen=True)
 class Openings:
-    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``: name -> (total,)."""
+    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``:
+    name -> (total,)."""
 
     sides: Mapping[str, Mask]
 
@@ -202,13 +212,14 @@ def build(
 ) -> ChannelModel:
     """Mesh and assemble channel and soil; collective.
 
-    Args:
-        sides: the ends of the soil layer; by default Rollers(), which hold them vertically (CHOSEN).
-        weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so that the soil's own settlement
-            is not in the figures; without any weight a channel with smooth sides drifts up without bound.
-        base: moves the bedrock, or lets waves in from below, in the frame of an observer at rest; its problems take
-            excitation=(). By default the bedrock is at rest and what shakes it is an inertia load, in the frame of the
-            bedrock.
+    Args: sides: the ends of the soil layer; by default Rollers(), which hold them vertically
+        (CHOSEN). weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so
+        that the soil's own settlement
+            is not in the figures; without any weight a channel with smooth sides drifts up without
+            bound.
+        base: moves the bedrock, or lets waves in from below, in the frame of an observer at rest;
+            its problems take excitation=(). By default the bedrock is at rest and what shakes it is
+            an inertia load, in the frame of the bedrock.
         meshed: (mesh, tags) of another model of this channel, for stages on one mesh.
     """
     mesh, tags = meshed or build_mesh(channel.shape, comm)
@@ -244,7 +255,8 @@ def staged(
     weighing: Sequence[str],
     base: BaseMotion | RockBelow | None,
 ) -> tuple[ChannelModel, ChannelModel | None]:
-    """Return the model, and on its mesh the one for its gravity stage where its own supports hold no static load."""
+    """Return the model, and on its mesh the one for its gravity stage where its own supports hold
+    no static load."""
     ends = sides or Rollers()
     if ends.firm and (base is None or not base.lets_waves_in):
         return build(channel, comm, sides=ends, weighing=weighing, base=base), None

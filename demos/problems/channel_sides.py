@@ -22,7 +22,8 @@ ENDS = ("left_side", "right_side")
 
 
 class Sides(Protocol):
-    """Give the conditions at the layer's ends. ``firm``: they hold static loads; else see ``staged`` for gravity."""
+    """Give the conditions at the layer's ends. ``firm``: they hold static loads; else see
+    ``staged`` for gravity."""
 
     @property
     def firm(self) -> bool: ...
@@ -30,14 +31,15 @@ class Sides(Protocol):
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
 
-        ``motion``: displacement, velocity, acceleration of the bedrock as `Prescribed` takes them; empty in its frame.
+        ``motion``: displacement, velocity, acceleration of the bedrock as `Prescribed` takes them;
+        empty in its frame.
         """
 
 
 @dataclass(frozen=True)
 class RockBelow:
-    """Describe rock under the layer that lets waves through: ``motion``, t [s] -> upgoing velocity (2,) [m/s]
-    (``upgoing``), and its ``rock``, the soil above when None."""
+    """Describe rock under the layer that lets waves through: ``motion``, t [s] -> upgoing velocity
+    (2,) [m/s] (``upgoing``), and its ``rock``, the soil above when None."""
 
     motion: Callable[[float], Array] = field(repr=False)
     rock: LinearElastic | None = None
@@ -60,10 +62,11 @@ def bedrock(
 ) -> BaseMotion | RockBelow | None:
     """Return what moves the bottom of the layer, None where the motion is an inertia load.
 
-    base: "relative", that load, in the frame of the bedrock; "prescribed", a moved bedrock: the same contact forces,
-    and both expect the motion under the layer; "compliant", with ``rock`` (the soil's own material when None): takes
-    the motion as that of an outcrop, and half its velocity comes up. dt: step of the run [s]; what is no record is
-    integrated with a tenth of it. InputError for another word, and for rock without a compliant base.
+    base: "relative", that load, in the frame of the bedrock; "prescribed", a moved bedrock: the
+    same contact forces, and both expect the motion under the layer; "compliant", with ``rock`` (the
+    soil's own material when None): takes the motion as that of an outcrop, and half its velocity
+    comes up. dt: step of the run [s]; what is no record is integrated with a tenth of it.
+    InputError for another word, and for rock without a compliant base.
     """
     check_word("base", base, BASES)
     if rock is not None and base != "compliant":
@@ -83,8 +86,9 @@ def bedrock(
 
 @dataclass(frozen=True)
 class Rollers:
-    """Hold the ends along one component, free along the other. Under horizontal shaking of a horizontal layer ends with
-    component 1 held follow the free field exactly, under vertical shaking those with component 0 held."""
+    """Hold the ends along one component, free along the other. Under horizontal shaking of a
+    horizontal layer ends with component 1 held follow the free field exactly, under vertical
+    shaking those with component 0 held."""
 
     firm: ClassVar[bool] = True
     component: int = 1
@@ -109,7 +113,8 @@ class Fixed:
 
 @dataclass(frozen=True)
 class TiedSides:
-    """Tie the ends to each other: exact free field of horizontal layers; waves leave at one end and come back."""
+    """Tie the ends to each other: exact free field of horizontal layers; waves leave at one end and
+    come back."""
 
     firm: ClassVar[bool] = True
 
@@ -119,7 +124,8 @@ class TiedSides:
 
 @dataclass(frozen=True)
 class DashpotSides:
-    """Put Lysmer and Kuhlemeyer's dashpots only: waves leave, but the ends follow no free field (Kontoe 2007)."""
+    """Put Lysmer and Kuhlemeyer's dashpots only: waves leave, but the ends follow no free field
+    (Kontoe 2007)."""
 
     firm: ClassVar[bool] = False
 
@@ -129,8 +135,8 @@ class DashpotSides:
 
 @dataclass(frozen=True)
 class FreeFieldSides:
-    """Put dashpots on the difference to the free field, and its stresses: exact for level ground, waves from the
-    channel leave. ``base`` is that of the run, as ``soil.FreeField`` wants it."""
+    """Put dashpots on the difference to the free field, and its stresses: exact for level ground,
+    waves from the channel leave. ``base`` is that of the run, as ``soil.FreeField`` wants it."""
 
     firm: ClassVar[bool] = False
     base: Excitation | Sequence[Excitation] | BaseMotion | RockBelow = field(repr=False)

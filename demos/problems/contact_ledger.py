@@ -13,10 +13,12 @@ from vi_contact.core.errors import InputError
 
 @dataclass(frozen=True)
 class ContactLedger:
-    """Hold the works up to each time (steps,) [J/m] from boundary data: energy = load + contact + support to round-off.
+    """Hold the works up to each time (steps,) [J/m] from boundary data: energy = load + contact +
+    support to round-off.
 
-    energy: of the body; load: of the tractions; contact: of the contact forces, friction included; support: of what
-    holds prescribed unknowns; friction: what friction took (in ``contact`` already).
+    energy: of the body; load: of the tractions; contact: of the contact forces, friction included;
+    support: of what holds prescribed unknowns; friction: what friction took (in ``contact``
+    already).
     """
 
     energy: Array
@@ -38,7 +40,8 @@ class ContactLedger:
 def ledger(
     run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None
 ) -> ContactLedger:
-    """Return the works of a run from its boundary motion, BoundaryProblem.solve(run.forces); loads: (steps, 2, n).
+    """Return the works of a run from its boundary motion, BoundaryProblem.solve(run.forces); loads:
+    (steps, 2, n).
 
     supported: (2, n), the ``fixed`` of the problem.
     """
@@ -47,7 +50,8 @@ def ledger(
     loads = array("ledger", "loads", loads, motion.displacement.shape, unit="N/m")
     if len(run.times) != len(motion.times):
         raise InputError(
-            f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give the "
+            f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give "
+            "the "
             "motion of this run, BoundaryProblem.solve(run.forces)"
         )
     optional(mask, "ledger", "supported", supported, motion.displacement.shape[1:])

@@ -1,9 +1,11 @@
-"""Split the answer of a step with contact into two structures without contact (boundary method, eqs. 34 to 36).
+"""Split the answer of a step with contact into two structures without contact (boundary method,
+eqs. 34 to 36).
 
     A u = b - B_nᵀ r_n,     u_1 = A⁻¹ b,     u_2 = -A⁻¹ B_nᵀ r_n,     u = u_1 + u_2
 
-A is the stiffness with the springs of the time step, b holds the loads and what the steps before leave behind. The
-first structure has all loads and no reactions, the second one the reactions alone: mu_N = -r_n of the source.
+A is the stiffness with the springs of the time step, b holds the loads and what the steps before
+leave behind. The first structure has all loads and no reactions, the second one the reactions
+alone: mu_N = -r_n of the source.
 """
 
 from __future__ import annotations
@@ -20,10 +22,12 @@ from vi_contact.core.step import Report
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Hold what a step adds up to, at the nodes of the mesh in rows from the foot upwards, each from left to right.
+    """Hold what a step adds up to, at the nodes of the mesh in rows from the foot upwards, each
+    from left to right.
 
-    points, u, loaded, pressed: (n, 2) [m] places, displacement of the step, u_1 and u_2; contact, forces: (m, 2) places
-    [m] of the conditions and forces on the body [N]; t [s]; defect: largest |u - u_1 - u_2| over the largest |u_1|.
+    points, u, loaded, pressed: (n, 2) [m] places, displacement of the step, u_1 and u_2; contact,
+    forces: (m, 2) places [m] of the conditions and forces on the body [N]; t [s]; defect: largest
+    |u - u_1 - u_2| over the largest |u_1|.
     """
 
     points: Array
@@ -37,7 +41,8 @@ class Decomposition:
 
 
 def split(problem: ContactProblem, report: Report) -> Decomposition | None:
-    """Split a step without friction whose unknowns are displacements; None but on rank 0. Collective."""
+    """Split a step without friction whose unknowns are displacements; None but on rank 0.
+    Collective."""
     step, result, surface = report.step, report.result, problem.surface
     space: Any = problem.system.space
     n = len(step.b)

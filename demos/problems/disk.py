@@ -1,7 +1,9 @@
-"""Model the tennis ball of Aimi, Di Credico and Gimperlein (2024): a disk on a plane that pushes it up and retracts.
+"""Model the tennis ball of Aimi, Di Credico and Gimperlein (2024): a disk on a plane that pushes it
+up and retracts.
 
-No weight and no other load: once released, the disk flies up with a constant velocity and swings. The plane is rigid,
-stays horizontal and moves by s(t); the gap of a point of the disk is its height above the plane, y + u_y - s(t).
+No weight and no other load: once released, the disk flies up with a constant velocity and swings.
+The plane is rigid, stays horizontal and moves by s(t); the gap of a point of the disk is its height
+above the plane, y + u_y - s(t).
 """
 
 import math
@@ -24,9 +26,11 @@ from vi_contact.laws.materials import LinearElastic, PlaneStrain
 
 @dataclass(frozen=True)
 class Push:
-    """Push by s(t) = ``height`` sin²(pi t / (2 ``rise``)) until it is zero again at t = 2 ``rise``, then by zero.
+    """Push by s(t) = ``height`` sin²(pi t / (2 ``rise``)) until it is zero again at t = 2 ``rise``,
+    then by zero.
 
-    With height 0.05 and rise 1 it is 0.05 (1 - cos pi t)/2 for t <= 1; it goes down as it came up. [m, s]
+    With height 0.05 and rise 1 it is 0.05 (1 - cos pi t)/2 for t <= 1; it goes down as it came up.
+    [m, s]
     """
 
     height: float = 0.05
@@ -46,7 +50,8 @@ class Push:
 
 @dataclass(frozen=True)
 class Disk:
-    """Describe a disk of ``radius`` [m], with cells of ``size`` [m], plane strain, pushed by ``push``."""
+    """Describe a disk of ``radius`` [m], with cells of ``size`` [m], plane strain, pushed by
+    ``push``."""
 
     radius: float = 0.5
     size: float = 0.04
@@ -62,13 +67,15 @@ class Disk:
 
     @property
     def time_step(self) -> float:
-        """Return the time [s] in which a pressure wave crosses a cell: half the cell size in the paper's units."""
+        """Return the time [s] in which a pressure wave crosses a cell: half the cell size in the
+        paper's units."""
         return self.size / self.material.c_p
 
 
 @dataclass(frozen=True)
 class DiskModel:
-    """Hold the assembled disk; ``foot``: its contact side; ``mass``: of the disk as the mesh has it [kg/m]."""
+    """Hold the assembled disk; ``foot``: its contact side; ``mass``: of the disk as the mesh has it
+    [kg/m]."""
 
     disk: Disk
     system: SemiDiscreteSystem
@@ -99,8 +106,8 @@ def build(disk: Disk, comm: Any) -> DiskModel:
 
 
 class Momentum:
-    """Record the momentum rᵀMv of a body in the plane along x and y and about the point ``centre``, in which
-    contact and friction are the only forces; M is the mass matrix of the run."""
+    """Record the momentum rᵀMv of a body in the plane along x and y and about the point ``centre``,
+    in which contact and friction are the only forces; M is the mass matrix of the run."""
 
     def __init__(self, centre: tuple[float, float]) -> None:
         self._centre = centre

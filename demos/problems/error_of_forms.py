@@ -1,18 +1,22 @@
-"""Measure the error of both forms of the Poincaré-Steklov operator against the finest symmetric solution.
+"""Measure the error of both forms of the Poincaré-Steklov operator against the finest symmetric
+solution.
 
-The source (Aimi, Di Credico, Gimperlein, Comput. Methods Appl. Mech. Engrg. 427 (2024) 117066) says of concrete on
-steel: "The squared energy error for both couplings decays with similar slope." Displacements of nested meshes and time
-steps lie in the finest space, whose symmetric operator S knows the energy of any motion v of the boundary:
+The source (Aimi, Di Credico, Gimperlein, Comput. Methods Appl. Mech. Engrg. 427 (2024) 117066) says
+of concrete on steel: "The squared energy error for both couplings decays with similar slope."
+Displacements of nested meshes and time steps lie in the finest space, whose symmetric operator S
+knows the energy of any motion v of the boundary:
 
     |v|²(t_n) = sum_(k<=n) (S v)_k . (v_k - v_(k-1)),       error² = sum_n |u_h - u|²(t_n) / sum_n |u|²(t_n),
 
-u the finest symmetric solution: the energy norm of the difference, over time. Its own error e² is what the successive
-differences of its last three levels, d = |u_4h - u_2h| and b = |u_2h - u_h|, leave when they go on falling by q = b/d,
-with the cosine c between them (1: Richardson's extrapolation, 0: differences of projections, perpendicular):
+u the finest symmetric solution: the energy norm of the difference, over time. Its own error e² is
+what the successive differences of its last three levels, d = |u_4h - u_2h| and b = |u_2h - u_h|,
+leave when they go on falling by q = b/d, with the cosine c between them (1: Richardson's
+extrapolation, 0: differences of projections, perpendicular):
 
     e² = b² q²/(1 - q²) (1 + 2 c q/(1 - q))
 
-Slopes are those of error² + e² over h, by least squares: u is no nearer to the exact solution than e.
+Slopes are those of error² + e² over h, by least squares: u is no nearer to the exact solution than
+e.
 """
 
 import math
@@ -37,15 +41,19 @@ from vi_contact.laws.materials import LinearElastic
 
 FORMS = {"symmetric": True, "unsymmetric": False}
 SETTLED = 0.3  # slopes between neighbouring levels that differ by more have not settled
-MARCHED = 40  # elements of a side up to which both forms are solved by a march; beyond, the symmetric one on a circle
+# elements of a side up to which both forms are solved by a march; beyond, the symmetric one on a
+# circle
+MARCHED = 40
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Example:
-    """Describe a pressed square with c_P dt = ``ratio`` h and ``count`` time steps per element of a side.
+    """Describe a pressed square with c_P dt = ``ratio`` h and ``count`` time steps per element of a
+    side.
 
-    pressure: (t) [Pa]; supports: of the base, by name: components that are held, or the friction of a contact.
+    pressure: (t) [Pa]; supports: of the base, by name: components that are held, or the friction of
+    a contact.
     """
 
     material: LinearElastic
@@ -96,7 +104,8 @@ EXAMPLES = {
 
 @dataclass
 class Solutions:
-    """Collect displacements (steps, 2n) [m], energies (steps,) [J/m] and worst certificates by support, form and k."""
+    """Collect displacements (steps, 2n) [m], energies (steps,) [J/m] and worst certificates by
+    support, form and k."""
 
     displacement: dict[tuple[str, str, int], Array] = field(default_factory=dict)
     energy: dict[tuple[str, str, int], Array] = field(default_factory=dict)
@@ -130,8 +139,9 @@ def held(problem: BoundaryProblem, components: tuple[int, ...]) -> BoundaryProbl
 
 
 def prolonged(u: Array, k: int, fine: int) -> Array:
-    """Return displacements (steps, 2, 4k) of k elements per side in the space of ``fine``, a multiple of k, with as
-    many times the steps: linear between nodes and between times, zero at t = 0."""
+    """Return displacements (steps, 2, 4k) of k elements per side in the space of ``fine``, a
+    multiple of k, with as many times the steps: linear between nodes and between times, zero at t =
+    0."""
     m, steps = fine // k, len(u)
     place, time = np.arange(4 * fine) / m, np.arange(1, m * steps + 1) / m
     node, share = place.astype(int), place % 1.0
@@ -150,7 +160,8 @@ class Norm(Protocol):
 
 
 class EnergyNorm:
-    """Give products <S v, w>, summed over all times up to each and then over these, of motions of the finest space."""
+    """Give products <S v, w>, summed over all times up to each and then over these, of motions of
+    the finest space."""
 
     def __init__(self, operator: PoincareSteklov, motions: Sequence[Array]) -> None:
         u = np.stack([motion.reshape(len(motion), -1) for motion in motions], axis=2)
@@ -166,10 +177,12 @@ class EnergyNorm:
 
 
 def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
-    """Return a row for each support (all by default), form and level of an example; the last level is the reference.
+    """Return a row for each support (all by default), form and level of an example; the last level
+    is the reference.
 
-    ``levels``: numbers of elements per side, at least three, all divisors of the last, which is twice and four times
-    two of them. With more than MARCHED elements the last level is solved in the symmetric form alone.
+    ``levels``: numbers of elements per side, at least three, all divisors of the last, which is
+    twice and four times two of them. With more than MARCHED elements the last level is solved in
+    the symmetric form alone.
     """
     example, fine, found = (
         EXAMPLES[name].only(*(supports or EXAMPLES[name].supports)),
@@ -225,7 +238,8 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
 
 
 class Differences:
-    """Give squared energy norms of differences of solutions, over that of the finest symmetric one."""
+    """Give squared energy norms of differences of solutions, over that of the finest symmetric
+    one."""
 
     def __init__(self, norm: Norm, keys: list[tuple[str, int]]) -> None:
         self._norm, self._keys = norm, keys
@@ -244,7 +258,8 @@ class Differences:
         return self._norm.square(self._weights(one, two)) / self._unit
 
     def reference_error(self, fine: int) -> tuple[float, float]:
-        """Return e² of the finest symmetric solution, and the cosine between its last two successive differences."""
+        """Return e² of the finest symmetric solution, and the cosine between its last two
+        successive differences."""
         last, middle, first = (("symmetric", fine // m) for m in (1, 2, 4))
         d2, b2 = self.between(first, middle), self.between(middle, last)
         cosine = 0.5 * (self.between(first, last) - d2 - b2) / math.sqrt(d2 * b2)

@@ -1,15 +1,17 @@
-"""Add the second-order effect of a static load: geometric stiffness of its stresses (P-Delta, gravity's moment).
+"""Add the second-order effect of a static load: geometric stiffness of its stresses (P-Delta,
+gravity's moment).
 
-In first-order statics a block that has tilted about its corner by theta still has its weight at the lever arm b. The
-arm b - h theta of the tilted block, hence uplift that ends in overturning, needs the work of the initial stresses
-sigma0 on the second-order part of the strains,
+In first-order statics a block that has tilted about its corner by theta still has its weight at the
+lever arm b. The arm b - h theta of the tilted block, hence uplift that ends in overturning, needs
+the work of the initial stresses sigma0 on the second-order part of the strains,
 
     E_ij = ½ (u_i,j + u_j,i + u_k,i u_k,j)   ->   ½ uᵀ K_G u = ½ ∫ sigma0_ij u_k,i u_k,j dx
 
-(Bathe, Finite Element Procedures, sect. 6.3; Zienkiewicz and Taylor, The Finite Element Method 2, initial stress
-matrix). For a rotation u = theta x (.) in the plane that is ½ theta² ∫ tr sigma0, and by the virial theorem, exact for
-the finite element solution because x itself is a displacement of the space, ∫ tr sigma0 = Σ f·x - Σ r·x: for a block
-on level ground minus m g times the height h_c of its centre of mass, so that the energy changes by -½ m g h_c theta².
+(Bathe, Finite Element Procedures, sect. 6.3; Zienkiewicz and Taylor, The Finite Element Method 2,
+initial stress matrix). For a rotation u = theta x (.) in the plane that is ½ theta² ∫ tr sigma0,
+and by the virial theorem, exact for the finite element solution because x itself is a displacement
+of the space, ∫ tr sigma0 = Σ f·x - Σ r·x: for a block on level ground minus m g times the height
+h_c of its centre of mass, so that the energy changes by -½ m g h_c theta².
 """
 
 from dataclasses import replace
@@ -28,12 +30,14 @@ from vi_contact.fem.space import FemSpace, known_matrices, space_of
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:
-    """Linearise the problem's system about a static state: K + K_G instead of K, f + K_G u0 instead of f.
+    """Linearise the problem's system about a static state: K + K_G instead of K, f + K_G u0 instead
+    of f.
 
-    The state stays an equilibrium with the same reactions, and motions about it feel the geometric stiffness of its
-    stresses: (K + K_G) u = f + K_G u0 - B_nᵀ r_n - B_tᵀ r_t. Use it as ``dataclasses.replace(problem, system=...)`` and
-    start from the same state. Damping keeps the K it was made of. sigma0 is that of the state for good: when contact
-    moves to a corner the stresses change, their mean does not (reactions at y = 0 add nothing to Σ r·x).
+    The state stays an equilibrium with the same reactions, and motions about it feel the geometric
+    stiffness of its stresses: (K + K_G) u = f + K_G u0 - B_nᵀ r_n - B_tᵀ r_t. Use it as
+    ``dataclasses.replace(problem, system=...)`` and start from the same state. Damping keeps the K
+    it was made of. sigma0 is that of the state for good: when contact moves to a corner the
+    stresses change, their mean does not (reactions at y = 0 add nothing to Σ r·x).
 
     Args:
         problem: its system made by ``fem.assemble``.
@@ -59,9 +63,11 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
 
 
 def initial_stress_matrix(space: FemSpace, nodal: Array, t: float = 0.0) -> Any:
-    """Assemble K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m] at a time.
+    """Assemble K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes,
+    d) [m] at a time.
 
-    Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on all cells.
+    Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on
+    all cells.
     """
     forms = space.forms
     u0 = compat.function(space.V)

@@ -1,4 +1,5 @@
-"""Join loose segments, in any order and direction, to the closed loops of a mesh of boundary elements."""
+"""Join loose segments, in any order and direction, to the closed loops of a mesh of boundary
+elements."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,10 +18,12 @@ def from_segments(
     labels: ArrayLike | None = None,
     exterior: bool = False,
 ) -> BoundaryMesh:
-    """Join loose segments to a mesh, for example the facets of a finite element boundary, in any order and direction.
+    """Join loose segments to a mesh, for example the facets of a finite element boundary, in any
+    order and direction.
 
-    points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g. facet tags. Loops
-    are joined and turned so that the body is on the left. Raises InputError when a curve is open or branches.
+    points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g.
+    facet tags. Loops are joined and turned so that the body is on the left. Raises InputError when
+    a curve is open or branches.
     """
     coordinates = array("from_segments", "points", points, (None, None), unit="m")[:, :2]
     pairs = integers("from_segments", "segments", segments, (None, 2))
@@ -39,12 +42,14 @@ def from_segments(
 def ordered_loops(
     points: Array, segments: Indices, *, exterior: bool
 ) -> tuple[Indices, tuple[int, ...]]:
-    """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
+    """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops),
+    body on the left."""
     ends = np.bincount(segments.ravel(), minlength=len(points))
     if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
         bad = int(np.argmax((ends != 2) & (ends > 0)))
         raise InputError(
-            f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where "
+            f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), "
+            "where "
             f"{int(ends[bad])} segments meet; give every segment of closed curves"
         )
     at_point: dict[int, list[int]] = {}

@@ -1,15 +1,17 @@
-"""Make systems of thin (Kirchhoff) plates from a form of DOLFINx: C0 interior penalty on triangles of second order.
+"""Make systems of thin (Kirchhoff) plates from a form of DOLFINx: C0 interior penalty on triangles
+of second order.
 
     rho t w'' + D ∇⁴w = q,   M(w) = D ((1 - nu) ∇∇w + nu (Δw) I),   w the deflection upwards [m]
 
     K(w, v) = ∫ M(w):∇∇v - ∫_S {M_nn(w)} [∂v/∂n] + {M_nn(v)} [∂w/∂n] - p [∂w/∂n] [∂v/∂n]
 
-S are the edges between triangles and, where the plate is clamped, those of its boundary; {} is the mean of both sides,
-[] the jump. w = 0 along the whole boundary; M_nn = 0 of a simple support is natural. p is 4 D times the mean over the
-sides of edge length over area. K is positive on every mesh, and nothing is left to tune: second derivatives are
-constant in a triangle, and M_nn² <= D M:∇∇w, so that the terms with M_nn are at most the last one and three quarters of
-the first. Source: S. Brenner, L.-Y. Sung, C0 interior penalty methods for fourth order elliptic boundary value problems
-on polygonal domains, J. Sci. Comput. 22 (2005).
+S are the edges between triangles and, where the plate is clamped, those of its boundary; {} is the
+mean of both sides, [] the jump. w = 0 along the whole boundary; M_nn = 0 of a simple support is
+natural. p is 4 D times the mean over the sides of edge length over area. K is positive on every
+mesh, and nothing is left to tune: second derivatives are constant in a triangle, and M_nn² <= D
+M:∇∇w, so that the terms with M_nn are at most the last one and three quarters of the first. Source:
+S. Brenner, L.-Y. Sung, C0 interior penalty methods for fourth order elliptic boundary value
+problems on polygonal domains, J. Sci. Comput. 22 (2005).
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ from vi_contact.fem import compat
 
 @dataclass(frozen=True)
 class Plate:
-    """Describe a plate: bending stiffness D [N m], Poisson's ratio [-], mass per area rho t [kg/m²]."""
+    """Describe a plate: bending stiffness D [N m], Poisson's ratio [-], mass per area rho t
+    [kg/m²]."""
 
     D: float = 1.0e4
     nu: float = 0.3
@@ -38,7 +41,8 @@ class Plate:
 
 
 def square_mesh(comm: Any, side: float, cells: int) -> Any:
-    """Return so many squares along the side of a square around 0 [m], each cut into four triangles."""
+    """Return so many squares along the side of a square around 0 [m], each cut into four
+    triangles."""
     half, crossed = 0.5 * side, dolfinx.mesh.DiagonalType.crossed
     ghosts = dolfinx.mesh.GhostMode.shared_facet  # edges between ranks are integrated too
     return dolfinx.mesh.create_rectangle(
@@ -65,11 +69,11 @@ def plate_system(
 ) -> SemiDiscreteSystem:
     """Return the system of a plate on a mesh of triangles, held along its boundary. Collective.
 
-    Its unknowns are deflections along z at the vertices and at the middle of edges, ``system.space.points``.
+    Its unknowns are deflections along z at the vertices and at the middle of edges,
+    ``system.space.points``.
 
-    Args:
-        on: mesh in the plane. clamped: whether its boundary may not turn either.
-        pressure: uniform load downwards [Pa]. speed: x (n, 3) -> upward velocities (n,) at the start [m/s].
+    Args: on: mesh in the plane. clamped: whether its boundary may not turn either. pressure:
+        uniform load downwards [Pa]. speed: x (n, 3) -> upward velocities (n,) at the start [m/s].
     """
     V = compat.lagrange(on, 2)
     w, v = ufl.TrialFunction(V), ufl.TestFunction(V)

@@ -1,11 +1,13 @@
 """Give the data of Ahn (2012), section 8, with the readings of what the text leaves open.
 
-The normal force is printed as r_N(0) = 100,000 and r_N(t) = 100,000/100t. Three readings, as |r_N| >= 0:
+The normal force is printed as r_N(0) = 100,000 and r_N(t) = 100,000/100t. Three readings, as |r_N|
+>= 0:
 
     A    10⁵/(100 t) for t > 0              B    10⁵/100^t            C    10⁵/100^k at step k, t = k dt
 
-Only C dies within a few steps, as the text's negligible loss by friction and its two Newton iterations per step ask
-for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the initial data are lost: "moves downward".
+Only C dies within a few steps, as the text's negligible loss by friction and its two Newton
+iterations per step ask for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the
+initial data are lost: "moves downward".
 """
 
 from collections.abc import Callable
@@ -31,7 +33,8 @@ def published_start() -> Start:
 
 
 def published_elements(count: int = 1000) -> Elements:
-    """Return m = 1000 elements: linear functions, exact integration, the cubic last rotation function."""
+    """Return m = 1000 elements: linear functions, exact integration, the cubic last rotation
+    function."""
     return Elements(count, reduced_shear=False, published_end=True)
 
 
@@ -41,7 +44,8 @@ def published_friction(eps: float = 0.002) -> RegularisedFriction:
 
 
 def readings(dt: float = DT) -> dict[str, Force]:
-    """Return the readings of |r_N|(t) [N] by their letters, and "none", a free tip; dt > 0 [s]: step of reading C."""
+    """Return the readings of |r_N|(t) [N] by their letters, and "none", a free tip; dt > 0 [s]:
+    step of reading C."""
     number("readings", "dt", dt, positive=True, unit="s")
     return {
         "none": lambda t: 0.0,

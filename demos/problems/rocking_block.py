@@ -1,13 +1,16 @@
-"""Model a stiff block that stands on the ground with its two lower corners: the rigid limit of contact.
+"""Model a stiff block that stands on the ground with its two lower corners: the rigid limit of
+contact.
 
-The base may lift but not slide: in small displacements the base of a block that turns about one of its corners does not
-move sideways, so its horizontal displacement is held. The weight's lever arm b - h theta is a second-order effect,
-the geometric stiffness of the gravity stage. In the rigid limit the block therefore is the slender block
+The base may lift but not slide: in small displacements the base of a block that turns about one of
+its corners does not move sideways, so its horizontal displacement is held. The weight's lever arm b
+- h theta is a second-order effect, the geometric stiffness of the gravity stage. In the rigid limit
+the block therefore is the slender block
 
     phi'' = p_eff² (phi - 1),  phi = theta/(b/h),  p_eff² = p² h/R = p² cos(alpha)     (theta > 0, mirrored below)
 
-where Housner's has phi = theta/alpha and p²: for b/h = 0.2, angles 1.3 % larger and times 1.0 % longer at equal phi.
-The restitution e = 1 - (3/2) sin²(alpha) is Housner's: the mass matrix knows the true moments of inertia.
+where Housner's has phi = theta/alpha and p²: for b/h = 0.2, angles 1.3 % larger and times 1.0 %
+longer at equal phi. The restitution e = 1 - (3/2) sin²(alpha) is Housner's: the mass matrix knows
+the true moments of inertia.
 """
 
 import math
@@ -40,11 +43,13 @@ RIGID = 200.0  # least sqrt(E/rho)/height over p
 
 @dataclass(frozen=True)
 class RockingBlock:
-    """Describe width and height of ``shape`` [m], a material stiff enough to be rigid, and the mesh.
+    """Describe width and height of ``shape`` [m], a material stiff enough to be rigid, and the
+    mesh.
 
-    ``damping``: the default is 5 % of critical in the block's lowest bending vibration and nothing in rigid rotations;
-    without it the vibrations of an impact last and stir the next one. InputError unless sqrt(E/rho)/height >= 200 p
-    (waves cross the block many times while it rocks once), and for fewer than 4 elements over the height.
+    ``damping``: the default is 5 % of critical in the block's lowest bending vibration and nothing
+    in rigid rotations; without it the vibrations of an impact last and stir the next one.
+    InputError unless sqrt(E/rho)/height >= 200 p (waves cross the block many times while it rocks
+    once), and for fewer than 4 elements over the height.
     """
 
     shape: HousnerBlock = field(default_factory=lambda: HousnerBlock(width=0.4, height=2.0))
@@ -58,7 +63,8 @@ class RockingBlock:
         least = self.material.rho * (RIGID * self.shape.p * self.shape.height) ** 2
         if least > self.material.E:
             raise InputError(
-                f"RockingBlock: E = {self.material.E:g} Pa is too soft for a rigid block of this size: "
+                f"RockingBlock: E = {self.material.E:g} Pa is too soft for a rigid block of this "
+                "size: "
                 f"give at least {least:.2g} Pa"
             )
         if self.divisions[1] < 4:
@@ -82,7 +88,8 @@ class RockingBlock:
         return self.material.rho * self.shape.width * self.shape.height
 
     def motion(self, theta0: float, t: Array) -> Array:
-        """Return theta(t) [rad] of the rigid limit released at rest: Housner's phi, p_eff for p and b/h for alpha."""
+        """Return theta(t) [rad] of the rigid limit released at rest: Housner's phi, p_eff for p and
+        b/h for alpha."""
         return self._scaled(self.shape.free_rocking(self._twin(theta0), t * self.p / self.shape.p))
 
     def impact_times(self, theta0: float, impacts: int) -> Array:
@@ -103,7 +110,8 @@ class RockingBlock:
 
 @dataclass(frozen=True)
 class RockingModel:
-    """Hold the model. ``problem``: the block with geometric stiffness; ``rest``: the block still under its weight."""
+    """Hold the model. ``problem``: the block with geometric stiffness; ``rest``: the block still
+    under its weight."""
 
     block: RockingBlock
     problem: ContactProblem
@@ -114,11 +122,13 @@ class RockingModel:
         return replace(self.problem, excitation=excitation)
 
     def time_steps(self, *, dt: float | None = None, halvings: int = 4) -> HalvedAtImpact:
-        """Return steps of 1/(400 p), halved where a corner lands: the loss of an impact needs its time resolved."""
+        """Return steps of 1/(400 p), halved where a corner lands: the loss of an impact needs its
+        time resolved."""
         return HalvedAtImpact(1.0 / (400.0 * self.block.shape.p) if dt is None else dt, halvings)
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
-        """Return the block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
+        """Return the block at rest, turned by theta [rad] about its lower left corner, turning at
+        ``rate`` [rad/s]."""
         u, v, none = (
             self.rest.u + theta * self._turn,
             rate * self._turn,
@@ -128,7 +138,8 @@ class RockingModel:
 
     @property
     def onset_acceleration(self) -> float:
-        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly: m g b / turn·M r."""
+        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly: m g
+        b / turn·M r."""
         system = self.problem.equations
         overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))
         return (
@@ -140,13 +151,15 @@ class RockingModel:
         )
 
     def angle(self, state: State) -> float:
-        """Return the rotation [rad] by the heights of the corners, positive when the right one is up."""
+        """Return the rotation [rad] by the heights of the corners, positive when the right one is
+        up."""
         surface = self.problem.surface
         down = surface.everywhere(surface.normal_values(state.u - self.rest.u))
         return float(down[0] - down[1]) / self.block.shape.width
 
     def spin(self, state: State) -> float:
-        """Return the angular velocity [rad/s] by vertical velocities: s·M v / s·M s with s = (x - b) e_y."""
+        """Return the angular velocity [rad/s] by vertical velocities: s·M v / s·M s with s = (x -
+        b) e_y."""
         return float(self.problem.system.algebra.dot(self._spin, state.v))
 
     @cached_property
@@ -202,8 +215,9 @@ class Rocking:
 def build(block: RockingBlock, comm: Any) -> RockingModel:
     """Build mesh, gravity stage and second-order system of the block.
 
-    The stresses are those of the block on its whole base: standing on its corners it pushes them apart, and the thrust
-    of the held base would be counted as weight (virial theorem, see ``geometric_stiffness``).
+    The stresses are those of the block on its whole base: standing on its corners it pushes them
+    apart, and the thrust of the held base would be counted as weight (virial theorem, see
+    ``geometric_stiffness``).
     """
     width, height, gravity = block.shape.width, block.shape.height, block.shape.gravity
     mesh, tags = build_mesh(BlockMesh(lengths=(width, height), divisions=block.divisions), comm)
@@ -226,9 +240,11 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
 
 
 def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Return (times when theta passes zero [s], largest abs(theta) between them and before [rad]) of a free block.
+    """Return (times when theta passes zero [s], largest abs(theta) between them and before [rad])
+    of a free block.
 
-    The other side counts once a thousandth of the largest rotation is reached there: landing corners may chatter.
+    The other side counts once a thousandth of the largest rotation is reached there: landing
+    corners may chatter.
     """
     t, theta = history["t"], history["theta"]
     rows = np.flatnonzero(np.abs(theta) > 1e-3 * np.max(np.abs(theta)))
@@ -247,8 +263,9 @@ def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
 def restitution(block: RockingBlock, history: Mapping[str, Array], impact: float) -> float:
     """Return the ratio of angular velocities over the first impact at time ``impact`` [s].
 
-    Means from 0.1/p to 0.3/p before and after it of the velocity that the rigid block has there at theta = 0,
-    sqrt(theta'² + p² theta (2b/h - theta)), which is constant between impacts: vibrations have left the mean by then.
+    Means from 0.1/p to 0.3/p before and after it of the velocity that the rigid block has there at
+    theta = 0, sqrt(theta'² + p² theta (2b/h - theta)), which is constant between impacts:
+    vibrations have left the mean by then.
     """
     t, theta, unit = history["t"], np.abs(history["theta"]), 1.0 / block.p
     speed = np.sqrt(

@@ -1,7 +1,9 @@
-"""Model a square that is pressed on a rigid support: compression tests of Aimi, Di Credico and Gimperlein (2024).
+"""Model a square that is pressed on a rigid support: compression tests of Aimi, Di Credico and
+Gimperlein (2024).
 
-A uniform pressure acts on the top of [-a/2, a/2]², the bottom is in possible contact, the sides are free, plane strain;
-at rest for t <= 0. In the source's units: c_P = 1, c_S = 1/2, rho = 1, side 1, pressure 0.1 from t = 0 on.
+A uniform pressure acts on the top of [-a/2, a/2]², the bottom is in possible contact, the sides are
+free, plane strain; at rest for t <= 0. In the source's units: c_P = 1, c_S = 1/2, rho = 1, side 1,
+pressure 0.1 from t = 0 on.
 """
 
 import math
@@ -23,9 +25,11 @@ from vi_contact.meshes.block import BlockMesh
 
 @dataclass(frozen=True)
 class Square:
-    """Describe a square of ``cells`` bilinear cells a ``side`` [m]; ``pressure`` [Pa] on the top times ``history``(t).
+    """Describe a square of ``cells`` bilinear cells a ``side`` [m]; ``pressure`` [Pa] on the top
+    times ``history``(t).
 
-    ``confined``: the sides move vertically only, so that plane waves run up and down. InputError for no cells.
+    ``confined``: the sides move vertically only, so that plane waves run up and down. InputError
+    for no cells.
     """
 
     cells: int = 20
@@ -53,7 +57,8 @@ class Square:
 
 
 def concrete(cells: int = 20) -> Square:
-    """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²)."""
+    """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa
+    tanh((t/15 ms)²)."""
     return Square(
         cells=cells,
         material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0),

@@ -1,4 +1,5 @@
-"""Keep boundary element blocks in a file (HDF5): they depend on geometry, wave speeds and time step only."""
+"""Keep boundary element blocks in a file (HDF5): they depend on geometry, wave speeds and time step
+only."""
 
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,8 @@ def stored_blocks(
 ) -> EnergeticBlocks:
     """Return the first `steps` blocks of the file if it exists; else compute and write them.
 
-    InputError, naming what differs, for a file of another mesh, material or dt, too few steps, or not to be written.
+    InputError, naming what differs, for a file of another mesh, material or dt, too few steps, or
+    not to be written.
     """
     owner = "stored_blocks"
     target = checks.path(owner, "path", path)
@@ -51,7 +53,8 @@ def stored_blocks(
         hdf5_atomically(target, fill)
     except OSError as error:
         raise InputError(
-            f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
+            f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file "
+            "in a "
             "folder with room that may be written to"
         ) from error
     return blocks

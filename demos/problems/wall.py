@@ -1,6 +1,8 @@
-"""Model the first example of the boundary method: a wall clamped at its base, beside the ground (Figs. 2 to 5).
+"""Model the first example of the boundary method: a wall clamped at its base, beside the ground
+(Figs. 2 to 5).
 
-What the source leaves open is marked CHOSEN and explained in the documentation (docs/start/first_wall.md).
+What the source leaves open is marked CHOSEN and explained in the documentation
+(docs/start/first_wall.md).
 """
 
 from collections.abc import Sequence
@@ -44,8 +46,9 @@ BASE_INERTIA = {  # which mass the ground accelerates, and what log and summary 
 class Wall:
     """Describe geometry and material of Fig. 2, in SI units.
 
-    width: CHOSEN 6 m (8 base intervals of the 0.75 m spacing that 12 intervals on 9 m give). thickness: d = 0.20 m.
-    rho: CHOSEN 2400 kg/m³, concrete (0.24 in the technical system). Divisions: the source's boundary nodes, 8 x 12.
+    width: CHOSEN 6 m (8 base intervals of the 0.75 m spacing that 12 intervals on 9 m give).
+    thickness: d = 0.20 m. rho: CHOSEN 2400 kg/m³, concrete (0.24 in the technical system).
+    Divisions: the source's boundary nodes, 8 x 12.
     """
 
     height: float = 9.0
@@ -71,9 +74,11 @@ class Wall:
         )
 
     def point(self, number: int) -> tuple[float, float]:
-        """Return the source's boundary points 1..40, anticlockwise from the right side above the base.
+        """Return the source's boundary points 1..40, anticlockwise from the right side above the
+        base.
 
-        1-12 right side upwards (12 = top right corner), 13-20 top, 21-32 left side downwards, 33-40 base.
+        1-12 right side upwards (12 = top right corner), 13-20 top, 21-32 left side downwards, 33-40
+        base.
         """
         if not 1 <= number <= 40:
             raise InputError(
@@ -119,9 +124,11 @@ class WallModel:
         impact: ImpactLaw | None = Inelastic(),
         mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic impact on its mass.
+        """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic
+        impact on its mass.
 
-        Schemes with massless contact nodes take impact=None and their own mass; an impact law runs on consistent mass.
+        Schemes with massless contact nodes take impact=None and their own mass; an impact law runs
+        on consistent mass.
         """
         return ContactProblem(
             self.system,
@@ -132,7 +139,8 @@ class WallModel:
         )
 
     def harmonic(self, amplitude: float = 1.0) -> Harmonic:
-        """Return a_g = a0 sin(2 pi f t), f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor period; a0 = 1 m/s²."""
+        """Return a_g = a0 sin(2 pi f t), f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor
+        period; a0 = 1 m/s²."""
         return Harmonic(amplitude, 0.5 * lowest_frequency(self.system), direction=(1.0, 0.0))
 
     def time_step(self) -> float:
@@ -140,15 +148,16 @@ class WallModel:
         return 1.0 / (20.0 * lowest_frequency(self.system))
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Return the points that the figures show: contact points, points between them, top and far side."""
+        """Return the points that the figures show: contact points, points between them, top and far
+        side."""
         return {str(number): self.wall.point(number) for number in (4, 6, 7, 10, 12, 26)}
 
 
 def build(wall: Wall, comm: Any, *, weight: bool = False, base_inertia: str = "whole") -> WallModel:
     """Mesh and assemble the wall; ``weight`` adds its own weight, for a gravity stage.
 
-    base_inertia: a word of BASE_INERTIA. "catalogue" reproduces the numbers of docs/start/first_wall.md, whose
-    inertia load is 1.4 % short on 8 x 12 elements.
+    base_inertia: a word of BASE_INERTIA. "catalogue" reproduces the numbers of
+    docs/start/first_wall.md, whose inertia load is 1.4 % short on 8 x 12 elements.
     """
     check_word("base_inertia", base_inertia, list(BASE_INERTIA))
     mesh, tags = build_mesh(wall.mesh(), comm)

@@ -1,7 +1,8 @@
 """Compare a whole run of finite elements with answers of other methods to the same problem.
 
-Boundary elements, for example, have steps and points of their own. So what is compared are resultants over the whole
-run: the impulse of the contact forces on the body, and the mean displacement of its contact boundary to the support.
+Boundary elements, for example, have steps and points of their own. So what is compared are
+resultants over the whole run: the impulse of the contact forces on the body, and the mean
+displacement of its contact boundary to the support.
 """
 
 from collections.abc import Sequence
@@ -20,10 +21,12 @@ from vi_contact.run.time_steps import TimeSteps
 
 @dataclass(frozen=True)
 class Reference:
-    """Hold another answer to the same problem, from the same initial time on; in the plane per metre of thickness.
+    """Hold another answer to the same problem, from the same initial time on; in the plane per
+    metre of thickness.
 
-    times: (k,) [s], increasing; impulse: (k, d) of the contact forces of the support on the body up to each time [N s];
-    mean_towards: (k,) displacement towards the support at each time, mean over the contact boundary [m].
+    times: (k,) [s], increasing; impulse: (k, d) of the contact forces of the support on the body up
+    to each time [N s]; mean_towards: (k,) displacement towards the support at each time, mean over
+    the contact boundary [m].
     """
 
     name: str
@@ -44,7 +47,8 @@ class Reference:
 class RunDifference:
     """Hold the largest differences between a run and a reference over their common times, relative.
 
-    Impulses over the largest one, mean displacements over the largest of any point; ``bound``: up to which they agree.
+    Impulses over the largest one, mean displacements over the largest of any point; ``bound``: up
+    to which they agree.
     """
 
     name: str
@@ -92,7 +96,8 @@ class RunComparison:
         self.towards.append(float(moved / size))
 
     def compare(self, reference: Reference, bound: float) -> RunDifference:
-        """Return the differences. InputError for a reference in other dimensions, without common times, or with NaN."""
+        """Return the differences. InputError for a reference in other dimensions, without common
+        times, or with NaN."""
         mine, theirs = np.array(self.impulse), np.asarray(reference.impulse, float)
         t = np.asarray(reference.times, float)
         common = (t >= self.times[0]) & (t <= self.times[-1] * (1.0 + 1e-12))
@@ -102,7 +107,8 @@ class RunComparison:
             or not np.isfinite(theirs).all()
         ):
             raise InputError(
-                f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; give "
+                f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; "
+                "give "
                 f"finite ones, {mine.shape[1]} components each, at times of the run"
             )
         at = np.array([np.interp(t[common], self.times, column) for column in mine.T]).T
@@ -128,9 +134,11 @@ def compare_runs(
     state: State | None = None,
     bound: float = 0.02,
 ) -> list[RunDifference]:
-    """March the problem and return how far each reference is off, for example ``Reference.of`` a ``bem.ContactRun``.
+    """March the problem and return how far each reference is off, for example ``Reference.of`` a
+    ``bem.ContactRun``.
 
-    Impulses and mean displacements should agree within ``bound``, relative; the rest as in ``march``.
+    Impulses and mean displacements should agree within ``bound``, relative; the rest as in
+    ``march``.
     """
     for one in several(
         "compare_runs", "references", references, "give a list of answers of other methods"

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Run the demos of the gallery, take their pictures, and compare what they print with what their pages say.
+"""Run the demos of the gallery, take their pictures, and compare what they print with what their
+pages say.
 
     python3 docs/gallery/make.py                      all entries of demos.toml and made_by.toml, into build/gallery
     python3 docs/gallery/make.py --only wall crack    these alone
@@ -8,8 +9,9 @@
     python3 docs/gallery/make.py --store              and put them into docs/figures
     python3 docs/gallery/make.py --index              write index.md from demos.toml, and run nothing
 
-Every entry runs in a process of its own. It runs again when its own files, the package or its entry changed. The build
-of the site calls this script. It needs the standard library only; the demos bring what they need.
+Every entry runs in a process of its own. It runs again when its own files, the package or its entry
+changed. The build of the site calls this script. It needs the standard library only; the demos
+bring what they need.
 """
 
 from __future__ import annotations
@@ -68,7 +70,8 @@ def entries() -> dict[str, Entry]:
 
 
 def page_entries() -> dict[str, Entry]:
-    """Return name -> entry of made_by.toml: pictures of other pages, from blocks and commands of these pages."""
+    """Return name -> entry of made_by.toml: pictures of other pages, from blocks and commands of
+    these pages."""
     raw = tomllib.loads((HERE / "made_by.toml").read_text(encoding="utf-8"))
     return {name: {"blocks": {}} | entry for name, entry in raw["made"].items()}
 
@@ -129,7 +132,8 @@ def key(name: str, entry: Entry) -> str:
 
 
 def make(name: str, entry: Entry) -> dict[str, Any]:
-    """Run an entry, unless it is made already; keep its pictures and what it prints; return the times of its run."""
+    """Run an entry, unless it is made already; keep its pictures and what it prints; return the
+    times of its run."""
     place, now = MADE / name, key(name, entry)
     note = place / "made.json"
     if note.is_file() and json.loads(note.read_text())["key"] == now:
@@ -182,13 +186,15 @@ def agree(line: str, other: str) -> bool:
 
 
 def residuals(size: float, other: float) -> bool:
-    """Say whether two sizes are alike as rounding is, of which another processor makes more or less."""
+    """Say whether two sizes are alike as rounding is, of which another processor makes more or
+    less."""
     least, most = sorted((size, other))
     return most <= BOUND or (most <= SMALL and most <= ORDER * least)
 
 
 def said(entry: Entry) -> list[str]:
-    """Return the lines that the page of an entry says are printed: those of its blocks of text, in its section."""
+    """Return the lines that the page of an entry says are printed: those of its blocks of text, in
+    its section."""
     page, _, anchor = entry["page"].partition("#")
     text = (HERE / page).read_text(encoding="utf-8")
     if anchor:
@@ -237,7 +243,8 @@ def cell(entry: Entry) -> str:
     picture, page, (first, *more) = next(iter(entry["pictures"])), entry["page"], entry["commands"]
     others = f" and [{len(more)} more commands]({page})" if more else ""
     return (
-        f"[![{entry['title']}](../figures/{picture})]({page}) **[{entry['title']}]({page}).** {entry['sentence']} "
+        f"[![{entry['title']}](../figures/{picture})]({page}) **[{entry['title']}]({page}).** "
+        f"{entry['sentence']} "
         f"`{first}`{others}"
     )
 

@@ -43,7 +43,8 @@ def cells(name: str) -> list[str]:
 
 
 def run(name: str, out: Path) -> None:
-    """Run the cells of a notebook as one program, and save each picture that it shows in ``out``."""
+    """Run the cells of a notebook as one program, and save each picture that it shows in
+    ``out``."""
     import matplotlib
 
     matplotlib.use("Agg")

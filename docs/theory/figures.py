@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Make the figures of the theory pages, and compare the numbers of the pages with those of the figures.
+"""Make the figures of the theory pages, and compare the numbers of the pages with those of the
+figures.
 
     python3 docs/theory/figures.py                       # all of them, into docs/figures
     python3 docs/theory/figures.py step friction         # two of them
     python3 docs/theory/figures.py --out results/theory  # into another folder
 
-Each function draws docs/figures/theory_NAME.png of the page docs/theory/NAME.md and returns the phrases with
-numbers that the page states about it. They are printed; where a page lacks one, the status is 1.
+Each function draws docs/figures/theory_NAME.png of the page docs/theory/NAME.md and returns the
+phrases with numbers that the page states about it. They are printed; where a page lacks one, the
+status is 1.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ from vi_contact.plots.histories import canvas, save  # noqa: E402
 BLUE, RED, GREEN, GREY = "tab:blue", "tab:red", "tab:green", "0.7"
 
 
-# Small bodies --------------------------------------------------------------------------------------------------------
+# Small bodies
+# --------------------------------------------------------------------------------------------------------
 def spring_mass(force: float) -> vc.ContactProblem:
     """A mass of 1 kg on a spring of 100 N/m, pushed towards a wall that is 5 cm away."""
     system = vc.system_from_arrays([1.0], None, [[100.0]], coordinates=[[0.0]], load=[force])
@@ -83,7 +86,8 @@ def simulated(problem: vc.ContactProblem, scheme: Any, dt: float, t_end: float) 
     return found.history, found.facts
 
 
-# Figures -------------------------------------------------------------------------------------------------------------
+# Figures
+# -------------------------------------------------------------------------------------------------------------
 def inequality(path: Path) -> list[str]:
     """Energy of the spring-mass beside its wall, and reactions against gaps for growing loads."""
     k, g0, loads = 100.0, 0.05, (2.0, 8.0)
@@ -143,7 +147,8 @@ def inequality(path: Path) -> list[str]:
 
 
 def step(path: Path) -> list[str]:
-    """The quadratic program of a midpoint step of two masses, and the energies that schemes leave to an oscillator."""
+    """The quadratic program of a midpoint step of two masses, and the energies that schemes leave
+    to an oscillator."""
     dt, figure, axes = 0.05, *pair()
     ((_, report),) = vc.march(
         two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=dt, steps=1
@@ -271,7 +276,8 @@ def blow_up(path: Path) -> list[str]:
 
 
 def certificate(path: Path) -> list[str]:
-    """Certificates of a run, of an answer that was spoiled, and beside the error of the discretisation."""
+    """Certificates of a run, of an answer that was spoiled, and beside the error of the
+    discretisation."""
     case, reports, figure, axes = ThrownBar(), [], *pair(3, 3.2)
     n = 100
     dt = 0.5 * case.length / n / case.wave_speed
@@ -349,7 +355,8 @@ def certificate(path: Path) -> list[str]:
 
 
 def spoil(result: Any, problem: Any, what: str, size: float) -> Any:
-    """An answer with a reaction that is too large by ``size``, or with a foot that is that far in the wall."""
+    """An answer with a reaction that is too large by ``size``, or with a foot that is that far in
+    the wall."""
     if what == "reaction":
         return replace(result, r_n=result.r_n * (1.0 + size))
     x = result.x.copy()
@@ -358,7 +365,8 @@ def spoil(result: Any, problem: Any, what: str, size: float) -> Any:
 
 
 def velocity_error(case: ThrownBar, n: int) -> tuple[float, float]:
-    """The relative error in the mean square of the velocities amid the contact, and the worst certificate."""
+    """The relative error in the mean square of the velocities amid the contact, and the worst
+    certificate."""
     problem, h = bar(case, n), case.length / n
     at = case.contact_start + 0.5 * case.crossing
     steps = round(at / (0.5 * h / case.wave_speed))
@@ -372,7 +380,8 @@ def velocity_error(case: ThrownBar, n: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Careless(vc.ZienkiewiczWoodTaylor):
-    """The midpoint rule with a fault: the mean velocity of the step is taken for the one at its end."""
+    """The midpoint rule with a fault: the mean velocity of the step is taken for the one at its
+    end."""
 
     phi: float = 0.5
 
@@ -384,7 +393,8 @@ class Careless(vc.ZienkiewiczWoodTaylor):
 
 
 def ledger(path: Path) -> list[str]:
-    """Where the energy of the clamped bar goes, and the defects of a sound and of a faulty scheme."""
+    """Where the energy of the clamped bar goes, and the defects of a sound and of a faulty
+    scheme."""
     case, n, end = PeriodicBar(), 20, 8.6
     dt, (figure, (left, right)) = 0.5 / n, pair()
     inelastic = vc.Inelastic(vc.ImpulseUpdate())
@@ -452,7 +462,8 @@ def ledger(path: Path) -> list[str]:
 
 
 def condensation(path: Path) -> list[str]:
-    """The Delassus operator of a block's face: the matrix, and how it decays, step by step longer."""
+    """The Delassus operator of a block's face: the matrix, and how it decays, step by step
+    longer."""
     problem = hanging_block(
         (1.0, 0.5), (60, 30), (0.0, -300.0), gap=0.001, mass=vc.ConsistentMass()
     )

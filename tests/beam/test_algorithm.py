@@ -1,4 +1,5 @@
-"""Algorithm 10 of seed 002 against the reference numbers V6.1, and its energy identities (6.5), Lemma 11."""
+"""Algorithm 10 of seed 002 against the reference numbers V6.1, and its energy identities (6.5),
+Lemma 11."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
 FREE = source.readings()["none"]
-# (a2, reading): E at t = .02 .1 .5 1 1.5 2, tip at .1 .5 1 2, friction loss, viscous loss, Newton updates; as printed
+# (a2, reading): E at t = .02 .1 .5 1 1.5 2, tip at .1 .5 1 2, friction loss, viscous loss, Newton
+# updates; as printed
 TABLE = {
     (
         0.001,
@@ -93,8 +95,8 @@ def test_reference_rows(runs: dict[tuple[float, str], BeamRun], case: tuple[floa
 
 
 def test_invariants(runs: dict[tuple[float, str], BeamRun]) -> None:
-    """V6.1, hard: energy falls in every step, E(0) - E(t) is viscous plus friction loss to 1e-8, both losses grow;
-    A and B under a2 = 0.001 lose most of it by friction, 65 and 42 %."""
+    """V6.1, hard: energy falls in every step, E(0) - E(t) is viscous plus friction loss to 1e-8,
+    both losses grow; A and B under a2 = 0.001 lose most of it by friction, 65 and 42 %."""
     for found in runs.values():
         assert np.all(np.diff(found.energy) < 0.0)
         assert np.max(np.abs(found.history["energy_defect"])) <= 1e-8
@@ -110,8 +112,8 @@ def test_invariants(runs: dict[tuple[float, str], BeamRun]) -> None:
 
 
 def test_qualitative_statements(runs: dict[tuple[float, str], BeamRun]) -> None:
-    """Section 8: the damped beam loses most of its energy by t = 0.1 and hardly moves back; the nearly elastic one
-    keeps above 90 %, goes down until about t = 0.8 and comes up again."""
+    """Section 8: the damped beam loses most of its energy by t = 0.1 and hardly moves back; the
+    nearly elastic one keeps above 90 %, goes down until about t = 0.8 and comes up again."""
     for name in ("none", "C"):
         assert 0.10 < runs[2.0, name].energy[50] / runs[2.0, name].energy[0] < 0.28
         elastic = runs[0.001, name]
@@ -121,7 +123,8 @@ def test_qualitative_statements(runs: dict[tuple[float, str], BeamRun]) -> None:
 
 
 def test_without_viscosity_and_friction_energy_stays() -> None:
-    """V6.1: "an unreasonable increase of the energy" for very small a2 is no property of the scheme."""
+    """V6.1: "an unreasonable increase of the energy" for very small a2 is no property of the
+    scheme."""
     found = run(0.0, FREE)
     assert np.ptp(found.energy) <= 2.5e-9
     rigid = run(
@@ -134,14 +137,16 @@ def test_without_viscosity_and_friction_energy_stays() -> None:
 
 
 def test_counts_of_longer_steps() -> None:
-    """V6.1: reading C with dt = 0.005 takes 2.035 and 2.028 passes, the confirming one counted (2.0250, 2.0125)."""
+    """V6.1: reading C with dt = 0.005 takes 2.035 and 2.028 passes, the confirming one counted
+    (2.0250, 2.0125)."""
     for a2, passes in ((0.001, 2.035), (2.0, 2.0275)):
         found = run(a2, source.readings(0.005)["C"], dt=0.005, steps=400)
         assert found.mean_updates + 1.0 == pytest.approx(passes, abs=1e-12)
 
 
 def test_published_newton_can_run_away() -> None:
-    """Reading B with dt = 0.005: slips are large beside eps. StepFailure names the step; the safeguard converges."""
+    """Reading B with dt = 0.005: slips are large beside eps. StepFailure names the step; the
+    safeguard converges."""
     with pytest.raises(
         StepFailure,
         match=r"step 297, t = 1\.485 s: Newton's method .* 60 updates .* safeguard=True",
@@ -168,7 +173,8 @@ def test_safeguard_and_relative_tolerance_change_nothing() -> None:
 
 
 def test_load_and_units() -> None:
-    """Work of a distributed load closes the ledger; the same beam in mm, g and s moves alike (unit of force 1e-6 N)."""
+    """Work of a distributed load closes the ledger; the same beam in mm, g and s moves alike (unit
+    of force 1e-6 N)."""
     stepper = {"elements": Elements(20), "dt": 0.01, "friction": RegularisedFriction(1e-3)}
     metres = BeamStepper(
         TimoshenkoBeam(viscosity=0.01),

@@ -1,4 +1,5 @@
-"""The table of docs/theory/beam.md on both statements of Ahn (2012), section 8: it is what the runs give."""
+"""The table of docs/theory/beam.md on both statements of Ahn (2012), section 8: it is what the runs
+give."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ def test_the_table_is_what_the_runs_give(printed: dict[tuple[str, float], list[s
 
 
 def test_no_reading_has_both(printed: dict[tuple[str, float], list[str]]) -> None:
-    """The verdicts follow from the printed counts and losses; friction is not negligible where statement 1 holds."""
+    """The verdicts follow from the printed counts and losses; friction is not negligible where
+    statement 1 holds."""
     for (reading, a2), cells in printed.items():
         found = Row(reading, a2, counts(cells[2]), counts(cells[3]), *map(float, cells[4:7]))
         assert [str(found.statement_1).lower(), str(found.statement_2).lower()] == cells[8:]
@@ -71,7 +73,8 @@ def test_turning_points() -> None:
 
 
 def test_the_demo(capsys: pytest.CaptureFixture[str]) -> None:
-    """JSON has all that the table has; a coarse run has neither numbers of the page nor both statements."""
+    """JSON has all that the table has; a coarse run has neither numbers of the page nor both
+    statements."""
     rows = demo("beam_statements").main(quick=True, as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert [(one["reading"], one["a2"]) for one in told] == [(one.reading, one.a2) for one in rows]

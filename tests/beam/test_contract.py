@@ -1,4 +1,5 @@
-"""Rod and beam under the exact inequalities, as contact problems of the project, and Algorithm 10 beside them."""
+"""Rod and beam under the exact inequalities, as contact problems of the project, and Algorithm 10
+beside them."""
 
 from __future__ import annotations
 
@@ -51,8 +52,8 @@ def algorithm(friction: Any, elements: Elements, dt: float, steps: int, **given:
     "elements", [Elements(50), Elements(50, reduced_shear=False, published_end=True)]
 )
 def test_exact_law_through_the_contract(elements: Elements) -> None:
-    """Given force, Coulomb: Midpoint and the condensed solver do what Algorithm 10 does with the inequality itself;
-    the tip slips, sticks and slips back."""
+    """Given force, Coulomb: Midpoint and the condensed solver do what Algorithm 10 does with the
+    inequality itself; the tip slips, sticks and slips back."""
     law = vc.Coulomb(MU)
     problem = beam_problem(
         BEAM, elements, normal_force=lambda t: PUSH, friction=law, start=published_start()
@@ -85,7 +86,8 @@ def test_convergence_as_eps_vanishes() -> None:
 
 
 def test_rate_dependent_friction() -> None:
-    """mu = |rate|/100: of the old step in Algorithm 10, of the step itself in SlipRateCoulomb; order 1 between them."""
+    """mu = |rate|/100: of the old step in Algorithm 10, of the step itself in SlipRateCoulomb;
+    order 1 between them."""
     elements, apart = Elements(50), []
     for steps in (200, 400):
         law = vc.SlipRateCoulomb(lambda rate: published_mu(0.0, 1.0) * rate)
@@ -100,8 +102,8 @@ def test_rate_dependent_friction() -> None:
 
 
 def test_rod_of_period_three() -> None:
-    """V1.3 with the wall on the right: displacement of the tip, contact impulse 1/2 a period, energy; observed order
-    between 0.4 and 0.95."""
+    """V1.3 with the wall on the right: displacement of the tip, contact impulse 1/2 a period,
+    energy; observed order between 0.4 and 0.95."""
     bar, errors = PeriodicBar(), []
     for n in (50, 100, 200):
         problem = rod_problem(Rod(1.0, 1.0, 1.0, 1.0), Elements(n), Start(u=lambda x: -0.5 * x))
@@ -117,7 +119,8 @@ def test_rod_of_period_three() -> None:
 
 
 def test_rod_ledger() -> None:
-    """V9.1: midpoint rule with the inequality at the end of the step never creates energy; with viscosity it closes."""
+    """V9.1: midpoint rule with the inequality at the end of the step never creates energy; with
+    viscosity it closes."""
     problem = rod_problem(
         Rod(1.0, 1.0, 1.0, 1.0, viscosity=0.01, gap=0.1), Elements(40), Start(u=lambda x: -0.5 * x)
     )
@@ -132,7 +135,8 @@ def test_rod_ledger() -> None:
 
 
 def test_rod_comes_to_rest() -> None:
-    """Kelvin-Voigt, V9.1's scheme: the mean contact force tends to end force + half the body force - E A gap/l."""
+    """Kelvin-Voigt, V9.1's scheme: the mean contact force tends to end force + half the body force
+    - E A gap/l."""
     rod = Rod(viscosity=0.05, gap=0.05, body_force=lambda t: 20.0, end_force=lambda t: 3.0)
     _, ringing, _, _ = histories(rod_problem(rod, Elements(40)), 0.01, 1500, scheme=vc.Midpoint())
     assert 0.5 * (ringing[-1] + ringing[-2]) == pytest.approx(52.0, abs=1e-3)
@@ -190,7 +194,8 @@ def test_schemes_agree(rubbing: tuple[Array, Array, Array, float]) -> None:
 
 
 def test_records_and_ledger(tmp_path: Any) -> None:
-    """``simulate`` with all recorders; the closed ledger includes the friction between rod and beam."""
+    """``simulate`` with all recorders; the closed ledger includes the friction between rod and
+    beam."""
     problem = rubbing_problem(
         ROD, BEAM, Elements(20), friction=vc.Coulomb(MU), start=published_start()
     )
@@ -227,8 +232,8 @@ def test_bad_input() -> None:
 
 @pytest.mark.parametrize("published", [False, True])
 def test_ground_accelerates_the_mass_shared_with_the_clamp(published: bool) -> None:
-    """The inertia load is that of the whole mass, rho A h at every node and half of it at the tip, along and across,
-    and rotations feel none: what a uniform body force of minus rho A a does."""
+    """The inertia load is that of the whole mass, rho A h at every node and half of it at the tip,
+    along and across, and rotations feel none: what a uniform body force of minus rho A a does."""
     elements = Elements(4, reduced_shear=not published, published_end=published)
     rod, beam = Rod(length=2.0, rho=3.0), TimoshenkoBeam(length=2.0, rho=3.0)
     mass = 3.0 * np.array([0.5, 0.5, 0.5, 0.25])

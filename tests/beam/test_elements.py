@@ -1,5 +1,5 @@
-"""Beam and rod elements against closed forms: tip deflection, thin limit, frequencies, and what the source's last
-rotation function does."""
+"""Beam and rod elements against closed forms: tip deflection, thin limit, frequencies, and what the
+source's last rotation function does."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def shear(beam: TimoshenkoBeam) -> float:
 
 @pytest.mark.parametrize("slenderness", SLENDER)
 def test_one_point_for_the_shear_energy_does_not_lock(slenderness: float) -> None:
-    """The tip deflection is l/KAG + l³/3EI (1 - 1/(4 n²)), for any slenderness, to round-off: the condition of S grows
-    with its square."""
+    """The tip deflection is l/KAG + l³/3EI (1 - 1/(4 n²)), for any slenderness, to round-off: the
+    condition of S grows with its square."""
     beam = rectangular(slenderness)
     for n in (2, 5, 10, 40):
         expected = shear(beam) + bending(beam) * (1.0 - 0.25 / n**2)
@@ -65,7 +65,8 @@ def test_exact_integration_locks(slenderness: float) -> None:
 
 
 def test_exact_integration_converges() -> None:
-    """With order 2, from below, once h is small beside the depth; the seed's beam has depth sqrt(12)."""
+    """With order 2, from below, once h is small beside the depth; the seed's beam has depth
+    sqrt(12)."""
     errors = [
         1.0 - tip(SEED, Elements(n, reduced_shear=False)) / (bending(SEED) + shear(SEED))
         for n in (50, 100, 200)
@@ -74,7 +75,8 @@ def test_exact_integration_converges() -> None:
 
 
 def frequencies(beam: TimoshenkoBeam, *, end: str, count: int = 3) -> Array:
-    """Angular frequencies [rad/s] of the clamped beam whose tip is free, or "guided": free to slide, not to turn."""
+    """Angular frequencies [rad/s] of the clamped beam whose tip is free, or "guided": free to
+    slide, not to turn."""
     KAG, EI, rho = beam.shear_stiffness, beam.bending_stiffness, beam.rho
     free = {"free": (2, 3), "guided": (2, 1)}[
         end
@@ -105,7 +107,8 @@ def discrete(beam: TimoshenkoBeam, elements: Elements, count: int = 3) -> Array:
 
 
 def test_frequencies() -> None:
-    """Of the seed's beam, with order 2; mass and stiffness are symmetric, M is positive definite."""
+    """Of the seed's beam, with order 2; mass and stiffness are symmetric, M is positive
+    definite."""
     exact = frequencies(SEED, end="free")
     coarse, fine = (discrete(SEED, Elements(n)) / exact - 1.0 for n in (50, 100))
     assert np.all(np.abs(fine) < 3e-4) and coarse / fine == pytest.approx(4.0, rel=0.02)
@@ -118,8 +121,9 @@ def test_frequencies() -> None:
 
 
 def test_the_published_end_clamps_the_rotation() -> None:
-    """Section 7's last basis function: h -> 0 gives a tip that cannot turn, tip deflection l³/12EI + l/KAG and the
-    frequencies of the clamped-guided beam, first order; the free tip's are l³/3EI + l/KAG and 32 % lower."""
+    """Section 7's last basis function: h -> 0 gives a tip that cannot turn, tip deflection l³/12EI
+    + l/KAG and the frequencies of the clamped-guided beam, first order; the free tip's are l³/3EI +
+    l/KAG and 32 % lower."""
     guided = SEED.length**3 / (12.0 * SEED.bending_stiffness) + shear(SEED)
     errors = [tip(SEED, published_elements(n)) / guided - 1.0 for n in (1000, 2000, 4000)]
     assert 0.0 < errors[2] < 0.005 and np.diff(np.log2(errors)) == pytest.approx(

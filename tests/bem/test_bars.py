@@ -1,4 +1,5 @@
-"""Bars of boundary elements that no other file has: a rod on a stiffer rod, long runs, the projection of Uzawa."""
+"""Bars of boundary elements that no other file has: a rod on a stiffer rod, long runs, the
+projection of Uzawa."""
 
 from __future__ import annotations
 
@@ -22,8 +23,9 @@ STIFF = vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0)
 
 
 def test_a_rod_on_a_stiffer_rod():
-    """B8: c_P = 1 on c_P = 2, fixed at its base, rollers, a step until t = 5: pressures of the interface from the
-    characteristics, 4/3, 20/9, 40/27 and 8/81 in a unit of time each, impulse 5.13580 to 1e-4; never above 2.25."""
+    """B8: c_P = 1 on c_P = 2, fixed at its base, rollers, a step until t = 5: pressures of the
+    interface from the characteristics, 4/3, 20/9, 40/27 and 8/81 in a unit of time each, impulse
+    5.13580 to 1e-4; never above 2.25."""
     k, exact = 6, 4.0 / 3.0 + 20.0 / 9.0 + 40.0 / 27.0 + 8.0 / 81.0
     upper = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 1.0 / k)
     lower = polygon([(0, -1), (1, -1), (1, 0), (0, 0)], 1.0 / k)
@@ -47,7 +49,8 @@ def test_a_rod_on_a_stiffer_rod():
 
 @pytest.mark.parametrize("ratio", [1.0, 4.0])
 def test_long_runs_stay_bounded(ratio):
-    """B5: the rod under the smooth load to t = 60, nothing grows, large steps damp (more: benchmarks/bem.py)."""
+    """B5: the rod under the smooth load to t = 60, nothing grows, large steps damp (more:
+    benchmarks/bem.py)."""
     dt = 0.5 * ratio
     blocks = energetic_blocks(polygon(SQUARE, 0.5), MATERIAL, dt=dt, steps=round(60.0 / dt))
     motion = pulled_rod(blocks, smooth_load).solve()
@@ -58,7 +61,8 @@ def test_long_runs_stay_bounded(ratio):
 
 
 def test_the_projection_of_uzawa_projects():
-    """B10: what lies in the cone of a friction law stays as it is, to the last digit but one; twice is once."""
+    """B10: what lies in the cone of a friction law stays as it is, to the last digit but one; twice
+    is once."""
     random = np.random.default_rng(3)
     for dimensions in (1, 2):
         w, limit = random.standard_normal((200, dimensions)), np.abs(random.standard_normal(200))

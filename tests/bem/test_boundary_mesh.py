@@ -46,7 +46,8 @@ def test_mass_integrates_products():
 
 
 def test_loose_segments_with_a_hole():
-    """Facets in any order and direction: loops joined, outside counter-clockwise, hole clockwise, tags kept."""
+    """Facets in any order and direction: loops joined, outside counter-clockwise, hole clockwise,
+    tags kept."""
     outer = polygon(SQUARE, 0.25)
     points = np.concatenate([outer.points, 0.4 * outer.points])
     segments = np.concatenate([outer.elements, outer.elements + len(outer)])

@@ -1,4 +1,5 @@
-"""Galerkin matrices: symmetric, exact for translations, second order in plane waves; quadrature split at the fronts."""
+"""Galerkin matrices: symmetric, exact for translations, second order in plane waves; quadrature
+split at the fronts."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ def test_symmetry(mesh):
 
 
 def test_a_translation_only_accelerates_the_mass():
-    """B2: eᵀ S(s) e = s² rho area, in the limit of slow motion (S is a million times greater than that)."""
+    """B2: eᵀ S(s) e = s² rho area, in the limit of slow motion (S is a million times greater than
+    that)."""
     mesh, s = polygon(SQUARE, 0.2), 1e-3
     matrix = steklov(mesh, s, Orders(touching=20))["symmetric"].real
     for direction in ((1.0, 0.0), (0.6, 0.8)):
@@ -103,7 +105,8 @@ def source_traction(x: np.ndarray, normals: np.ndarray) -> np.ndarray:
 )
 @pytest.mark.parametrize("t", [0.13, 0.2, 0.61, 2.5])
 def test_quadrature_split_at_the_fronts(mesh, t):
-    """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the greatest entry."""
+    """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the
+    greatest entry."""
     few = in_time(mesh, t)
     many = in_time(mesh, t, Orders(far=8, near=12, outer=12, inner=12, touching=24))
     for name in ("single", "double", "hyper"):

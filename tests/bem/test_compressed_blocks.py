@@ -73,7 +73,8 @@ def expanded(short: CompressedBlocks) -> EnergeticBlocks:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_blocks(shape):
-    """Entries differ from exact ones by less than their bounds, which are small; before tails by rounding only."""
+    """Entries differ from exact ones by less than their bounds, which are small; before tails by
+    rounding only."""
     dense, short = both(shape)
     again, numbers = expanded(short), sum(part.values.size for part in short.stretches)
     assert numbers < 0.7 * sum(part.size for part in (dense.single, dense.double, dense.hyper))
@@ -118,7 +119,8 @@ def problem(blocks, *, symmetric: bool, held: bool) -> BoundaryProblem:
     ("shape", "held"), [("square", True), ("disk", False), ("hole", True), ("thin slab", False)]
 )
 def test_circle_of_frequencies(shape, held, symmetric):
-    """Compliances and motions are those of the march with the same blocks; supports, given motions, both forms."""
+    """Compliances and motions are those of the march with the same blocks; supports, given motions,
+    both forms."""
     short = both(shape)[1]
     ours, march = (
         problem(blocks, symmetric=symmetric, held=held) for blocks in (short, expanded(short))
@@ -156,7 +158,8 @@ def test_everything_held():
 
 
 def test_contact():
-    """A pressed square moves as with dense blocks: contact forces differ by what interpolation and the circle lose."""
+    """A pressed square moves as with dense blocks: contact forces differ by what interpolation and
+    the circle lose."""
     runs = []
     for blocks in both("square"):
         mesh = blocks.mesh
@@ -192,8 +195,8 @@ def test_long_tails_of_a_small_body():
 
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_long_runs(symmetric, monkeypatch):
-    """Motions of many steps are those of the march; blocks cut off at the last step are wrong and are refused. Large
-    steps are for the symmetric form: the other is wrong there, and says so."""
+    """Motions of many steps are those of the march; blocks cut off at the last step are wrong and
+    are refused. Large steps are for the symmetric form: the other is wrong there, and says so."""
     mesh, steps, dt = polygon(SQUARE, 0.5), 200, 2.0 if symmetric else 0.5
     short = energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps, compressed=True)
     pull = traction_forces(
@@ -222,7 +225,8 @@ def test_long_runs(symmetric, monkeypatch):
 
 
 def test_rounding_moves_a_free_body(monkeypatch):
-    """Where rounding of second differences outgrows the momentum of a free body, a sentence; held bodies go on."""
+    """Where rounding of second differences outgrows the momentum of a free body, a sentence; held
+    bodies go on."""
     mesh, steps = polygon(SQUARE, 1.0), 300
     short = energetic_blocks(mesh, MATERIAL, dt=4.0, steps=steps, compressed=True)
     free, held = (
@@ -252,7 +256,8 @@ def test_missed_equations(monkeypatch):
 
 
 def test_choice_by_size(monkeypatch):
-    """Small problems keep dense blocks; beyond a number of numbers they are compressed; both can be asked for."""
+    """Small problems keep dense blocks; beyond a number of numbers they are compressed; both can be
+    asked for."""
     mesh = polygon(SQUARE, 0.5)
     assert isinstance(energetic_blocks(mesh, MATERIAL, dt=0.5, steps=9), EnergeticBlocks)
     monkeypatch.setattr("vi_contact.bem.energetic.DENSE", 28 * 9 * len(mesh) ** 2 - 1)

@@ -1,4 +1,5 @@
-"""Contact on condensed boundaries: the contract, Uzawa on the whole history, two bodies, welds, limits, bad input."""
+"""Contact on condensed boundaries: the contract, Uzawa on the whole history, two bodies, welds,
+limits, bad input."""
 
 from __future__ import annotations
 
@@ -63,7 +64,8 @@ def away(one: ContactRun, other: ContactRun) -> float:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_every_step_is_certified(law):
-    """B9: residuals of the contract, no penetration, no tension, cone, complementarity, by hand too."""
+    """B9: residuals of the contract, no penetration, no tension, cone, complementarity, by hand
+    too."""
     found = run(law)
     assert len(found.certificates) == 30 and found.worst < 1e-12
     assert found.gap.min() >= 0.0 and found.r_n.min() >= 0.0 and found.r_n.max() > 0.1
@@ -80,8 +82,9 @@ def test_every_step_is_certified(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_energy_from_boundary_data_alone(law):
-    """B9: energy = work of load and contact forces to round-off, never negative; pressure on a support at rest never
-    gives energy, and takes some where points close; the whole boundary moves as the condensed one does."""
+    """B9: energy = work of load and contact forces to round-off, never negative; pressure on a
+    support at rest never gives energy, and takes some where points close; the whole boundary moves
+    as the condensed one does."""
     found = run(law)
     motion = square().solve(found.forces)
     books = ledger(found, motion, square().forces)
@@ -126,7 +129,8 @@ def test_uzawa_in_windows(window):
 
 @pytest.mark.parametrize("rho", [1e-6, 1e-300])
 def test_uzawa_does_not_stop_because_its_steps_are_small(rho):
-    """B10: the change to stop at is that of the default rho: with a small one nothing moved, and all was wrong."""
+    """B10: the change to stop at is that of the default rho: with a small one nothing moved, and
+    all was wrong."""
     with pytest.raises(StepFailure, match="stopped after 50 iterations"):
         SpaceTimeUzawa(tolerance=1e-3, rho=rho, max_iterations=50).solve(
             BoundaryContact(condensed())
@@ -135,8 +139,8 @@ def test_uzawa_does_not_stop_because_its_steps_are_small(rho):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_uzawa_is_certified_in_any_unit(law):
-    """B10: every step within the tolerance, of the largest numbers of the run; loads of 1e-170 N/m too, whose squares
-    are zero."""
+    """B10: every step within the tolerance, of the largest numbers of the run; loads of 1e-170 N/m
+    too, whose squares are zero."""
     given = condensed()
     laws = (LAWS[law], vc.Tresca(0.05e-170) if law == "Tresca" else LAWS[law])
     contacts = [
@@ -149,8 +153,8 @@ def test_uzawa_is_certified_in_any_unit(law):
 
 
 def test_conditions_and_supports_that_leave_no_contact_are_refused():
-    """Three conditions at a node were answered by two; lengths of zero gave a pressure of NaN; nothing free, an index
-    error."""
+    """Three conditions at a node were answered by two; lengths of zero gave a pressure of NaN;
+    nothing free, an index error."""
     for nodes, lengths in (([0, 0, 0], [1.0, 1.0, 1.0]), ([0, 1, 2], [1.0, 0.0, 1.0]), ([], [])):
         with pytest.raises(
             InputError, match="one condition or more, at most two at a node, and positive lengths"
@@ -191,7 +195,8 @@ def test_limits_of_the_friction_laws():
 
 
 def rod(elements: int, steps: int, *, load: float = 1.0, pulse: float = 99.0) -> BoundaryProblem:
-    """A unit square on rollers at its sides, c_P dt = h: plane waves up and down, exact by characteristics."""
+    """A unit square on rollers at its sides, c_P dt = h: plane waves up and down, exact by
+    characteristics."""
     mesh = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 1.0 / elements)
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[0] = mesh.nodes_of(mesh.labels % 2 == 1)
@@ -206,7 +211,8 @@ def rod(elements: int, steps: int, *, load: float = 1.0, pulse: float = 99.0) ->
 
 
 def test_impact_with_a_gap():
-    """A rod driven by a unit pulse of length 1 crosses a gap of 0.27, rebounds with its speed: impulse 2, order 1."""
+    """A rod driven by a unit pulse of length 1 crosses a gap of 0.27, rebounds with its speed:
+    impulse 2, order 1."""
     error = []
     for elements in (5, 10):
         contact = BoundaryContact(
@@ -220,7 +226,8 @@ def test_impact_with_a_gap():
 
 
 def test_two_bodies_that_are_mirror_images():
-    """B8: a square pressed on its mirror image feels what it feels on a smooth rigid support, whatever the friction."""
+    """B8: a square pressed on its mirror image feels what it feels on a smooth rigid support,
+    whatever the friction."""
     mesh = polygon([(-0.5, -1.5), (0.5, -1.5), (0.5, -0.5), (-0.5, -0.5)], 0.2)
     below = pressed(
         steklov(mesh, MATERIAL, dt=0.2, steps=30),
@@ -240,7 +247,8 @@ def test_two_bodies_that_are_mirror_images():
 
 
 def test_a_weld_is_no_cut():
-    """B8: two halves welded move together at the weld, to round-off, and like one body of their height, to O(h²)."""
+    """B8: two halves welded move together at the weld, to round-off, and like one body of their
+    height, to O(h²)."""
     corners = [(0, 0), (1, 0), (1, 0.5), (0, 0.5)]
     lower, upper = polygon(corners, 0.1), polygon([(x, y + 0.5) for x, y in corners], 0.1)
     whole = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 0.1)
@@ -276,7 +284,8 @@ def test_a_weld_is_no_cut():
 
 
 def test_part_of_an_interface_is_welded():
-    """B8: the right half of the interface welded, the left half in contact: both conditions hold in every step."""
+    """B8: the right half of the interface welded, the left half in contact: both conditions hold in
+    every step."""
     mesh = polygon([(-0.5, -1.5), (0.5, -1.5), (0.5, -0.5), (-0.5, -0.5)], [4, 4, 4, 4])
     above = square_problem(4, MATERIAL, dt=0.25, steps=20)
     below = unloaded(
@@ -350,8 +359,9 @@ def test_bad_input():
 
 @pytest.mark.parametrize("law", ["none", "Tresca"])
 def test_a_third_opinion(law):
-    """compare_runs takes the boundary element run: impulses within 2 % of 20 x 20 finite elements although meshes and
-    steps differ; another problem is noticed; a reference in space is refused."""
+    """compare_runs takes the boundary element run: impulses within 2 % of 20 x 20 finite elements
+    although meshes and steps differ; another problem is noticed; a reference in space is
+    refused."""
     from mpi4py import MPI
 
     from demos.problems.square import Square, build
@@ -371,7 +381,8 @@ def test_a_third_opinion(law):
 
 @pytest.mark.parametrize("law", ["none", "Tresca"])
 def test_contact_with_convolution_quadrature(law):
-    """The condensed compliance of the other time discretisation serves as well: impulse until t = 4 within 0.5 %."""
+    """The condensed compliance of the other time discretisation serves as well: impulse until t = 4
+    within 0.5 %."""
     mesh, loads = square().operator.mesh, square().forces[:20]
     operator = convolution_operator(mesh, MATERIAL, dt=0.2, steps=20)
     problem = BoundaryProblem(operator, loads, contact=square().contact)

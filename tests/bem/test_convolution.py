@@ -1,4 +1,5 @@
-"""Convolution quadrature: weights, table of radial functions, rods and pulses in time, contact, passivity."""
+"""Convolution quadrature: weights, table of radial functions, rods and pulses in time, contact,
+passivity."""
 
 from __future__ import annotations
 
@@ -58,7 +59,8 @@ def smooth_integral(t: np.ndarray) -> np.ndarray:
 
 
 def rod(operator: ConvolutionOperator, load) -> BoundaryProblem:
-    """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1, length 1."""
+    """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1,
+    length 1."""
     mesh = operator.mesh
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[1] = mesh.nodes_of(mesh.labels == 0)
@@ -107,7 +109,8 @@ def test_weights_of_an_oscillator():
 
 
 def oscillator(w2: float, damping: float, times: np.ndarray) -> np.ndarray:
-    """u'' + damping u' + w2 u = sin⁴ t = 3/8 - cos(2t)/2 + cos(4t)/8 at equal steps, by the matrix exponential."""
+    """u'' + damping u' + w2 u = sin⁴ t = 3/8 - cos(2t)/2 + cos(4t)/8 at equal steps, by the matrix
+    exponential."""
     a = np.zeros((7, 7))  # u, u', 1, cos 2t, sin 2t, cos 4t, sin 4t
     a[0, 1], a[1, :4], a[1, 5] = 1.0, (-w2, -damping, 0.375, -0.5), 0.125
     a[3, 4], a[4, 3], a[5, 6], a[6, 5] = -2.0, 2.0, -4.0, 4.0
@@ -120,7 +123,8 @@ def oscillator(w2: float, damping: float, times: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 def test_table_of_radial_functions(operators):
-    """The matrices from the table are those of the Galerkin layer at frequencies of the whole range."""
+    """The matrices from the table are those of the Galerkin layer at frequencies of the whole
+    range."""
     mesh = polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)
     table, plain = RadialTable(mesh, 0.5, 0.15), Galerkin(mesh, 0.5)
     for s in operators[5].frequencies.s.ravel()[::15]:
@@ -138,7 +142,8 @@ def test_rod_under_a_smooth_load(operators):
 
 
 def test_rod_under_a_step(operators):
-    """B11: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts smear and ring."""
+    """B11: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts
+    smear and ring."""
     operator, mesh = operators[10], operators[10].mesh
     assert top_error(operator, lambda t: 1.0, lambda t: np.maximum(t, 0.0)) < 0.026
     motion = rod(operator, lambda t: 1.0).solve()
@@ -157,7 +162,8 @@ def test_rod_under_a_step(operators):
 
 
 def test_small_steps_stay_bounded():
-    """B11: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching elements give 250."""
+    """B11: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching
+    elements give 250."""
     operator = convolution_operator(polygon(SQUARE, 0.5), MATERIAL, dt=0.05, steps=180)
     motion = rod(operator, smooth_load).solve()
     assert np.abs(motion.displacement[motion.times > 6.0, 1]).max() < 1.25
@@ -192,7 +198,8 @@ def test_energetic_and_convolution_agree(operators):
 
 
 def test_compliance_is_the_inverse_seen_from_the_contact(operators):
-    """u_c = W * lam + u_free is what solve() gives, to what wraps around; supported unknowns zero; W_0 symmetric."""
+    """u_c = W * lam + u_free is what solve() gives, to what wraps around; supported unknowns zero;
+    W_0 symmetric."""
     problem = rod(operators[5], smooth_load)
     lam = np.random.default_rng(1).standard_normal(problem.condensed().u_free.shape)
     for fixed in (problem.fixed, None):
@@ -206,7 +213,8 @@ def test_compliance_is_the_inverse_seen_from_the_contact(operators):
 
 
 def test_work_of_contact_forces_is_never_negative(operators):
-    """B11: forces held in each step and the displacement increments: their work is a positive quadratic form."""
+    """B11: forces held in each step and the displacement increments: their work is a positive
+    quadratic form."""
     w = replace(rod(operators[5], smooth_load), fixed=None).condensed().W[:20]
     increments = np.diff(w, axis=0, prepend=0.0)
     size = w.shape[1]
@@ -219,7 +227,8 @@ def test_work_of_contact_forces_is_never_negative(operators):
 
 
 def test_contact_runs_on_it(operators):
-    """V7.1: the pressed square with Tresca's friction: no penetration, impulse at t = 4 (4.6737 energetic); Uzawa."""
+    """V7.1: the pressed square with Tresca's friction: no penetration, impulse at t = 4 (4.6737
+    energetic); Uzawa."""
     operator, mesh = operators[10], operators[10].mesh
     forces = traction_forces(mesh, lambda x, n, t: -n, dt=0.1, steps=60, elements=mesh.labels == 2)
     problem = BoundaryProblem(operator, forces, contact=mesh.labels == 0)
@@ -236,8 +245,9 @@ def test_contact_runs_on_it(operators):
 
 
 def test_prescribed_motion(operators):
-    """The top of the rod moved as it moved under its load: all else moves as before, to second order in the step,
-    for prescribed unknowns move evenly during each step; the reactions there are the load."""
+    """The top of the rod moved as it moved under its load: all else moves as before, to second
+    order in the step, for prescribed unknowns move evenly during each step; the reactions there are
+    the load."""
     errors, forces = [], []
     for operator in operators.values():
         loaded, mesh = rod(operator, smooth_load), operator.mesh
@@ -255,7 +265,8 @@ def test_prescribed_motion(operators):
 
 
 def test_density_and_the_unsymmetric_form(operators):
-    """Twice the density at the same speeds halves the compliance; the unsymmetric form converges to the same rod."""
+    """Twice the density at the same speeds halves the compliance; the unsymmetric form converges to
+    the same rod."""
     mesh = operators[5].mesh
     heavy = LinearElastic.from_wave_speeds(1.0, 0.5, 2.0)
     light, twice = (

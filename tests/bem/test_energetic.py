@@ -1,4 +1,5 @@
-"""Energetic boundary elements in time: plane pulses, a rod between rollers, positivity, stability, saved blocks."""
+"""Energetic boundary elements in time: plane pulses, a rod between rollers, positivity, stability,
+saved blocks."""
 
 from __future__ import annotations
 
@@ -41,7 +42,8 @@ def blocks() -> dict[int, EnergeticBlocks]:
 @pytest.mark.parametrize("symmetric", [True, False])
 @pytest.mark.parametrize(("shear", "fine"), [(False, 1.4e-2), (True, 1.6e-2)])
 def test_plane_pulses(blocks, symmetric, shear, fine):
-    """B4: displacement of the whole boundary under the tractions of an oblique pulse, T = 4; order > 1.85."""
+    """B4: displacement of the whole boundary under the tractions of an oblique pulse, T = 4; order
+    > 1.85."""
     wave, errors = pulse(shear=shear), []
     for k, b in blocks.items():
         forces = traction_forces(b.mesh, wave.traction, dt=b.dt, steps=4 * k)
@@ -91,7 +93,8 @@ def echoes(t: np.ndarray, integral) -> np.ndarray:
 
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_rod_under_a_step(blocks, symmetric):
-    """B5: top displacement to 1 %, the reaction of the base (exactly 0 or 2) never above 2.05; work 2 at t = 2."""
+    """B5: top displacement to 1 %, the reaction of the base (exactly 0 or 2) never above 2.05; work
+    2 at t = 2."""
     problem = rod(blocks[10], lambda t: 1.0, symmetric=symmetric)
     motion, mesh = problem.solve(), blocks[10].mesh
     exact = echoes(motion.times, lambda t: np.maximum(t, 0.0))
@@ -126,7 +129,8 @@ def test_rod_under_a_smooth_load(blocks, symmetric):
 
 
 def test_both_forms_give_the_same_impulse(blocks):
-    """B7: impulse on the base at t = 4 within 0.5 %; tractions of both agree with the nodal reactions."""
+    """B7: impulse on the base at t = 4 within 0.5 %; tractions of both agree with the nodal
+    reactions."""
     impulses = {}
     for symmetric in (True, False):
         motion, mesh = rod(blocks[10], lambda t: 1.0, symmetric=symmetric).solve(), blocks[10].mesh
@@ -142,7 +146,8 @@ def test_both_forms_give_the_same_impulse(blocks):
 
 
 def test_compliance_is_the_inverse_seen_from_the_contact(blocks):
-    """u_c = W * lam + u_free is what solve() gives; W_0 symmetric, eigenvalues 1.0 to 5.3 (free body); density."""
+    """u_c = W * lam + u_free is what solve() gives; W_0 symmetric, eigenvalues 1.0 to 5.3 (free
+    body); density."""
     free = replace(rod(blocks[5], smooth_load, rho=3.0), fixed=None)
     compliance = free.condensed()
     lam = np.random.default_rng(1).standard_normal(compliance.u_free.shape)
@@ -168,7 +173,8 @@ def test_motion_everywhere_gives_the_forces_back(blocks):
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
 def test_symmetric_form_is_positive_definite(ratio):
-    """B6: smallest eigenvalue of the symmetric part of the space-time S (increments, 20 steps) above zero."""
+    """B6: smallest eigenvalue of the symmetric part of the space-time S (increments, 20 steps)
+    above zero."""
     steps, mesh = 20, polygon(SQUARE, 0.2)
     small = energetic_blocks(mesh, MATERIAL, dt=0.2 * ratio, steps=steps)
     n = 2 * len(mesh)
@@ -217,7 +223,8 @@ def test_a_free_disk_keeps_its_momentum():
 
 
 def test_prescribed_motion(blocks):
-    """The top of the rod moved as it moved under its load: the reactions there are the load, all else the same."""
+    """The top of the rod moved as it moved under its load: the reactions there are the load, all
+    else the same."""
     loaded = rod(blocks[5], smooth_load, rho=2.0)
     motion = loaded.solve()
     fixed = loaded.fixed.copy()
@@ -230,7 +237,8 @@ def test_prescribed_motion(blocks):
 
 
 def test_saved_blocks(tmp_path):
-    """Saved blocks come back to the last bit, for another density too; those of another problem are refused."""
+    """Saved blocks come back to the last bit, for another density too; those of another problem are
+    refused."""
     path, mesh = tmp_path / "square.h5", polygon(SQUARE, 0.2)
     b = stored_blocks(path, mesh, MATERIAL, dt=0.2, steps=4)
     whole = path.read_bytes()

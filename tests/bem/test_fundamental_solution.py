@@ -1,4 +1,5 @@
-"""Kernels of the boundary elements: each integrated kernel against the Laplace domain, the textbook form, 60 digits."""
+"""Kernels of the boundary elements: each integrated kernel against the Laplace domain, the textbook
+form, 60 digits."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ def kernel(kernels: KernelSet, operator: str, field: str) -> np.ndarray:
 
 
 def displacement_tensor(d: np.ndarray, t: float, c_p: float, c_s: float) -> np.ndarray:
-    """G(x - y, t) itself, density 1: (..., 2, 2) for d = x - y of shape (..., 2); the textbook form, not integrated.
+    """G(x - y, t) itself, density 1: (..., 2, 2) for d = x - y of shape (..., 2); the textbook
+    form, not integrated.
 
     Infinite at the fronts. It is here to check the integrated kernels, not to integrate with.
     """
@@ -126,7 +128,8 @@ def test_time_kernels_keep_their_digits_at_small_distances(r):
 
 
 def test_nothing_arrives_before_the_waves():
-    """Ahead of the P front all kernels are zero; between the fronts the functions of the S wave are."""
+    """Ahead of the P front all kernels are zero; between the fronts the functions of the S wave
+    are."""
     kernels = TimeKernels(1.0, C_P, C_S)(np.array([0.7, 1.0, 1.5]))
     for values in (kernels.single, kernels.double, kernels.hyper):
         assert all((field[1:] == 0.0).all() for field in values)

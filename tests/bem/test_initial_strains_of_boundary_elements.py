@@ -1,4 +1,5 @@
-"""A uniform initial strain on the boundary: the body takes the tractions C eps_0 n, beside finite elements (V8.10)."""
+"""A uniform initial strain on the boundary: the body takes the tractions C eps_0 n, beside finite
+elements (V8.10)."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ STRESS = (
 
 
 def warmed(blocks: EnergeticBlocks, history: Callable[[float], float], *, rollers: bool) -> Array:
-    """Displacement (steps, 2, n) of a square warmed by WARM * history(t), on rollers below and left, or held below."""
+    """Displacement (steps, 2, n) of a square warmed by WARM * history(t), on rollers below and
+    left, or held below."""
     mesh = blocks.mesh
     forces = traction_forces(
         mesh, lambda x, n, t: STRESS * history(t) * n, dt=blocks.dt, steps=blocks.steps
@@ -49,7 +51,8 @@ def warmed(blocks: EnergeticBlocks, history: Callable[[float], float], *, roller
 
 
 def test_slow_warming_expands_a_square():
-    """u = (1 + nu) eps_0 x from the corner of the rollers in plane strain, so that nothing is left of the stress."""
+    """u = (1 + nu) eps_0 x from the corner of the rollers in plane strain, so that nothing is left
+    of the stress."""
     blocks = energetic_blocks(polygon(SQUARE, 0.25), MATERIAL, dt=1.0, steps=60)
     u = warmed(blocks, lambda t: float(np.tanh((t / 20.0) ** 2)), rollers=True)[-1]
     exact = (1.0 + MATERIAL.nu) * WARM * (blocks.mesh.points.T + 0.5)
@@ -57,8 +60,9 @@ def test_slow_warming_expands_a_square():
 
 
 def test_warming_in_time_is_that_of_finite_elements():
-    """A square on a rigid base under a smooth warming: its corner in three crossings, beside 20 x 20 finite elements
-    with an ``InitialStrain``. Both together are 1.8 % apart; 20 elements a side and 40 x 40 cells 0.6 %."""
+    """A square on a rigid base under a smooth warming: its corner in three crossings, beside 20 x
+    20 finite elements with an ``InitialStrain``. Both together are 1.8 % apart; 20 elements a side
+    and 40 x 40 cells 0.6 %."""
     blocks = energetic_blocks(polygon(SQUARE, 0.1), MATERIAL, dt=0.1, steps=30)
     u = warmed(blocks, smooth_load, rollers=False)
     mesh, tags = fem.build_mesh(

@@ -1,4 +1,5 @@
-"""Displacement inside the body from the boundary: a plane pulse, a smoothly pulled rod, points that are refused."""
+"""Displacement inside the body from the boundary: a plane pulse, a smoothly pulled rod, points that
+are refused."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ def test_pulse_crosses_the_square():
 
 
 def test_rod_inside_and_density():
-    """The rod's wave before its echo from the top, at chosen steps; density divides displacement."""
+    """The rod's wave before its echo from the top, at chosen steps; density divides
+    displacement."""
     blocks = energetic_blocks(polygon(SQUARE, 0.1), MATERIAL, dt=0.1, steps=20)
     problem = rod(blocks, smooth_load, rho=2.0)
     steps = [4, 9, 14]

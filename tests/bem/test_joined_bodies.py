@@ -1,7 +1,9 @@
-"""Jumps of displacements and tractions that are given between two boundary element bodies, against plane waves.
+"""Jumps of displacements and tractions that are given between two boundary element bodies, against
+plane waves.
 
-Rods between rollers, impedances Z = rho c: a jump G of the displacements sends u_1 = G Z_2/(Z_1 + Z_2) up and
-u_2 = -G Z_1/(Z_1 + Z_2) down; a jump f of the tractions moves both faces with f/(Z_1 + Z_2).
+Rods between rollers, impedances Z = rho c: a jump G of the displacements sends u_1 = G Z_2/(Z_1 +
+Z_2) up and u_2 = -G Z_1/(Z_1 + Z_2) down; a jump f of the tractions moves both faces with f/(Z_1 +
+Z_2).
 """
 
 from __future__ import annotations
@@ -59,7 +61,8 @@ def joined(*, welded: bool = True, component: int = 1, **more) -> TwoBodies:
 
 
 def faces(bodies: TwoBodies, forces=None, component: int = 1):
-    """Displacements (steps, nodes) of both faces, body 2 in the order of body 1, and the forces on them (steps,)."""
+    """Displacements (steps, nodes) of both faces, body 2 in the order of body 1, and the forces on
+    them (steps,)."""
     motions = bodies.solve(forces)
     u = [
         motion.displacement[:, component][:, body.contact_nodes]
@@ -81,8 +84,9 @@ def along(component: int, size: float):
     ("component", "z", "ringing"), [(1, (1.0, 2.0), 0.05), (0, (0.5, 1.0), 0.15)]
 )
 def test_a_jump_of_displacements_across_a_weld(component, z, ringing):
-    """B14: faces part in the first step and stay, by impedances, the force is a pulse of impulse G Z_1 Z_2/(Z_1 + Z_2);
-    the jump itself is exact. Tension and shear waves; single nodes ring, c_S dt being h/4."""
+    """B14: faces part in the first step and stay, by impedances, the force is a pulse of impulse G
+    Z_1 Z_2/(Z_1 + Z_2); the jump itself is exact. Tension and shear waves; single nodes ring, c_S
+    dt being h/4."""
     above, below, on_one, on_two = faces(
         joined(component=component, jump=along(component, JUMP)), component=component
     )
@@ -97,8 +101,8 @@ def test_a_jump_of_displacements_across_a_weld(component, z, ringing):
 
 
 def test_a_jump_of_tractions_across_a_weld():
-    """B14: both faces move with f/(Z_1 + Z_2), f Z_1/(Z_1 + Z_2) of f is the traction of body 1, the rest of body 2; a
-    history of nodal forces is the same."""
+    """B14: both faces move with f/(Z_1 + Z_2), f Z_1/(Z_1 + Z_2) of f is the traction of body 1,
+    the rest of body 2; a history of nodal forces is the same."""
     bodies, t = joined(traction=along(1, PUSH)), DT * np.arange(1, STEPS + 1)
     above, below, on_one, on_two = faces(bodies)
     assert np.abs(above - below).max() < 1e-12 * above.max()
@@ -111,7 +115,8 @@ def test_a_jump_of_tractions_across_a_weld():
 
 
 def test_welds_of_the_unsymmetric_form():
-    """B14: bodies whose W[0] is 2 % off symmetry are held as well as others: by a given jump, and beside rubbing."""
+    """B14: bodies whose W[0] is 2 % off symmetry are held as well as others: by a given jump, and
+    beside rubbing."""
     one, two = (
         replace(
             body, operator=PoincareSteklov(body.operator.blocks, body.operator.rho, symmetric=False)
@@ -136,8 +141,9 @@ def test_welds_of_the_unsymmetric_form():
 
 
 def test_jumps_where_bodies_only_touch():
-    """B14: a jump that drives the faces apart acts like a weld's, one that parts them opens a gap and moves nothing; a
-    traction that presses acts like a weld's, one that pulls moves body 2 alone: p_1 = 0 and p_2 = f."""
+    """B14: a jump that drives the faces apart acts like a weld's, one that parts them opens a gap
+    and moves nothing; a traction that presses acts like a weld's, one that pulls moves body 2
+    alone: p_1 = 0 and p_2 = f."""
     t = DT * np.arange(1, STEPS + 1)
     for more, bound in (({"jump": along(1, JUMP)}, 0.1), ({"traction": along(1, PUSH)}, 4e-4)):
         bodies = joined(welded=False, **more)
@@ -165,8 +171,8 @@ def test_jumps_where_bodies_only_touch():
 
 
 def test_sliding_against_a_given_jump():
-    """B14: held and stuck points follow a jump along both axes as welded ones do; rubbing ones take Tresca's limit, and
-    the slip is what is left of the given one."""
+    """B14: held and stuck points follow a jump along both axes as welded ones do; rubbing ones take
+    Tresca's limit, and the slip is what is left of the given one."""
     one, two = (replace(body, fixed=None) for body in rods())
 
     def jump(points, t):
@@ -195,8 +201,9 @@ def test_sliding_against_a_given_jump():
 
 
 def test_traction_given_on_a_rigid_support():
-    """B14: p_perp >= f_perp, and = where it is open. A rod is lifted by f from its base, u = f t/Z, and pressed by p
-    from t = 1 on: it is back when f t = 2 p (t - 1), and then its base has p_perp = 2 p until f is back at t = 2."""
+    """B14: p_perp >= f_perp, and = where it is open. A rod is lifted by f from its base, u = f t/Z,
+    and pressed by p from t = 1 on: it is back when f t = 2 p (t - 1), and then its base has p_perp
+    = 2 p until f is back at t = 2."""
     mesh = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 1 / K)
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[0] = mesh.nodes_of(mesh.labels % 2 == 1)

@@ -1,4 +1,5 @@
-"""The contact multiplier on its own mesh: the pairing, what is tested, plane waves, inf-sup constants, the weight."""
+"""The contact multiplier on its own mesh: the pairing, what is tested, plane waves, inf-sup
+constants, the weight."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ def own(**choice) -> MultiplierMesh:
 
 @pytest.mark.parametrize("degree", [0, 1])
 def test_the_pairing(degree):
-    """B15: B R are the nodal forces of lambda: they do its work on linear displacements, exactly; Bᵀ u are means."""
+    """B15: B R are the nodal forces of lambda: they do its work on linear displacements, exactly;
+    Bᵀ u are means."""
     mesh = square().operator.mesh
     patches = own(patch=4, degree=degree)  # 6 elements: one patch of six
     assert [len(patch) for patch in patches.patches] == [6] and [
@@ -75,7 +77,8 @@ def test_the_pairing(degree):
 
 
 def test_patches_end_at_corners_and_close_circles():
-    """B15: three sides are three runs, a whole circle is one; the normals are those of the sides, the mean ones."""
+    """B15: three sides are three runs, a whole circle is one; the normals are those of the sides,
+    the mean ones."""
     problem = square_problem(4, MATERIAL, dt=0.25, steps=2)
     mesh, sides = problem.operator.mesh, problem.operator.mesh.labels != 2
     problem = BoundaryProblem(problem.operator, problem.forces, contact=sides)
@@ -111,8 +114,9 @@ def nothing(mesh, elements, *, steps: int) -> CondensedCompliance:
 
 
 def test_a_mean_normal_stands_for_30_degrees():
-    """B15: patches of a circle under a pressure 1 that presses it outwards. A patch that turns more is refused: in half
-    a circle the mean normal misses more than half of the pressure; two elements of 16, 22.5 degrees, miss 4 %."""
+    """B15: patches of a circle under a pressure 1 that presses it outwards. A patch that turns more
+    is refused: in half a circle the mean normal misses more than half of the pressure; two elements
+    of 16, 22.5 degrees, miss 4 %."""
     ring, whole, steps = circle(1.0, 16), np.ones(16, bool), 2
     loads = np.tile(ring.node_normals(whole).T, (steps, 1, 1))
     disk = BoundaryProblem(
@@ -134,8 +138,9 @@ def test_a_mean_normal_stands_for_30_degrees():
     "choice", [(1, 1, 0, "end"), (2, 2, 0, "end"), (3, 4, 1, "end"), (2, 3, 0, "mean")]
 )
 def test_the_second_line_holds_in_the_body(law, choice):
-    """B15: the displacements of the body under B lambda, from the whole boundary, satisfy what is tested: means over
-    patches, ends or means of intervals, increments of tangents; every interval is certified."""
+    """B15: the displacements of the body under B lambda, from the whole boundary, satisfy what is
+    tested: means over patches, ends or means of intervals, increments of tangents; every interval
+    is certified."""
     patch, interval, degree, testing = choice
     patches = own(patch=patch, interval=interval, degree=degree, testing=testing)
     run = march_contact(BoundaryContact(patches.condensed(), friction=LAWS[law]))
@@ -161,7 +166,8 @@ def test_the_second_line_holds_in_the_body(law, choice):
 
 
 def test_uzawa_solves_it_too():
-    """B15: the algorithm of the source on its own mesh of the multiplier ends where the march does."""
+    """B15: the algorithm of the source on its own mesh of the multiplier ends where the march
+    does."""
     contact = BoundaryContact(own(patch=2, interval=2).condensed(), friction=LAWS["Tresca"])
     found, march = SpaceTimeUzawa(tolerance=1e-10).solve(contact), march_contact(contact)
     assert np.abs(found.forces - march.forces).max() < 1e-7 * np.abs(march.forces).max()
@@ -169,7 +175,8 @@ def test_uzawa_solves_it_too():
 
 @cache
 def rod() -> BoundaryProblem:
-    """A rod of length 1 between rollers under the pressure 1: the force on its base is 2 from t = 1 to t = 3."""
+    """A rod of length 1 between rollers under the pressure 1: the force on its base is 2 from t = 1
+    to t = 3."""
     mesh = polygon([(0, 0), (0.5, 0), (0.5, 1), (0, 1)], 0.125)
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[0] = mesh.nodes_of(mesh.labels % 2 == 1)
@@ -178,7 +185,8 @@ def rod() -> BoundaryProblem:
 
 
 def base_force(**choice) -> np.ndarray:
-    """Pressure on the base of the rod in intervals of 3 steps, the front coming after two thirds of the third."""
+    """Pressure on the base of the rod in intervals of 3 steps, the front coming after two thirds of
+    the third."""
     patches = MultiplierMesh(
         rod().operator.mesh, rod().contact, rod().condensed(), patch=2, interval=3, **choice
     )
@@ -187,9 +195,10 @@ def base_force(**choice) -> np.ndarray:
 
 
 def test_a_front_inside_of_an_interval():
-    """B15: with x = 1/3 of an interval behind the front, exactly: tested at the end lambda is 2 x there and then 2; in
-    the mean 2 x², and then 2 (1 +- 2 x (1 - x)) in turn, undamped, although its inf-sup constants are good. The last
-    interval has the echo of what was wrong in that of the front."""
+    """B15: with x = 1/3 of an interval behind the front, exactly: tested at the end lambda is 2 x
+    there and then 2; in the mean 2 x², and then 2 (1 +- 2 x (1 - x)) in turn, undamped, although
+    its inf-sup constants are good. The last interval has the echo of what was wrong in that of the
+    front."""
     end, mean, x = base_force()[:7], base_force(testing="mean")[:7], 1.0 / 3.0
     assert end == pytest.approx([0.0, 0.0, 2.0 * x, 2.0, 2.0, 2.0, 2.0], abs=0.05)
     swing = 4.0 * x * (1.0 - x)
@@ -198,8 +207,9 @@ def test_a_front_inside_of_an_interval():
 
 
 def test_the_weight():
-    """B15: sigma = 0 are the means, digit for digit; the answer moves by O(sigma DT); with the weight the swing of the
-    rod grows by (1 - theta)/theta an interval, theta the weighted middle, which is less than exp(2 sigma DT)."""
+    """B15: sigma = 0 are the means, digit for digit; the answer moves by O(sigma DT); with the
+    weight the swing of the rod grows by (1 - theta)/theta an interval, theta the weighted middle,
+    which is less than exp(2 sigma DT)."""
     patches = own(patch=2, interval=4, testing="mean", sigma=0.0)
     assert (
         patches.weights[0].tolist() == [0.125, 0.25, 0.25, 0.25, 0.125]
@@ -243,8 +253,9 @@ def test_a_weight_that_lets_the_means_swing_without_bounds_is_refused():
 
 
 def test_inf_sup_constants():
-    """B15: with H = h and, for means, DT = dt the constants vanish with the mesh: zig-zags of lambda are not seen. With
-    patches of two elements and intervals of two steps they stay, sqrt(3)/2 in time; linear lambda takes four."""
+    """B15: with H = h and, for means, DT = dt the constants vanish with the mesh: zig-zags of
+    lambda are not seen. With patches of two elements and intervals of two steps they stay,
+    sqrt(3)/2 in time; linear lambda takes four."""
     meshes = [polygon(SIDES, 1.0 / k) for k in (4, 12)]
     one, two, linear, three = (
         np.array([space_constant(mesh, mesh.labels == 0, patch, degree) for mesh in meshes])
@@ -261,7 +272,8 @@ def test_inf_sup_constants():
 
 
 def test_an_obstacle_that_moves():
-    """B15: the mean of a motion over an interval: of a constant speed the place at its middle; at the end the place."""
+    """B15: the mean of a motion over an interval: of a constant speed the place at its middle; at
+    the end the place."""
     middle, end = (
         own(interval=3, testing="mean").averaged(lambda t: 2.0 * t),
         own(interval=3).averaged(lambda t: t**2),
@@ -270,8 +282,8 @@ def test_an_obstacle_that_moves():
 
 
 def test_the_benchmark(tmp_path):
-    """benchmarks/bem_multiplier.py, small: means swing where ends do not, the constants are good in both; H = h takes
-    Uzawa's method more iterations; its picture."""
+    """benchmarks/bem_multiplier.py, small: means swing where ends do not, the constants are good in
+    both; H = h takes Uzawa's method more iterations; its picture."""
     spec = spec_from_file_location("bem_multiplier", ROOT / "benchmarks" / "bem_multiplier.py")
     assert spec and spec.loader
     benchmark = sys.modules["bem_multiplier"] = module_from_spec(

@@ -1,4 +1,5 @@
-"""Thin and sharp bodies: integrals of elements that nearly meet, a thin rod, positivity, what is refused."""
+"""Thin and sharp bodies: integrals of elements that nearly meet, a thin rod, positivity, what is
+refused."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_points_of_thin_bodies(name):
-    """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the greatest entry."""
+    """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the
+    greatest entry."""
     for t in (0.0063, 0.125, 0.375, 2.5):
         found, exact = in_time(SHAPES[name], t), in_time(SHAPES[name], t, MANY)
         for kind in ("single", "double", "hyper"):
@@ -70,7 +72,8 @@ def test_points_of_thin_bodies(name):
 
 @pytest.mark.parametrize("fronts", [(), (0.05, 0.1)])
 def test_elements_that_face_each_other(fronts):
-    """Peaks log r, d/r² and a kink at each front over a slab and its neighbours, against 900 x 900 plain points."""
+    """Peaks log r, d/r² and a kink at each front over a slab and its neighbours, against 900 x 900
+    plain points."""
     pairs = ElementPairs(slab(H / 20))
     close = np.flatnonzero(pairs.close & ~pairs.corner)
     total = np.zeros((3, len(pairs), 4))
@@ -104,7 +107,8 @@ def peaks(d: np.ndarray, fronts: tuple[float, ...]) -> np.ndarray:
 
 
 def pulled(mesh: BoundaryMesh, dt: float, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Loads of the top, (sin pi t/2)² until t = 2, and rollers at the sides on a fixed base: the rod of c = 1."""
+    """Loads of the top, (sin pi t/2)² until t = 2, and rollers at the sides on a fixed base: the
+    rod of c = 1."""
     fixed = np.stack([mesh.nodes_of(np.isin(mesh.labels, (1, 3))), mesh.nodes_of(mesh.labels == 0)])
     top = mesh.labels == 2
     return traction_forces(
@@ -133,8 +137,9 @@ def error(displacement: np.ndarray, times: np.ndarray, mesh: BoundaryMesh) -> fl
 
 @pytest.mark.parametrize("share", [5, 20])
 def test_thin_rod(share):
-    """A rod of h/5 and h/20 between rollers against the exact one: the error is that of the time step, of first order;
-    the ledger never goes below zero. Inside, halfway between the sides, it moves as they do."""
+    """A rod of h/5 and h/20 between rollers against the exact one: the error is that of the time
+    step, of first order; the ledger never goes below zero. Inside, halfway between the sides, it
+    moves as they do."""
     h, errors = 0.25, []
     mesh = slab(h / share, h)
     for dt in (h / 2, h / 4):
@@ -165,7 +170,8 @@ def test_thin_rod_by_convolution_quadrature(ratio):
 
 @pytest.mark.parametrize("name", ["slab of h/20", "7 degrees", "3 degrees"])
 def test_symmetric_form_is_positive_on_thin_bodies(name):
-    """B6: the smallest eigenvalue of the symmetric part of the space-time S, 6 steps, is above zero."""
+    """B6: the smallest eigenvalue of the symmetric part of the space-time S, 6 steps, is above
+    zero."""
     mesh, steps = SHAPES[name], 6
     n = 2 * len(mesh)
     blocks = energetic_blocks(mesh, MATERIAL, dt=H, steps=steps)
@@ -180,7 +186,8 @@ def test_symmetric_form_is_positive_on_thin_bodies(name):
 
 
 def test_ordinary_bodies_keep_their_points():
-    """Nothing is close on squares, disks and notches, so that their matrices stay what they were."""
+    """Nothing is close on squares, disks and notches, so that their matrices stay what they
+    were."""
     notched = [(-3, -4), (3, -4), (3, 0), (1, 0), (1, -2), (-1, -2), (-1, 0), (-3, 0)]
     for mesh in (
         polygon(SQUARE, 0.2),

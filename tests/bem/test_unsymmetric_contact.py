@@ -1,4 +1,5 @@
-"""B16, contact with the unsymmetric form of the Poincaré-Steklov operator: beside the symmetric one, certified."""
+"""B16, contact with the unsymmetric form of the Poincaré-Steklov operator: beside the symmetric
+one, certified."""
 
 from __future__ import annotations
 
@@ -41,7 +42,8 @@ LAWS = {
 
 @cache
 def square(k: int, form: str) -> BoundaryProblem:
-    """The unit square pressed on its top, T = 6, c_P dt = h, from one set of blocks for both forms."""
+    """The unit square pressed on its top, T = 6, c_P dt = h, from one set of blocks for both
+    forms."""
     if form == "symmetric":
         return square_problem(k, MATERIAL, dt=1.0 / k, steps=6 * k)
     given = square(k, "symmetric")
@@ -75,7 +77,8 @@ def differences(k: int, law: str) -> tuple[float, float]:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_both_forms_meet(law):
-    """Every step certified; impulses and energies: measured 0.14 to 0.2 % and 0.5 to 1 % at k = 5, less at k = 10."""
+    """Every step certified; impulses and energies: measured 0.14 to 0.2 % and 0.5 to 1 % at k = 5,
+    less at k = 10."""
     coarse, fine = differences(5, law), differences(10, law)
     assert coarse[0] < 6e-3 and coarse[1] < 3e-2
     assert fine[0] < 0.8 * coarse[0] and fine[1] < (1.2 if law == "Coulomb" else 0.8) * coarse[1]
@@ -114,8 +117,8 @@ def test_the_bars_at_twenty_elements():
 
 
 def test_the_sharp_triangle():
-    """benchmarks/bem_forms.py, elements twice as long: both forms follow plane pulses, the symmetric one is positive
-    and the other one is not."""
+    """benchmarks/bem_forms.py, elements twice as long: both forms follow plane pulses, the
+    symmetric one is positive and the other one is not."""
     spec = spec_from_file_location(
         "bem_forms", Path(__file__).resolve().parents[2] / "benchmarks" / "bem_forms.py"
     )
@@ -134,7 +137,8 @@ def test_the_sharp_triangle():
 
 @pytest.mark.parametrize("law", ["none", "weak"])
 def test_uzawa_on_the_whole_history_is_the_march(law):
-    """Two methods that share nothing but W: the default rho is that of the symmetric part of W[0]."""
+    """Two methods that share nothing but W: the default rho is that of the symmetric part of
+    W[0]."""
     contact = BoundaryContact(condensed(5, "unsymmetric"), friction=LAWS[law])
     found, marched = SpaceTimeUzawa(tolerance=1e-9).solve(contact), run(5, "unsymmetric", law)
     assert np.abs(found.forces - marched.forces).max() < 1e-6 * np.abs(marched.forces).max()
@@ -142,8 +146,8 @@ def test_uzawa_on_the_whole_history_is_the_march(law):
 
 
 def test_the_step_matrix_is_a_p_matrix():
-    """W[0] is 2 % off symmetry, its symmetric part positive definite: one solution, without and with friction; after a
-    loss of that the minors decide."""
+    """W[0] is 2 % off symmetry, its symmetric part positive definite: one solution, without and
+    with friction; after a loss of that the minors decide."""
     for form, law in (
         (form, law) for form in ("symmetric", "unsymmetric") for law in ("none", "Tresca")
     ):
@@ -168,8 +172,8 @@ def spoilt(by: float) -> BoundaryContact:
 
 
 def test_methods_and_failures():
-    """Those for symmetric matrices name the others; Lemke on the symmetric form has the answer of ActiveSet; a ray in a
-    step is a sentence."""
+    """Those for symmetric matrices name the others; Lemke on the symmetric form has the answer of
+    ActiveSet; a ray in a step is a sentence."""
     contact = BoundaryContact(condensed(5, "unsymmetric"))
     with pytest.raises(
         InputError, match=r"not symmetric.*methods Lemke\(\) and, with friction, FrictionNewton"
@@ -192,8 +196,8 @@ def test_methods_and_failures():
 
 @pytest.mark.parametrize("form", ["symmetric", "unsymmetric"])
 def test_points_at_rest_are_certified(form):
-    """Loads that friction and pressure take up to the last point, one of them grazing: x is zero but for rounding, and
-    the motion without reactions measures that, not x."""
+    """Loads that friction and pressure take up to the last point, one of them grazing: x is zero
+    but for rounding, and the motion without reactions measures that, not x."""
     compliance = replace(
         condensed(5, form), W=condensed(5, form).W[:1], u_free=condensed(5, form).u_free[:1]
     )
@@ -209,8 +213,9 @@ def test_points_at_rest_are_certified(form):
 
 
 def test_corners_and_two_bodies():
-    """A box in a notch, whose corner has two conditions, and the square on its mirror image, of which one body has the
-    unsymmetric form, rubbing: impulses as with the symmetric form, measured 0.16 and 0.09 % off."""
+    """A box in a notch, whose corner has two conditions, and the square on its mirror image, of
+    which one body has the unsymmetric form, rubbing: impulses as with the symmetric form, measured
+    0.16 and 0.09 % off."""
     given = square_problem(4, MATERIAL, dt=0.25, steps=20)
     mesh, below = (
         given.operator.mesh,
@@ -235,9 +240,9 @@ def test_corners_and_two_bodies():
 
 @pytest.mark.parametrize("form", ["symmetric", "unsymmetric"])
 def test_thin_rod_pressed_on_its_base(form):
-    """A rod of h/20 between rollers under a unit step from t = 0, its base free to leave the support: pressure 2 from
-    t = 1 to 3, so impulse 2 at t = 2 (measured 2.001 and 2.016) and 4 from t = 3 on (3.97 and 3.95 at t = 3.5; fronts
-    are smeared in bodies thinner than h)."""
+    """A rod of h/20 between rollers under a unit step from t = 0, its base free to leave the
+    support: pressure 2 from t = 1 to 3, so impulse 2 at t = 2 (measured 2.001 and 2.016) and 4 from
+    t = 3 on (3.97 and 3.95 at t = 3.5; fronts are smeared in bodies thinner than h)."""
     h, dt = 0.25, 0.0625
     mesh = slab(h / 20, h)
     operator = PoincareSteklov(
@@ -269,7 +274,8 @@ def concrete_blocks() -> BoundaryProblem:
 
 
 def concrete(steps: int, form: str, fixed: bool) -> BoundaryProblem:
-    """The concrete box on steel, 5 elements a side and c_P dt = 4 h, its base in contact or on rollers."""
+    """The concrete box on steel, 5 elements a side and c_P dt = 4 h, its base in contact or on
+    rollers."""
     given = concrete_blocks()
     operator = replace(given.operator, symmetric=form == "symmetric")
     held = np.zeros((2, 20), bool)
@@ -278,9 +284,10 @@ def concrete(steps: int, form: str, fixed: bool) -> BoundaryProblem:
 
 
 def test_growth_of_rounding_errors_is_refused():
-    """B16: with c_P dt = 4 h the unsymmetric form multiplies what unit forces move by 1e18 in 160 steps, and rounding
-    with it: contact forces were 28 times too large, each step certified. Motions, free and on rollers, grow sooner, and
-    miss the equation of the symmetric form by much of the largest force. 100 steps of contact are right."""
+    """B16: with c_P dt = 4 h the unsymmetric form multiplies what unit forces move by 1e18 in 160
+    steps, and rounding with it: contact forces were 28 times too large, each step certified.
+    Motions, free and on rollers, grow sooner, and miss the equation of the symmetric form by much
+    of the largest force. 100 steps of contact are right."""
     for fixed in (False, True):
         long = concrete(160, "unsymmetric", fixed)
         with pytest.raises(

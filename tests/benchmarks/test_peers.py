@@ -1,4 +1,5 @@
-"""The comparison with other programs: its references are right, and its page says what was measured."""
+"""The comparison with other programs: its references are right, and its page says what was
+measured."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ def problems() -> Any:
 
 
 def of_all_sets(problems: Any, n: int) -> tuple[Any, Any]:
-    """Displacements and contact forces by trying all sets of closed nodes: exactly one satisfies all conditions."""
+    """Displacements and contact forces by trying all sets of closed nodes: exactly one satisfies
+    all conditions."""
     mesh = problems.Square(n)
     K, f = problems.stiffness(mesh, **problems.SIGNORINI).toarray(), problems.traction_load(mesh)
     found = []
@@ -69,7 +71,8 @@ def test_reference_is_the_one_of_all_sets(problems: Any, n: int) -> None:
 
 
 def test_reference_satisfies_its_conditions_on_the_meshes_that_are_compared(problems: Any) -> None:
-    """Equilibrium of all nodes, no force that pulls, no penetration, no force where it is open; and the whole load."""
+    """Equilibrium of all nodes, no force that pulls, no penetration, no force where it is open; and
+    the whole load."""
     for n in problems.SIZES:
         mesh = problems.Square(n)
         u, r = problems.signorini_reference(n)
@@ -118,7 +121,8 @@ def test_bar_measures_of_the_exact_solution(problems: Any) -> None:
 
 
 def test_thrown_reference_is_its_command_s(problems: Any) -> None:
-    """Stored runs agree with one another, and with a coarse one of today; the largest force is rho c_P v."""
+    """Stored runs agree with one another, and with a coarse one of today; the largest force is rho
+    c_P v."""
     sys.path.insert(0, str(PEERS))
     try:
         import thrown_reference
@@ -147,7 +151,8 @@ def compare() -> Any:
 
 
 def test_page_says_what_was_measured(compare: Any) -> None:
-    """Tables, ways, machine and versions of the page are those of the stored run, in which every peer has its rows."""
+    """Tables, ways, machine and versions of the page are those of the stored run, in which every
+    peer has its rows."""
     page = (PEERS.parents[1] / "docs" / "reference" / "comparison.md").read_text(encoding="utf-8")
     stored = json.loads((PEERS / "results.json").read_text(encoding="utf-8"))
     assert (
@@ -176,7 +181,8 @@ def stored_rows() -> list[dict[str, Any]]:
 def test_our_rows_are_measured(
     problems: Any, monkeypatch: pytest.MonkeyPatch, problem: str, way: str
 ) -> None:
-    """What the program of this project answers today is what its stored rows say; of the bar the first bounce."""
+    """What the program of this project answers today is what its stored rows say; of the bar the
+    first bounce."""
     pytest.importorskip("dolfinx")
     monkeypatch.syspath_prepend(str(PEERS))
     import peer_vi_contact as peer
@@ -220,7 +226,8 @@ def test_a_row_is_a_process(compare: Any, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_rows_of_this_program_are_those_of_its_version() -> None:
-    """After a new version: bash benchmarks/peers/run.sh --json benchmarks/peers/results.json, and the page."""
+    """After a new version: bash benchmarks/peers/run.sh --json benchmarks/peers/results.json, and
+    the page."""
     assert {
         row["version"].split(",")[0] for row in stored_rows() if row["name"] == "vi_contact"
     } == {__version__}
@@ -264,7 +271,8 @@ if __name__ == "__main__":
 def test_a_peer_that_is_not_there_becomes_rows_that_say_so(
     tmp_path: Path, pip: str, why: str
 ) -> None:
-    """The script goes on: a program that cannot be installed, or does not start, has a row for each problem."""
+    """The script goes on: a program that cannot be installed, or does not start, has a row for each
+    problem."""
     folder = tmp_path / "benchmarks" / "peers"
     shutil.copytree(
         PEERS, folder, ignore=shutil.ignore_patterns("peer_*", "__pycache__", "results.json")
@@ -354,27 +362,34 @@ def claims(rows: list[dict[str, Any]]) -> list[str]:
         f"wrong by {100.0 * of('getfem', 'signorini', 'default', 'force_error'):.0f} %",
         f"overlap of {100.0 * of('calculix', 'signorini', 'default', 'penetration'):.1f} %",
         f"force is then {1.0 + min(peaks):.1f} to {1.0 + max(peaks):.1f} times the exact one",
-        f"overshoot ({over[0]}), before CalculiX by default ({over[1]}), scikit-fem ({over[2]}) and `vi_contact` "
+        f"overshoot ({over[0]}), before CalculiX by default ({over[1]}), scikit-fem ({over[2]}) "
+        "and `vi_contact` "
         f"({over[3]})",
         f"`vi_contact` gains {percent('vi_contact', 'thrown', 'best', 2)}, GetFEM's best way "
-        f"{percent('getfem', 'thrown', 'best', 2)}, and scikit-fem's {percent('scikit_fem', 'thrown', 'best', 2)}",
+        f"{percent('getfem', 'thrown', 'best', 2)}, and scikit-fem's "
+        f"{percent('scikit_fem', 'thrown', 'best', 2)}",
         f"of `vi_contact` loses {percent('vi_contact', 'thrown', 'never gains')}",
-        f"force error {first['getfem']}, followed by `ContactStabilisedNewmark` ({never:.3f}), Siconos "
+        f"force error {first['getfem']}, followed by `ContactStabilisedNewmark` ({never:.3f}), "
+        "Siconos "
         f"{first['siconos']} and the default of `vi_contact` {first['vi_contact']}",
         f"NGSolve ({close['ngsolve']:.3f})", f"CalculiX ({close['calculix']:.3f})",
         f"`vi_contact` has {close['vi_contact']:.3f}",
         f"`ContactStabilisedNewmark` loses {percent('vi_contact', 'bar', 'never gains')}, CalculiX "
-        f"{percent('calculix', 'bar', 'best')} and {percent('calculix', 'bar', 'default')}, OpenSeesPy's TRBDF2 "
-        f"{percent('opensees', 'bar', 'best')} and Kratos with Bossak's scheme {percent('kratos', 'bar', 'best')}",
+        f"{percent('calculix', 'bar', 'best')} and {percent('calculix', 'bar', 'default')}, "
+        "OpenSeesPy's TRBDF2 "
+        f"{percent('opensees', 'bar', 'best')} and Kratos with Bossak's scheme "
+        f"{percent('kratos', 'bar', 'best')}",
         f"Siconos with projected positions gains {percent('siconos', 'bar', 'best')}",
     ]  # fmt: skip
 
 
 def test_lines_of_code_are_counted(problems: Any, tmp_path: Path) -> None:
-    """Its function and what it uses; no blank lines, comments, docstrings, nor what only other problems use."""
+    """Its function and what it uses; no blank lines, comments, docstrings, nor what only other
+    problems use."""
     file = tmp_path / "peer_one.py"
     file.write_text(
-        '"""Say."""\n\nimport numpy as np\nimport json\n\nHOW = 1\n\n\ndef other():\n    return json\n\n\n'
+        '"""Say."""\n\nimport numpy as np\nimport json\n\nHOW = 1\n\n\ndef other():\n    return '
+        "json\n\n\n"
         'def helper(x):\n    """Help\n    twice."""\n\n    return HOW * x  # HOW\n\n\n'
         "def bar(way):\n    # a comment\n    return np.sin(helper(1))\n"
     )

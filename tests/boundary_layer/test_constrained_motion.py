@@ -1,4 +1,5 @@
-"""The boundary layer as ordinary differential equations: particle (V5.1), rigid body (V5.2), equality constraints."""
+"""The boundary layer as ordinary differential equations: particle (V5.1), rigid body (V5.2),
+equality constraints."""
 
 from __future__ import annotations
 
@@ -40,8 +41,8 @@ def collide(layer: Layer, **more) -> LayerContact:
 
 
 def test_particle():
-    """V5.1, all pairs in closed form: table to its digits; every fourth one by integration: closed form to 1e-9, times
-    of the events too."""
+    """V5.1, all pairs in closed form: table to its digits; every fourth one by integration: closed
+    form to 1e-9, times of the events too."""
     for i, k in enumerate(K):
         for j, c in enumerate(C):
             layer = Layer(1.0, k=k, c=c)
@@ -72,7 +73,8 @@ def test_cut_off_changes_duration_not_restitution():
 
 
 def test_full_metric():
-    """V5.1: g_11 + ĝ_11 in the place of the dominant term; the blended reading is its limit a -> b."""
+    """V5.1: g_11 + ĝ_11 in the place of the dominant term; the blended reading is its limit a ->
+    b."""
     full = collide(Layer(1.0, k=1.0, c=1.0), metric=Metric.FULL)
     assert (full.duration, full.restitution, full.deepest) == pytest.approx(
         (2.70353, 0.56918, 0.55461), abs=5.1e-6
@@ -90,7 +92,8 @@ def test_full_metric():
 
 
 def test_any_coordinates_any_mass_matrix():
-    """(27), (28): the same particle in polar coordinates, M(q) = diag(1, r²), affinities by differences."""
+    """(27), (28): the same particle in polar coordinates, M(q) = diag(1, r²), affinities by
+    differences."""
     polar = ConstrainedSystem(
         lambda q: np.diag([1.0, q[0] ** 2]),
         lambda q: q[0] * np.cos(q[1]),
@@ -108,7 +111,8 @@ def test_any_coordinates_any_mass_matrix():
 
 
 def test_events_flight_and_several_contacts():
-    """A ball falls from 1 m on a thin layer of e = ½ and bounces: times and speeds of the point mass, less O(b)."""
+    """A ball falls from 1 m on a thin layer of e = ½ and bounces: times and speeds of the point
+    mass, less O(b)."""
     g, b = 9.81, 1e-6
     ball = ConstrainedSystem(
         np.array([[2.0]]),
@@ -140,7 +144,8 @@ def test_events_flight_and_several_contacts():
     )
 
 
-# Rigid body ----------------------------------------------------------------------------------------------------------
+# Rigid body
+# ----------------------------------------------------------------------------------------------------------
 BODY = RigidBody(2.0, (0.2, 0.3, 0.4), (0.3, -0.2, -0.5))
 BEFORE = np.array([0.3, 0.0, -1.0, 0.5, -0.4, 0.2])
 AFTER = np.array([0.3, 0.0, -0.21912411, -1.06175177, -1.96175177, 0.2])
@@ -182,7 +187,8 @@ def test_rigid_body_through_the_layer():
 
 
 def test_an_ellipsoid_turns_and_bounces():
-    """Support point, gradient and its rate of an ellipsoid: A is d rho along the motion; energy in flight."""
+    """Support point, gradient and its rate of an ellipsoid: A is d rho along the motion; energy in
+    flight."""
     body = RigidBody(2.0, (0.2, 0.3, 0.4), Ellipsoid((0.5, 0.4, 0.3)), gravity=(0.0, 0.0, -9.81))
     q0, v0 = (
         np.array([0.0, 0.0, 1.5, 1.0, 0.2, -0.1, 0.3]),
@@ -215,8 +221,8 @@ def test_rotations():
 
 
 def test_metric_and_affinities():
-    """(14), (15), (20), (21): ĝ_11 A_I A_J is added; the covariant derivative of the normal momentum is
-    ĝ_11 (ρ̈ - ρ̇²/rho) in any coordinates."""
+    """(14), (15), (20), (21): ĝ_11 A_I A_J is added; the covariant derivative of the normal
+    momentum is ĝ_11 (ρ̈ - ρ̇²/rho) in any coordinates."""
     rng = np.random.default_rng(5)
     root, A, v = rng.normal(size=(4, 4)), rng.normal(size=4), rng.normal(size=4)
     M, rho, b = root @ root.T + np.eye(4), 0.3, 0.7
@@ -233,9 +239,11 @@ def test_metric_and_affinities():
     assert np.einsum("ks,kij->sij", orthogonal, turned) == pytest.approx(0.0, abs=1e-10)
 
 
-# Equality constraints ------------------------------------------------------------------------------------------------
+# Equality constraints
+# ------------------------------------------------------------------------------------------------
 def test_pendulum():
-    """(29) to (34): a rod of length 1 m from 1 rad: period, tension below, and the constraint without drift."""
+    """(29) to (34): a rod of length 1 m from 1 rad: period, tension below, and the constraint
+    without drift."""
     m, g, angle = 2.0, 9.81, 1.0
     rod = ConstrainedSystem(
         m * np.eye(2),
@@ -254,7 +262,8 @@ def test_pendulum():
 
 
 def test_slider_returns_to_its_line():
-    """(34): with spring and damper an error in phi fades as m̄ φ̈ + c̄ φ̇ + k̄ φ = 0; two constraints fix the point."""
+    """(34): with spring and damper an error in phi fades as m̄ φ̈ + c̄ φ̇ + k̄ φ = 0; two
+    constraints fix the point."""
     K, C, M = 50.0, 1.5, np.array([[2.0, 0.3], [0.3, 1.0]])
     a = np.array([1.0, 2.0])
     line = ConstrainedSystem(M, lambda q: q @ a, lambda q: a, force=lambda t, q, v: -K * q - C * v)
@@ -272,7 +281,8 @@ def test_slider_returns_to_its_line():
 
 
 def test_a_string_in_the_layer_tends_to_the_rod():
-    """The same pendulum on a string, rho = L - |q| >= 0: its tension differs from the rod's by O(b)."""
+    """The same pendulum on a string, rho = L - |q| >= 0: its tension differs from the rod's by
+    O(b)."""
     m, g, angle = 2.0, 9.81, 1.0
     string = ConstrainedSystem(
         m * np.eye(2),
@@ -295,7 +305,8 @@ def test_a_string_in_the_layer_tends_to_the_rod():
     assert 0.0 < errors[1] == pytest.approx(0.127 * errors[0], rel=0.01) and errors[0] < 3e-4
 
 
-# Errors --------------------------------------------------------------------------------------------------------------
+# Errors
+# --------------------------------------------------------------------------------------------------------------
 def test_starts_and_systems_that_cannot_be():
     layer = Layer(1.0, k=1.0)
     with pytest.raises(InputError, match="rho = -0.1, outside the admissible set"):

@@ -1,4 +1,5 @@
-"""The boundary layer as a contact law of finite elements: rebound, energy, convergence to the exact inequality."""
+"""The boundary layer as a contact law of finite elements: rebound, energy, convergence to the exact
+inequality."""
 
 from __future__ import annotations
 
@@ -78,7 +79,8 @@ def layered_bar(
     elements: int = 50,
     metric: Metric = Metric.FLAT,
 ):
-    """(problem, reports) of the bar of V1.1 with a layer whose mass is what a wave passes while the layer is passed."""
+    """(problem, reports) of the bar of V1.1 with a layer whose mass is what a wave passes while the
+    layer is passed."""
     problem = make(elements)
     law = contact_layer(e, mass=IMPEDANCE * b / 10.0, speed=10.0, width=b, metric=metric)
     return (
@@ -115,7 +117,8 @@ def test_bar_tends_to_the_exact_inequality():
 
 @serial
 def test_energy_of_potential_and_damper():
-    """Without the metric: E + stored energy is constant for c = 0, and never grows otherwise, step by step (V1.2)."""
+    """Without the metric: E + stored energy is constant for c = 0, and never grows otherwise, step
+    by step (V1.2)."""
     lost = {}
     for e in (1.0, 0.3):
         problem, law, reports = layered_bar(0.5, e=e, make=bouncing)
@@ -142,7 +145,8 @@ def test_steps_larger_than_the_layer():
 
 @serial
 def test_mean_pressure():
-    """Its derivative; its limit for short steps is the law; the work of the potential; no force outside."""
+    """Its derivative; its limit for short steps is the law; the work of the potential; no force
+    outside."""
     law = ContactLayer(Layer(0.1, k=300.0, c=20.0, speed=2.0, start=0.05), mass=3.0)
     old = np.array([0.03, 0.06, 0.06, 0.11, 0.3])
     rho = np.array([0.04, 0.055, 0.06 + 1e-9, 0.09, 0.2])
@@ -177,7 +181,8 @@ def test_mean_pressure():
 
 @serial
 def test_continuing_from_a_state():
-    """What the scheme carries is in the state: a march in two parts is the march in one, to the last bit."""
+    """What the scheme carries is in the state: a march in two parts is the march in one, to the
+    last bit."""
     law = law_of(0.5)
     problem = bar(2, E=1e6, gap=0.12, v0=lambda x: np.full_like(x, -10.0))
     scheme = BoundaryLayer(law=law)
@@ -189,7 +194,8 @@ def test_continuing_from_a_state():
 
 @serial
 def test_restart_and_change_of_step(tmp_path):
-    """A run continued from its checkpoint is the straight run, to the last bit; steps may change their length."""
+    """A run continued from its checkpoint is the straight run, to the last bit; steps may change
+    their length."""
     problem = bar(2, E=1e6, gap=0.12, v0=lambda x: np.full_like(x, -10.0))
     scheme = BoundaryLayer(law=law_of(0.5))
     straight = simulate(problem, scheme=scheme, dt=5e-4, steps=30, progress=False)
@@ -307,7 +313,8 @@ def test_a_gap_lost_to_rounding_is_named():
         )
 
 
-# Finite elements -----------------------------------------------------------------------------------------------------
+# Finite elements
+# -----------------------------------------------------------------------------------------------------
 @pytest.mark.slow
 def test_a_stiff_block_of_finite_elements(comm):
     """A 2D block of nine cells falls flat on a plane: rebound e, 1 %, on any number of ranks."""
@@ -327,7 +334,8 @@ def test_a_stiff_block_of_finite_elements(comm):
 @pytest.mark.slow
 @serial
 def test_wall_tends_to_the_exact_inequality(comm):
-    """The wall of seed 000, case b, in the layer: contact points within O(b) of the midpoint rule with gap >= 0."""
+    """The wall of seed 000, case b, in the layer: contact points within O(b) of the midpoint rule
+    with gap >= 0."""
     from demos.problems.wall import Wall, build
 
     model = build(Wall(), comm)
@@ -356,7 +364,8 @@ def test_wall_tends_to_the_exact_inequality(comm):
 @pytest.mark.serial
 @pytest.mark.slow
 def test_two_stiff_blocks(comm):
-    """A layer between two bodies: with the reduced mass they part with e, and keep their momentum."""
+    """A layer between two bodies: with the reduced mass they part with e, and keep their
+    momentum."""
     from two_bodies import blocks, momenta, two_blocks
     from two_bodies import thrown as with_velocities
 

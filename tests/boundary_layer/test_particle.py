@@ -1,4 +1,5 @@
-"""The particle in the boundary layer in closed form: V5.1, Figs. 1 to 3 of seed 001, and the layer's own checks."""
+"""The particle in the boundary layer in closed form: V5.1, Figs. 1 to 3 of seed 001, and the
+layer's own checks."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ def unit(k: float, c: float) -> ParticleImpact:
 
 
 def test_restitution_and_duration_of_all_fifty_pairs():
-    """V5.1: printed digits, and the equations they solve to 1e-12: (36) at t_f and t_c, e = tau/s - 1."""
+    """V5.1: printed digits, and the equations they solve to 1e-12: (36) at t_f and t_c, e = tau/s -
+    1."""
     for i, k in enumerate(K):
         for j, c in enumerate(C):
             impact, s = unit(k, c), c / k
@@ -80,7 +82,8 @@ def test_closed_form_satisfies_the_equation_of_motion():
 
 
 def test_newton_and_poisson():
-    """(37), (38), V5.1: equal for the force on the particle, virtually indistinguishable for the covector force."""
+    """(37), (38), V5.1: equal for the force on the particle, virtually indistinguishable for the
+    covector force."""
     for (k, c), expected in {
         (1.0, 1.0): 0.609461,
         (1.0, 5.0): 0.204157,
@@ -94,8 +97,8 @@ def test_newton_and_poisson():
 
 
 def test_statements_of_the_figures():
-    """Figs. 1 and 2 (V5.1): x_min grows with k and c, t_f falls with both, e grows with k and falls with c; symmetry
-    about t_c without dissipation."""
+    """Figs. 1 and 2 (V5.1): x_min grows with k and c, t_f falls with both, e grows with k and falls
+    with c; symmetry about t_c without dissipation."""
     table = {
         name: np.array([[getattr(unit(k, c), name) for c in C] for k in K])
         for name in ("deepest", "duration", "restitution")
@@ -140,7 +143,8 @@ def test_wanted_restitution():
 
 
 def test_only_the_ratio_of_the_speeds_counts():
-    """A particle of another speed than the law's V: c is that many times as large; k = c = b = m = V = 1, U = 2."""
+    """A particle of another speed than the law's V: c is that many times as large; k = c = b = m =
+    V = 1, U = 2."""
     layer = Layer(1.0, k=1.0, c=1.0, speed=1.0)
     assert ParticleImpact(layer, 1.0, 2.0).restitution == pytest.approx(restitution(2.0), abs=1e-15)
     assert ParticleImpact(Layer(1.0, k=1.0, c=1.0), 1.0, 2.0).restitution == pytest.approx(

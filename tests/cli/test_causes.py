@@ -1,4 +1,5 @@
-"""The causes that sentences name: memory, permissions, closed streams, settings of matplotlib; none is guessed."""
+"""The causes that sentences name: memory, permissions, closed streams, settings of matplotlib; none
+is guessed."""
 
 from __future__ import annotations
 
@@ -152,7 +153,8 @@ def test_a_function_of_the_user_s_without_memory() -> None:
     assert not of_memory(other.value)
 
 
-# Streams --------------------------------------------------------------------------------------------------------------
+# Streams
+# --------------------------------------------------------------------------------------------------------------
 
 
 def shell(line: str, **more: str) -> tuple[int, str, str]:
@@ -168,7 +170,8 @@ def shell(line: str, **more: str) -> tuple[int, str, str]:
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_closed_streams_are_no_hindrance(folder: Path, tmp_path: Path, closed: str) -> None:
-    """A daemon has none; what libraries print does not get into the files of the run, which would get their numbers."""
+    """A daemon has none; what libraries print does not get into the files of the run, which would
+    get their numbers."""
     status, _, said = shell(f"$V run wall --steps 2 --out {tmp_path}/run {closed}")
     assert status == 0, said
     assert len(read_run(tmp_path / "run").history["t"]) == 3
@@ -179,7 +182,8 @@ def test_closed_streams_are_no_hindrance(folder: Path, tmp_path: Path, closed: s
 
 
 def test_a_reader_that_has_gone_is_no_error(folder: Path, tmp_path: Path) -> None:
-    """As of "| head -1": what was to be done is done; a file that is a stream was not written to its end."""
+    """As of "| head -1": what was to be done is done; a file that is a stream was not written to
+    its end."""
     line = (
         f"$V motion convert {folder}/motion.at2 {tmp_path}/out.txt | true; echo ${{PIPESTATUS[0]}}"
     )

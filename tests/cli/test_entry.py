@@ -1,4 +1,5 @@
-"""The command line: explains itself, prints what it finds, and says in one sentence what is wrong."""
+"""The command line: explains itself, prints what it finds, and says in one sentence what is
+wrong."""
 
 from __future__ import annotations
 
@@ -26,8 +27,8 @@ ROOT = Path(vi_contact.__file__).parent.parent
 def shell(*arguments: str) -> subprocess.CompletedProcess[str]:
     """python3 -m vi_contact, as a user calls it."""
     command = [sys.executable, "-m", "vi_contact", *arguments]
-    # env: without what MPI, started in this process, has put into the C environment; a child that inherits it
-    # takes itself for this process, and may end without a word
+    # env: without what MPI, started in this process, has put into the C environment; a child that
+    # inherits it takes itself for this process, and may end without a word
     return subprocess.run(
         command, capture_output=True, text=True, cwd=ROOT, check=False, env=dict(os.environ)
     )
@@ -57,7 +58,8 @@ def test_help_explains_itself():
 
 
 def test_calls_of_the_compiler_are_not_shown(monkeypatch, caplog, capsys):
-    """In a virtual environment of Debian 12 they are lines INFO:root among what a command prints."""
+    """In a virtual environment of Debian 12 they are lines INFO:root among what a command
+    prints."""
     monkeypatch.setattr(logging.getLogger(), "filters", [])
     monkeypatch.setattr(sys, "argv", ["vi-contact", "cases"])
     caplog.set_level(logging.INFO)
@@ -176,7 +178,8 @@ def test_wrong_cases_are_one_sentence(arguments, word, capsys):
     ],
 )
 def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word):
-    """An output that the command reads, or that it would write twice, is refused; every file is what it was."""
+    """An output that the command reads, or that it would write twice, is refused; every file is
+    what it was."""
     monkeypatch.chdir(tmp_path)
     Path("r.at2").write_text("A MOTION\nIN UNITS OF G\nNPTS= 4, DT= .01 SEC\n0.0 0.1 -0.1 0.0\n")
     Path("link.at2").symlink_to("r.at2")
@@ -199,7 +202,8 @@ def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word)
 @pytest.mark.parametrize("error", [InputError("no such thing"), RuntimeError("a defect")])
 @pytest.mark.parametrize("others", ["come", "wait"])
 def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, others):
-    """Rank 1 of 2 fails: when rank 0 does too it is the one that speaks; when not, rank 1 speaks and MPI ends both."""
+    """Rank 1 of 2 fails: when rank 0 does too it is the one that speaks; when not, rank 1 speaks
+    and MPI ends both."""
 
     class World:
         rank, size = 1, 2
@@ -249,7 +253,8 @@ def test_cases_are_listed(capsys):
 
 
 def test_a_library_that_is_missing_is_named():
-    """A Python without DOLFINx: one sentence, not a traceback; a module of the user's own keeps its traceback."""
+    """A Python without DOLFINx: one sentence, not a traceback; a module of the user's own keeps its
+    traceback."""
 
     def missing(name):
         raise ModuleNotFoundError(f"No module named '{name}'", name=name)

@@ -1,6 +1,8 @@
-"""Command lines that are wrong by construction end with a status and one sentence: no traceback, no hang, no work done.
+"""Command lines that are wrong by construction end with a status and one sentence: no traceback, no
+hang, no work done.
 
-All in one process. A sentence is that of ``main`` or, for words that the parser refuses, its last line.
+All in one process. A sentence is that of ``main`` or, for words that the parser refuses, its last
+line.
 """
 
 from __future__ import annotations
@@ -265,7 +267,8 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 FUZZ = Fuzz("command lines", __file__)
 RETIRED = ("wall", "channel", "beam", "layer")
-SPECIAL = {  # (command, option, value) -> the word that the sentence must have, where it is no word of the line
+# (command, option, value) -> the word that the sentence must have, where it is no word of the line
+SPECIAL = {
     ("motion info FILE", "--units", ""): "unit",
     ("run CASE --check --allow", "", ""): "--allow ''",
     ("run", "", ""): "''",
@@ -309,7 +312,8 @@ def entries() -> list[list[str]]:
 
 
 def chosen(dice: Random) -> list[str]:
-    """A wrong line; of an option that takes numbers sometimes with a number that nobody has written down here."""
+    """A wrong line; of an option that takes numbers sometimes with a number that nobody has written
+    down here."""
     command, option, value = dice.choice(entries())
     if (
         option in ("--low", "--high", "--resample", "--dt", "--arias")
@@ -327,7 +331,8 @@ def chosen(dice: Random) -> list[str]:
 
 
 def faults(command: str, option: str, value: str) -> list[str]:
-    """Words of which the sentence must have one: the key or option that was given the wrong value, or this value."""
+    """Words of which the sentence must have one: the key or option that was given the wrong value,
+    or this value."""
     if (command, option, value) in SPECIAL:
         return [SPECIAL[command, option, value]]
     if command in RETIRED:
@@ -377,8 +382,8 @@ def check(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> Callable[[list[str]], None]:
-    """Try a line in an empty folder: one sentence about the very fault that it has. An exception that is no SystemExit
-    would be a traceback, and ends the test; so does a warning of numpy."""
+    """Try a line in an empty folder: one sentence about the very fault that it has. An exception
+    that is no SystemExit would be a traceback, and ends the test; so does a warning of numpy."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("signal.signal", lambda *_: None)  # ida makes Ctrl-C of SIGTERM for good
     warnings.simplefilter("error", RuntimeWarning)
@@ -412,7 +417,8 @@ def test_all_wrong_command_lines(check: Callable[[list[str]], None], tmp_path: P
 
 
 def test_every_wrong_line_is_about_its_fault(places: dict[str, str]) -> None:
-    """The words that sentences must have are words of the fault: none of them is one that every sentence has."""
+    """The words that sentences must have are words of the fault: none of them is one that every
+    sentence has."""
     assert len(entries()) > 400
     for entry in entries():
         about = faults(*entry)

@@ -1,4 +1,5 @@
-"""vi-contact motion info, convert, plot, spectrum: numbers, files, pictures, and one sentence for bad input."""
+"""vi-contact motion info, convert, plot, spectrum: numbers, files, pictures, and one sentence for
+bad input."""
 
 import csv
 import math

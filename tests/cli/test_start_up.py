@@ -1,4 +1,5 @@
-"""What a command imports before its first step: a run starts in little more than the time of its libraries."""
+"""What a command imports before its first step: a run starts in little more than the time of its
+libraries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Checks of arguments: what passes comes back in its type, what does not is named in one sentence."""
+"""Checks of arguments: what passes comes back in its type, what does not is named in one
+sentence."""
 
 from __future__ import annotations
 

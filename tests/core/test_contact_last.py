@@ -1,4 +1,5 @@
-"""The factor with contact unknowns last: beside dense algebra, compiled once for all processes, done without (V4.0)."""
+"""The factor with contact unknowns last: beside dense algebra, compiled once for all processes,
+done without (V4.0)."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def grid(*lengths: int) -> sp.csr_matrix:
 
 
 def two_bodies() -> sp.csr_matrix:
-    """Two grids of which contact unknowns 20 to 24 belong to both, and a row of the identity: three trees."""
+    """Two grids of which contact unknowns 20 to 24 belong to both, and a row of the identity: three
+    trees."""
     whole = sp.block_diag([grid(5, 5), sp.csr_matrix((20, 20)), sp.identity(1)], format="lil")
     whole[20:45, 20:45] += grid(5, 5)
     return sp.csr_matrix(whole)
@@ -56,7 +58,8 @@ MATRICES: dict[str, tuple[sp.csr_matrix, list[int]]] = {
 @pytest.mark.parametrize("short", [contact_last.SHORT_COLUMNS, 0.0], ids=["columns", "supernodes"])
 @pytest.mark.parametrize("name", MATRICES)
 def test_parts_beside_dense_algebra(name: str, short: float, monkeypatch: Any) -> None:
-    """L_cc L_ccᵀ is the Schur complement; forward, then backward, solves; any x_c leaves the others in equilibrium."""
+    """L_cc L_ccᵀ is the Schur complement; forward, then backward, solves; any x_c leaves the others
+    in equilibrium."""
     monkeypatch.setattr(contact_last, "SHORT_COLUMNS", short)
     A, last = MATRICES[name]
     c, dense, b = (
@@ -130,7 +133,8 @@ SLOW = "numpy does what compiled loops would do faster, because they need a C co
 def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
     how: str, cold: Path, small: Path, monkeypatch: Any, caplog: Any, tmp_path: Path
 ) -> None:
-    """Whatever is missing is told, and the loops that need no CHOLMOD go on where there is a compiler."""
+    """Whatever is missing is told, and the loops that need no CHOLMOD go on where there is a
+    compiler."""
     monkeypatch.setattr(compiled, "LOOPS", small)
     caplog.set_level(logging.INFO)
     maps, said = tmp_path / "maps", ""
@@ -180,7 +184,8 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
 def test_the_loops_need_no_library_of_the_machine() -> None:
     """What every process loads names no CHOLMOD, and brings none."""
     script = (
-        "from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import cholmod, library; "
+        "from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import "
+        "cholmod, library; "
         "print(library(SerialComm()) is not None, cholmod(SerialComm()), "
         "'cholmod' in open('/proc/self/maps').read())"
     )
@@ -230,7 +235,8 @@ def test_another_library_is_another_file(small: Path, tmp_path: Path) -> None:
 def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> None:
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
     script = (
-        f"import pathlib; from vi_contact.core import compiled; source = pathlib.Path({str(small)!r}); "
+        "import pathlib; from vi_contact.core import compiled; source = "
+        f"pathlib.Path({str(small)!r}); "
         "print(compiled.compiled(source, []))"
     )
     runs = [

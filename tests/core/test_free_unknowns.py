@@ -1,4 +1,5 @@
-"""Conjugate gradients to round-off on the unknowns that are not held; what large problems do beside their steps."""
+"""Conjugate gradients to round-off on the unknowns that are not held; what large problems do beside
+their steps."""
 
 from __future__ import annotations
 
@@ -68,7 +69,8 @@ STARTS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", STARTS)
 def test_first_acceleration_of_a_large_body(name: str, large: Any) -> None:
-    """With and without mass at contact points that rest and push: as with the factor of M, to 1e-11."""
+    """With and without mass at contact points that rest and push: as with the factor of M, to
+    1e-11."""
     box = thrown_box(COMM, simplices=True, divisions=(4, 4, 4))
     flat = replace(box.surface, gap0=np.zeros(box.surface.count))
     problem = replace(box, surface=flat, **STARTS[name])
@@ -84,7 +86,8 @@ def test_first_acceleration_of_a_large_body(name: str, large: Any) -> None:
 
 @pytest.mark.parametrize("name", ["predictor", "impulses"])
 def test_projections_of_a_large_body(name: str, large: Any) -> None:
-    """Steps with contact, each with a projection in M: as with the factor of M, to 1e-9 of the largest values."""
+    """Steps with contact, each with a projection in M: as with the factor of M, to 1e-9 of the
+    largest values."""
     scheme: Any = vc.ContactStabilisedNewmark() if name == "predictor" else vc.Midpoint()
     impact = None if name == "predictor" else Inelastic(ImpulseUpdate())
     problem = replace(thrown_box(COMM, simplices=True), impact=impact)
@@ -112,7 +115,8 @@ def test_projections_of_a_large_body(name: str, large: Any) -> None:
 def test_impacts_in_the_plane_are_condensed_longer(
     build: Any, factors: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """They come in every step: M is factorised up to six times the unknowns. Conjugate gradients agree to 1e-12."""
+    """They come in every step: M is factorised up to six times the unknowns. Conjugate gradients
+    agree to 1e-12."""
     after, made = [], []
     monkeypatch.setattr(impact, "condense", lambda *given: made.append(given) or condense(*given))
     for worth in (6, 1e9):

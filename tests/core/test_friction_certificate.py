@@ -1,4 +1,5 @@
-"""The certificate of a step with friction: 0 for the answer, and it sees what is wrong however long the way behind."""
+"""The certificate of a step with friction: 0 for the answer, and it sees what is wrong however long
+the way behind."""
 
 from __future__ import annotations
 
@@ -78,7 +79,8 @@ def test_slip_below_the_limit() -> None:
 
 
 def test_a_long_way_blunts_nothing() -> None:
-    """A column that has slid 1e4 steps far under a weak law: a promille less of the reaction is a promille still."""
+    """A column that has slid 1e4 steps far under a weak law: a promille less of the reaction is a
+    promille still."""
     report = last(Tresca(1e-4), v0=(1.0, 0.0))
     step = report.step
     far = np.zeros_like(step.guess)

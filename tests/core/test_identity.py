@@ -1,5 +1,6 @@
-"""What was made for what: groups and their mesh, surfaces and their system, states and their problem, motions and the
-steps they were computed with, outputs and the matrices they go by. Refused on every rank, with one sentence."""
+"""What was made for what: groups and their mesh, surfaces and their system, states and their
+problem, motions and the steps they were computed with, outputs and the matrices they go by. Refused
+on every rank, with one sentence."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ def test_numbers_of_no_facet_are_refused_on_all_ranks() -> None:
 
 
 def test_other_displacements_on_the_same_facets() -> None:
-    """Also where they meet on the facets of one rank only; at edges the later condition counts, as it always did."""
+    """Also where they meet on the facets of one rank only; at edges the later condition counts, as
+    it always did."""
     mesh, tags = body()
     bottom, left = tags["bottom"], tags["left"]
     moved = fem.Prescribed(bottom, (1.0, 0.0))
@@ -86,7 +88,8 @@ def test_other_displacements_on_the_same_facets() -> None:
 
 
 def test_a_surface_belongs_to_the_systems_of_its_space() -> None:
-    """It follows loads, weight, stiffness and initial values, and no other clamp: there its unknowns are others."""
+    """It follows loads, weight, stiffness and initial values, and no other clamp: there its
+    unknowns are others."""
     mesh, tags = body()
     system, other = (fem.assemble(mesh, STEEL, clamped=tags[name]) for name in ("bottom", "left"))
     surface = fem.contact_surface(system, tags["right"])
@@ -119,7 +122,8 @@ def test_a_state_belongs_to_its_problem() -> None:
 
 @pytest.mark.serial
 def test_a_start_inside_the_obstacle() -> None:
-    """Refused, but for what a scheme leaves there that stops velocities: it may go on from states of its own runs."""
+    """Refused, but for what a scheme leaves there that stops velocities: it may go on from states
+    of its own runs."""
     problem = chain_problem(3, gap=0.1, v0=[1.0, 1.0, 1.0])
     scheme = vc.MoreauJean()
     for state, report in vc.march(problem, scheme=scheme, dt=1e-2, steps=30):
@@ -138,8 +142,9 @@ def test_a_start_inside_the_obstacle() -> None:
 
 @pytest.mark.slow
 def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
-    """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also behind other loads: two
-    runs of one problem with other schemes or steps, at once, are those of two problems, to the last bit."""
+    """base_motion, as prescribed motion and as an obstacle that goes along, and FreeField, also
+    behind other loads: two runs of one problem with other schemes or steps, at once, are those of
+    two problems, to the last bit."""
     mesh, tags = body()
 
     def problems() -> list[vc.ContactProblem]:
@@ -177,7 +182,8 @@ def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
 def test_outputs_say_when_the_matrices_are_not_of_their_materials(
     caplog: pytest.LogCaptureFixture, shared_tmp: Path
 ) -> None:
-    """Twice the stiffness: stresses and reactions go by the material of fem.assemble, and say so on rank 0."""
+    """Twice the stiffness: stresses and reactions go by the material of fem.assemble, and say so on
+    rank 0."""
     mesh, tags = body()
     system = fem.assemble(mesh, STEEL, clamped=tags["bottom"], loads=fem.BodyForce((0.0, -1.0)))
     surface = fem.contact_surface(system, tags["right"])
@@ -208,7 +214,8 @@ def test_outputs_say_when_the_matrices_are_not_of_their_materials(
 
 @pytest.mark.serial
 def test_row_sums_that_are_no_masses() -> None:
-    """A consistent mass of elements of order two has row sums below zero: lumped, it would explode."""
+    """A consistent mass of elements of order two has row sums below zero: lumped, it would
+    explode."""
     problem = chain_problem(4)
     M = sp.diags([-0.55, 1.0, -0.55], [-1, 0, 1], shape=(4, 4))
     system = replace(problem.system, M=SerialMatrix(M))
@@ -221,7 +228,8 @@ def test_row_sums_that_are_no_masses() -> None:
 
 @pytest.mark.serial
 def test_numbers_beyond_those_of_the_machine(tmp_path: Path) -> None:
-    """A run that overflows fails: its ledger would be NaN with the status of a run that went well."""
+    """A run that overflows fails: its ledger would be NaN with the status of a run that went
+    well."""
     problem = chain_problem(
         3, gap=inf, excitation=vc.Harmonic(1e300, 1.0, phase=1.0, direction=(1.0,))
     )

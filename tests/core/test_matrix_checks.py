@@ -24,7 +24,8 @@ def K():
 
 
 def test_one_entry_is_found_whatever_its_units(K):
-    """A relative change of one entry by 1e-6, among unknowns in metres and in micrometres (or radians)."""
+    """A relative change of one entry by 1e-6, among unknowns in metres and in micrometres (or
+    radians)."""
     units = sp.diags(np.where(np.arange(N) % 2, 1.0, 1e-6))
     K[7, 8] *= 1.0 + 1e-6
     for A in (K, units @ K @ units):

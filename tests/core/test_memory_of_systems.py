@@ -1,7 +1,7 @@
 """What is made once of a system, a surface or a problem: never that of another argument.
 
-Every case makes something, uses it, changes an argument by a public method, uses it again, and compares with objects
-that nobody has used."""
+Every case makes something, uses it, changes an argument by a public method, uses it again, and
+compares with objects that nobody has used."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ COMM = MPI.COMM_WORLD
 
 
 def body(**given: Any) -> tuple[Any, Any, Any]:
-    """A soft block over an oblique plane: system, mesh tags and surface, in nodal frames of their own."""
+    """A soft block over an oblique plane: system, mesh tags and surface, in nodal frames of their
+    own."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), COMM)
     soft = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
     system = fem.assemble(
@@ -124,7 +125,8 @@ CHANGES: dict[str, Change] = {
     ],
 )
 def test_another_argument_is_another_answer(start, name, kind):
-    """Used before or not, the changed problem gives the same digits; the old one does too when it is used again."""
+    """Used before or not, the changed problem gives the same digits; the old one does too when it
+    is used again."""
     system, tags, _ = body()
     problem = vc.ContactProblem(system, start(system, tags["bottom"]))
     before = used(problem, kind)
@@ -190,7 +192,8 @@ def test_a_function_of_the_user_s_that_changed_between_runs():
     "name", ["gap0", "weights", "bilateral", "compliance", "normals", "points"]
 )
 def test_arrays_of_a_surface_are_its_own(name):
-    """Whoever made a surface may go on writing to the arrays, and nobody writes to those of the surface."""
+    """Whoever made a surface may go on writing to the arrays, and nobody writes to those of the
+    surface."""
     _, _, surface = body()
     mine = np.array(getattr(surface, name))
     made = replace(surface, **{name: mine})

@@ -1,4 +1,5 @@
-"""Files of a run folder: regular files of that folder alone; what a link leads to is neither read nor changed."""
+"""Files of a run folder: regular files of that folder alone; what a link leads to is neither read
+nor changed."""
 
 from __future__ import annotations
 
@@ -106,7 +107,8 @@ def test_what_is_read_or_continued_is_a_regular_file(
 def test_what_is_made_anew_takes_the_place_of_a_name(
     tmp_path: Path, notes: Path, kind: str
 ) -> None:
-    """The link goes, and not what it leads to; the temporary file beside it is made in the same way."""
+    """The link goes, and not what it leads to; the temporary file beside it is made in the same
+    way."""
     path = tmp_path / "history.csv"
     writers: dict[str, Callable[[], Any]] = {
         "new": lambda: own_files.open_new(path).close(),
@@ -170,7 +172,8 @@ def test_a_file_that_was_removed_is_another(tmp_path: Path) -> None:
         assert not own_files.same_file(tmp_path / "lock", file)
 
 
-# HDF5 -----------------------------------------------------------------------------------------------------------------
+# HDF5
+# -----------------------------------------------------------------------------------------------------------------
 
 
 def external_link(group: Any, other: Path, raw: Path) -> None:

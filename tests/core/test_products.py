@@ -1,4 +1,5 @@
-"""Nothing twice: the products with M, C and K that a step makes, counted, and what is remembered of them."""
+"""Nothing twice: the products with M, C and K that a step makes, counted, and what is remembered of
+them."""
 
 from __future__ import annotations
 
@@ -65,8 +66,9 @@ def per_step(
     ids=repr,
 )
 def test_a_step_makes_three_products(monkeypatch, scheme, ledger):
-    """M u, M v and K u serve the right-hand side, the certificate, the ledger and the next step; C u with damping (and
-    C v where the step is one in velocities; the ledger asks for C (u1 - u0)/dt)."""
+    """M u, M v and K u serve the right-hand side, the certificate, the ledger and the next step; C
+    u with damping (and C v where the step is one in velocities; the ledger asks for C (u1 -
+    u0)/dt)."""
     assert per_step(monkeypatch, scheme, damping=0.0, ledger=ledger, impact=None) <= 3.0
     in_velocities = ledger and isinstance(scheme, MoreauJean)
     assert (

@@ -1,4 +1,5 @@
-"""Names that have changed: an old program runs and is told the new name, and a case file is told the new word."""
+"""Names that have changed: an old program runs and is told the new name, and a case file is told
+the new word."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What is too large for dense matrices is refused with its size and what to take instead; what is small is counted
-over all ranks."""
+"""What is too large for dense matrices is refused with its size and what to take instead; what is
+small is counted over all ranks."""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ DOWN = np.tile([0.0, -1.0], (3, 1))
 
 
 def test_half_space_below_a_body():
-    """(X + u - point)·normal >= 0: the gap is the distance from the plane, the contact direction minus its normal."""
+    """(X + u - point)·normal >= 0: the gap is the distance from the plane, the contact direction
+    minus its normal."""
     ground = HalfSpace(point=(5.0, 0.25), normal=(0.0, 2.0))  # any length of the normal
     np.testing.assert_allclose(ground.gap(POINTS, DOWN), [0.75, 2.75, 0.25], rtol=1e-15)
     np.testing.assert_array_equal(ground.directions(POINTS, DOWN), DOWN)

@@ -1,4 +1,5 @@
-"""The certificate finds each kind of defect at its size; the energy ledger closes for every scheme (V9)."""
+"""The certificate finds each kind of defect at its size; the energy ledger closes for every scheme
+(V9)."""
 
 from __future__ import annotations
 
@@ -83,7 +84,8 @@ def test_penetration_defect(depth):
 
 
 def test_tension_and_force_at_a_distance():
-    """-5 N on the open wall is tension, +5 N is force over a gap; both are complementarity 5/r_ref."""
+    """-5 N on the open wall is tension, +5 N is force over a gap; both are complementarity
+    5/r_ref."""
     step, result = pressed()
     _, r_ref = size(step, result)
     for sign in (-1.0, 1.0):
@@ -93,7 +95,8 @@ def test_tension_and_force_at_a_distance():
 
 
 def test_wrong_active_set_defect():
-    """A right answer with a wrong set: the impact law would act on it. Each wrong row shows what makes it wrong."""
+    """A right answer with a wrong set: the impact law would act on it. Each wrong row shows what
+    makes it wrong."""
     step, result = pressed()
     x_ref, r_ref = size(step, result)
     gap = step.bound - step.surface.normal_values(result.x)
@@ -130,7 +133,8 @@ def test_springs_are_allowed_to_sink_in():
 
 
 def test_a_wide_gap_blunts_nothing():
-    """The residuals of the narrow gap are the same when the other wall is a kilometre away, or gone."""
+    """The residuals of the narrow gap are the same when the other wall is a kilometre away, or
+    gone."""
     step, result = pressed()
     inside = replace(result, x=result.x + [0.0, 0.0, 0.0, 1e-6])
     near = kkt_residual(step, inside)
@@ -139,7 +143,8 @@ def test_a_wide_gap_blunts_nothing():
 
 
 def test_units_do_not_matter():
-    """x in units of a millionth, r in units of a thousand: A, b and bounds follow, the certificate stays."""
+    """x in units of a millionth, r in units of a thousand: A, b and bounds follow, the certificate
+    stays."""
     step, result = pressed()
     step = replace(
         step, A=EffectiveMatrix(step.A.matrix, step.A.algebra)
@@ -183,8 +188,8 @@ IMPACTS: dict[str, Any] = {
 def ledger(
     problem: Any, scheme: Any, *, dt: float, steps: int, tolerance: float = 1e-12
 ) -> tuple[list[Report], dict[str, float], float]:
-    """(reports, totals [J], largest energy or total so far); asserts that every step closes to 1e-12 of it, and the sum
-    to ``tolerance``."""
+    """(reports, totals [J], largest energy or total so far); asserts that every step closes to
+    1e-12 of it, and the sum to ``tolerance``."""
     totals = dict.fromkeys(("input", "damping", "contact", "algorithmic", "impact"), 0.0)
     reports: list[Report] = []
     start = initial_state(problem)
@@ -207,7 +212,8 @@ def ledger(
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
 @pytest.mark.parametrize("impact", IMPACTS.values(), ids=IMPACTS)
 def test_V97_ledger_closes(scheme, damping, impact):
-    """V9.7: W_ext + E0 = E_end + D_visc + D_contact + D_impact + D_alg in every step, to 1e-12 of the largest term."""
+    """V9.7: W_ext + E0 = E_end + D_visc + D_contact + D_impact + D_alg in every step, to 1e-12 of
+    the largest term."""
     problem = shaken(impact, damping=damping)
     reports, totals, biggest = ledger(problem, scheme, dt=5e-3, steps=100)
     assert changes(reports) >= 2 and totals["input"] != 0.0 and totals["contact"] != 0.0
@@ -224,7 +230,8 @@ def test_V97_ledger_closes(scheme, damping, impact):
 @pytest.mark.parametrize("scheme", [HALF, NEWMARK], ids=["zwt", "newmark"])
 @pytest.mark.parametrize("body", [thrown, bouncing, period_three], ids=["V1.1", "V1.2", "V1.3"])
 def test_V97_ledger_closes_for_bars(scheme, body):
-    """The bars fly 5 m, so that velocities carry the rounding of displacements over dt: V9.7's 1e-10 for the sum."""
+    """The bars fly 5 m, so that velocities carry the rounding of displacements over dt: V9.7's
+    1e-10 for the sum."""
     n = 50
     dt = 0.5 / n if body is period_three else 1 / 150
     _, totals, biggest = ledger(body(n), scheme, dt=dt, steps=500, tolerance=1e-10)
@@ -246,7 +253,8 @@ def test_ledger_with_known_energies_is_the_same():
 
 
 def test_ledger_finds_a_wrong_step():
-    """A step that did not satisfy its equation of motion, here with a lighter M, leaves a defect."""
+    """A step that did not satisfy its equation of motion, here with a lighter M, leaves a
+    defect."""
     problem = shaken()
     report = list(run(problem, HALF, dt=5e-3, steps=30))[-1]
     wrong = replace(report.balance, a=1.01 * report.balance.a)
@@ -262,7 +270,8 @@ def test_ledger_finds_a_wrong_step():
 
 
 def test_compiled_sizes_are_those_of_numpy(monkeypatch):
-    """Digit by digit: of one step and of several, with springs, held conditions, friction, and NaN."""
+    """Digit by digit: of one step and of several, with springs, held conditions, friction, and
+    NaN."""
     if library(SerialComm()) is None:
         pytest.skip("needs a compiler and CHOLMOD")
     step, result = pressed()
@@ -310,7 +319,8 @@ def test_compiled_sizes_are_those_of_numpy(monkeypatch):
     ],
 )
 def test_what_solvers_of_others_give_is_read_as_what_it_is(worse):
-    """Whole numbers for a set, single precision, every second number: the certificate is that of the numpy way."""
+    """Whole numbers for a set, single precision, every second number: the certificate is that of
+    the numpy way."""
     step, result = pressed()
     asked = worse(result)
     for first in (True, False):  # of its shape, or after others

@@ -1,4 +1,5 @@
-"""The damping that a model has at its first modes, and ratios of materials: closed forms, and what is refused."""
+"""The damping that a model has at its first modes, and ratios of materials: closed forms, and what
+is refused."""
 
 from __future__ import annotations
 
@@ -91,7 +92,8 @@ def column(comm: Any = COMM, material: Any = None, **options: Any) -> vc.Contact
 )
 @pytest.mark.parametrize("second", [0.0, 90.0])
 def test_every_material_has_a_ratio(material: Any, second: float) -> None:
-    """One frequency: xi f / f1 at f. Two: alpha / (2 w) + beta w / 2. Exact, whatever the material."""
+    """One frequency: xi f / f1 at f. Two: alpha / (2 w) + beta w / 2. Exact, whatever the
+    material."""
     modes = first_modes(column(material=material, damping=vc.DampingRatio(30.0, second)))
     f = 1.0 / np.array(modes.periods)
     law = (
@@ -124,22 +126,24 @@ def test_laws_of_the_whole_body(law: Any, words: str) -> None:
 
 
 def test_dashpots_count() -> None:
-    """A bar of one column of cells with a dashpot of rho c at its end: phi² rho c / (2 w ∫ rho phi²) of each mode."""
+    """A bar of one column of cells with a dashpot of rho c at its end: phi² rho c / (2 w ∫ rho
+    phi²) of each mode."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0,), divisions=(200,)), COMM)
     material = vc.LinearElastic(E, 0.0, RHO)
     system = fem.assemble(
         mesh, material, clamped=tags["left"], dashpots=fem.Dashpots(tags["right"], normal=0.01)
     )
     modes = first_modes(vc.ContactProblem(system, empty_surface(system.algebra.comm, 1)))
-    # phi = sin((2 k - 1) pi x / 2), phi(1)² = 1, ∫ phi² = 1/2, w = (2 k - 1) pi c / 2: xi = 0.01 · 2 / ((2 k - 1) pi)
+    # phi = sin((2 k - 1) pi x / 2), phi(1)² = 1, ∫ phi² = 1/2, w = (2 k - 1) pi c / 2: xi = 0.01 ·
+    # 2 / ((2 k - 1) pi)
     assert modes.ratios == pytest.approx(
         [0.01 * 2.0 / ((2 * k - 1) * np.pi) for k in (1, 2, 3)], rel=2e-4
     )
 
 
 def test_one_mode_in_two_directions_has_one_ratio() -> None:
-    """A square column in space bends along x as along z; a mass that is damped along x alone would tell them apart only
-    by chance, so both have their mean."""
+    """A square column in space bends along x as along z; a mass that is damped along x alone would
+    tell them apart only by chance, so both have their mean."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 4.0, 1.0), divisions=(1, 4, 1)), COMM)
     system = fem.assemble(
         mesh,
@@ -168,7 +172,8 @@ def written(folder: Path, text: str = CASE) -> Path:
 
 
 def test_a_case_tells_what_it_has(shared_tmp: Path) -> None:
-    """A ratio by number and by per cent; the contact is closed, so the two blocks are one column."""
+    """A ratio by number and by per cent; the contact is closed, so the two blocks are one
+    column."""
     model = describe(read_case(written(shared_tmp)), COMM)
     together = [XI / 20.0 / T for T in model["periods"]]
     assert model["damping_ratios"] == pytest.approx(together, rel=1e-3)

@@ -1,4 +1,5 @@
-"""S4.1: checks of a run against formulas: coefficients against published ones and against other ways to them."""
+"""S4.1: checks of a run against formulas: coefficients against published ones and against other
+ways to them."""
 
 from __future__ import annotations
 
@@ -20,9 +21,10 @@ RUN = {"N_wall": np.array([9e4, 2e5, 1e5]), "height_wall": np.array([1.6, 2.0, 1
 def worst_wedge(
     phi: float, delta: float, slope: float, batter: float, psi: float, load: float = 0.0
 ) -> float:
-    """The largest thrust of a triangle of soil on wall, ground and a plane at any angle, over rho g H²/2: equilibrium
-    of weight (turned by psi, divided by its cosine), reaction of the plane at phi, and thrust at delta. load: on a
-    horizontal metre, over rho g H/2; the triangle's ground is as wide as the law of sines has it."""
+    """The largest thrust of a triangle of soil on wall, ground and a plane at any angle, over rho g
+    H²/2: equilibrium of weight (turned by psi, divided by its cosine), reaction of the plane at
+    phi, and thrust at delta. load: on a horizontal metre, over rho g H/2; the triangle's ground is
+    as wide as the law of sines has it."""
     angles = np.linspace(slope + 1e-4, 0.5 * np.pi + batter - 1e-4, 400001)
     area = (
         np.cos(batter - slope)
@@ -49,7 +51,8 @@ def worst_wedge(
     ],
 )
 def test_worst_wedge(angles: tuple[float, ...]) -> None:
-    """K is the maximum over all planes of the equilibrium of one wedge, to round-off of the search."""
+    """K is the maximum over all planes of the equilibrium of one wedge, to round-off of the
+    search."""
     phi, delta, slope, batter, psi = (DEGREE * one for one in angles)
     assert wedge(phi, delta, slope, batter, psi=psi) == pytest.approx(
         worst_wedge(phi, delta, slope, batter, psi), rel=1e-8
@@ -57,8 +60,9 @@ def test_worst_wedge(angles: tuple[float, ...]) -> None:
 
 
 def test_textbook_coefficients() -> None:
-    """K_A, K_P of level ground behind a vertical wall in textbooks (Das, Bowles: 0.3014, 0.2973; 6.105), Rankine's
-    1/3 and 3; on a slope his are Coulomb's with delta = slope (0.3495 for 30° and 10°)."""
+    """K_A, K_P of level ground behind a vertical wall in textbooks (Das, Bowles: 0.3014, 0.2973;
+    6.105), Rankine's 1/3 and 3; on a slope his are Coulomb's with delta = slope (0.3495 for 30° and
+    10°)."""
 
     def coulomb(phi: float, delta: float, *, passive: bool = False) -> float:
         return wedge(phi * DEGREE, delta * DEGREE, 0.0, 0.0, passive=passive)
@@ -104,8 +108,9 @@ def test_rest_and_surcharge() -> None:
 
 
 def test_surcharge_on_a_slope_behind_a_batter() -> None:
-    """q on a horizontal metre: the thrust is that of the search over all planes with weight and load; 253 925 N of
-    another search for phi 35, delta 15, slope 20, batter 20 degrees, H = 5 m, 50 kPa."""
+    """q on a horizontal metre: the thrust is that of the search over all planes with weight and
+    load; 253 925 N of another search for phi 35, delta 15, slope 20, batter 20 degrees, H = 5 m, 50
+    kPa."""
     soil = {"height": 5.0, "rho": 1900.0, "surcharge": 5e4}
     own = 0.5 * 1900.0 * 9.80665 * 25.0
     for phi, delta, slope, batter in (

@@ -28,7 +28,8 @@ def test_frequency_of_the_discrete_bar(n, lumped):
 
 
 def test_frequency_of_the_continuous_bar():
-    """f1 = c/(4L) = 0.75 Hz; consistent mass from above and lumped from below, with error (pi/2n)²/24 each."""
+    """f1 = c/(4L) = 0.75 Hz; consistent mass from above and lumped from below, with error
+    (pi/2n)²/24 each."""
     for n in (20, 40):
         error = (np.pi / (2 * n)) ** 2 / 24.0
         consistent = lowest_frequency(bar(n, clamped=True).system) / 0.75 - 1.0

@@ -1,4 +1,5 @@
-"""Parts of a contact by name, group or box: thrust and its height, pressures at the ends, sliding and what is left."""
+"""Parts of a contact by name, group or box: thrust and its height, pressures at the ends, sliding
+and what is left."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ K0 = SOIL.nu / (1.0 - SOIL.nu)
 
 
 def box_of_soil(comm: Any) -> tuple[Any, Any, Any]:
-    """(problem, its rest, groups): soil on a smooth rigid floor between a roller and a smooth rigid wall."""
+    """(problem, its rest, groups): soil on a smooth rigid floor between a roller and a smooth rigid
+    wall."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(B, H), divisions=(4, N)), comm)
     system = vc.with_weight(
         fem.assemble(mesh, SOIL, prescribed=fem.Prescribed(tags["left"], components=(0,)))
@@ -41,8 +43,8 @@ def row(problem: Any, state: Any, *parts: Any, **named: Any) -> dict[str, Any]:
 
 @pytest.mark.two_ranks
 def test_thrust_of_soil_at_rest(comm: Any) -> None:
-    """V2.13: K0 rho g H²/2 at H/3, on cells of height h at H/3 + h²/(6 H); pressures at the ends those of the cells
-    there. The floor carries the weight; the corner is in both."""
+    """V2.13: K0 rho g H²/2 at H/3, on cells of height h at H/3 + h²/(6 H); pressures at the ends
+    those of the cells there. The floor carries the weight; the corner is in both."""
     problem, rest, tags = box_of_soil(comm)
     h, thrust = H / N, 0.5 * K0 * RHO * G * H**2
     for where in ({"part": tags["right"]}, {"where": lambda x, n: n[:, 0] > 0.5}):
@@ -62,7 +64,8 @@ def test_thrust_of_soil_at_rest(comm: Any) -> None:
 
 
 def test_parts_that_meet_at_a_node_both_have_it(comm: Any) -> None:
-    """Boxes add up to the whole where their faces lie between nodes; one more node of thrust K0 rho g h y otherwise."""
+    """Boxes add up to the whole where their faces lie between nodes; one more node of thrust K0 rho
+    g h y otherwise."""
     problem, rest, tags = box_of_soil(comm)
     h, whole = H / N, row(problem, rest, "wall", part=tags["right"])["N_wall"]
     for shift, twice in ((0.25 * h, 0.0), (0.0, K0 * RHO * G * h * 0.5 * H)):
@@ -77,8 +80,8 @@ DOWN, ACROSS = 1e4, 2e4  # tractions on the right side and the left one [Pa]
 
 
 def test_trapezoid_under_an_eccentric_load(comm: Any) -> None:
-    """A stiff block on springs with loads on both sides: N, e and p = N/B +- N e B/(2 I), where I = B³/12 + B h²/6 of
-    springs at nodes h apart; the friction left is 1 - H/(mu N)."""
+    """A stiff block on springs with loads on both sides: N, e and p = N/B +- N e B/(2 I), where I =
+    B³/12 + B h²/6 of springs at nodes h apart; the friction left is 1 - H/(mu N)."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(WIDTH, TALL), divisions=(12, 4)), comm)
     stiff = vc.LinearElastic(E=1e13, nu=0.2, rho=RHO)
     loads = [fem.Traction(tags["right"], (0.0, -DOWN)), fem.Traction(tags["left"], (ACROSS, 0.0))]
@@ -105,7 +108,8 @@ def test_trapezoid_under_an_eccentric_load(comm: Any) -> None:
 
 @pytest.mark.serial
 def test_a_block_slides_until_its_speed_is_gone(comm: Any) -> None:
-    """v²/(2 mu g) along the floor, nothing left of the friction on the way, all of it afterwards."""
+    """v²/(2 mu g) along the floor, nothing left of the friction on the way, all of it
+    afterwards."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), comm)
     stiff = vc.LinearElastic(E=1e9, nu=0.2, rho=RHO)
     system = vc.with_weight(fem.assemble(mesh, stiff, damping=vc.Rayleigh(0.0, 2e-3)))

@@ -1,4 +1,5 @@
-"""Resultants, racking, peaks, loops and spectra without finite elements, against hand calculations."""
+"""Resultants, racking, peaks, loops and spectra without finite elements, against hand
+calculations."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ def history(geometry: Points, r_n: Any, gap: Any, r_t: Any = None) -> dict[str, 
 
 
 def test_footing() -> None:
-    """N up, T to the right, M anticlockwise about the middle; e is where N acts; the left end has lifted off."""
+    """N up, T to the right, M anticlockwise about the middle; e is where N acts; the left end has
+    lifted off."""
     rows = history(FOOTING, [[0.0, 30.0, 10.0]], [[2e-3, 0.0, 0.0]], [[0.0, 6.0, 2.0]])
     found = engineering.contact_summary(rows, FOOTING, centre=(1.0, 0.0))
     expected = {
@@ -78,7 +80,8 @@ def test_footing() -> None:
 
 
 def test_wall_thrust_and_its_height() -> None:
-    """The thrust pushes a wall on the left of its soil to the left; its height counts from the centre's level."""
+    """The thrust pushes a wall on the left of its soil to the left; its height counts from the
+    centre's level."""
     rows = history(WALL, [[5.0, 3.0, 2.0], [0.0, 0.0, 0.0]], [[0.0] * 3, [1.0] * 3])
     found = engineering.contact_summary(rows, WALL, centre=(4.0, 0.5))
     assert found["N"].tolist() == [10.0, 0.0]
@@ -93,7 +96,8 @@ def test_wall_thrust_and_its_height() -> None:
 
 
 def test_part_by_position_and_by_direction() -> None:
-    """A corner of floor and wall: each part for itself; both together need a direction of N when they cancel."""
+    """A corner of floor and wall: each part for itself; both together need a direction of N when
+    they cancel."""
     corner = Points(
         np.vstack([FOOTING.points, WALL.points]),
         np.vstack([FOOTING.normals, WALL.normals]),
@@ -151,7 +155,8 @@ def test_bad_parts_are_refused() -> None:
 
 
 def test_recorder_agrees_with_the_summary() -> None:
-    """Recorded while the chain bounces between its walls, and computed from its history afterwards."""
+    """Recorded while the chain bounces between its walls, and computed from its history
+    afterwards."""
     problem = chain_problem(
         4,
         gap=1e-3,
@@ -174,7 +179,8 @@ def test_recorder_agrees_with_the_summary() -> None:
 
 
 def test_racking_ignores_rigid_motion() -> None:
-    """gamma = du_x/dy + du_y/dx = .003 of a sheared, turned and carried rectangle; a trapezium too."""
+    """gamma = du_x/dy + du_y/dx = .003 of a sheared, turned and carried rectangle; a trapezium
+    too."""
     box = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])
     for corners in (box, box + [[0, 0], [1, 0], [-1, 0.5], [0.5, 0]]):
         gradient = np.array([[1e-3, 2e-3 - 0.01], [1e-3 + 0.01, -2e-3]])
@@ -216,7 +222,8 @@ def test_peaks_table(tmp_path: Path) -> None:
 
 
 def test_loop_work_is_its_area() -> None:
-    """x = sin, F = k x + c cos: secant stiffness k, work pi c a cycle, for a damper of the amplitude 1."""
+    """x = sin, F = k x + c cos: secant stiffness k, work pi c a cycle, for a damper of the
+    amplitude 1."""
     t = np.linspace(0.0, 2.0 * np.pi, 2001)
     history = {"t": t, "x": np.sin(t), "f": -(7.0 * np.sin(t) + 0.5 * np.cos(t))}
     loop = engineering.hysteresis(history, "x", "f", sign=-1.0)
@@ -228,7 +235,8 @@ OMEGA, ZETA = 2.0 * np.pi * 5.0, 0.05
 
 
 def oscillator(steps: int = 2000, dt: float = 2e-3) -> dict[str, Array]:
-    """A damped oscillator of 5 Hz and 5 % under a Ricker wave, until it rests: absolute and ground accelerations."""
+    """A damped oscillator of 5 Hz and 5 % under a Ricker wave, until it rests: absolute and ground
+    accelerations."""
     stiffness = 2.0 * OMEGA**2  # mass 2 kg
     problem = chain_problem(
         1,
@@ -250,7 +258,8 @@ def resting() -> dict[str, Array]:
 
 
 def test_transfer_function_of_an_oscillator(resting: dict[str, Array]) -> None:
-    """|absolute/ground| = sqrt(1 + (2 z r)²)/sqrt((1 - r²)² + (2 z r)²): 1 % up to twice its frequency, 10.05 at it."""
+    """|absolute/ground| = sqrt(1 + (2 z r)²)/sqrt((1 - r²)² + (2 z r)²): 1 % up to twice its
+    frequency, 10.05 at it."""
     frequencies = np.array([1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 10.0])
     raw = engineering.transfer_function(resting, "a_x_top", frequencies=frequencies, bandwidth=None)
     r = 2.0 * np.pi * frequencies / OMEGA
@@ -272,7 +281,8 @@ def test_transfer_function_of_an_oscillator(resting: dict[str, Array]) -> None:
 
 
 def test_floor_spectrum_and_its_frame(resting: dict[str, Array]) -> None:
-    """A stiff oscillator on the mass feels its peak absolute acceleration; relative motion is absolute less ground."""
+    """A stiff oscillator on the mass feels its peak absolute acceleration; relative motion is
+    absolute less ground."""
     periods = np.array([0.02, 1.0])
     spectrum = engineering.floor_spectrum(resting, "a_x_top", periods)
     assert spectrum.psa[0] == pytest.approx(np.abs(resting["a_x_top"]).max(), rel=0.03)
@@ -291,8 +301,8 @@ def test_floor_spectrum_and_its_frame(resting: dict[str, Array]) -> None:
 
 
 def test_velocities_know_the_jumps_of_impacts() -> None:
-    """A chain between walls: the integral of the motion from velocities ends where the velocity does, jumps included;
-    without an impact law both columns are the same motion."""
+    """A chain between walls: the integral of the motion from velocities ends where the velocity
+    does, jumps included; without an impact law both columns are the same motion."""
     for impact, same in ((vc.Inelastic(), False), (None, True)):
         problem = chain_problem(
             3,
@@ -338,7 +348,8 @@ def test_konno_ohmachi_keeps_constants_and_powers_centre() -> None:
 
 
 def test_arc_position_of_lines_and_channels() -> None:
-    """Straight: the coordinate; inclined: length; U-shaped, in any order: arc length from the top left."""
+    """Straight: the coordinate; inclined: length; U-shaped, in any order: arc length from the top
+    left."""
     place, name = arc_position(WALL.points)
     assert place.tolist() == [1.0, 2.0, 3.0] and name == "y [m]"
     place, name = arc_position(np.array([[0.0, 0.0], [3.0, 4.0], [1.5, 2.0]]))

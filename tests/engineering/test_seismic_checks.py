@@ -1,4 +1,5 @@
-"""S4.2 to S4.6: checks under earthquakes: published coefficients, exact series, an independent program."""
+"""S4.2 to S4.6: checks under earthquakes: published coefficients, exact series, an independent
+program."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ T = np.arange(2001) * 0.005
 
 
 def run(acceleration: Any, **columns: Any) -> dict[str, Any]:
-    """A wall that is pressed by 1e5 N at 4 m and 2e4 N at 6 m for each m/s²; ``columns`` come in their place."""
+    """A wall that is pressed by 1e5 N at 4 m and 2e4 N at 6 m for each m/s²; ``columns`` come in
+    their place."""
     a = np.asarray(acceleration, dtype=float)
     thrust = 1e5 + 2e4 * a
     return {
@@ -48,8 +50,8 @@ def run(acceleration: Any, **columns: Any) -> dict[str, Any]:
 
 
 def test_mononobe_okabe_of_tables() -> None:
-    """K_AE of (30°, 15°) and (35°, 17.5°) for kh = 0 … 0.3 as tabulated to four digits; K of EN 1998-5, annex E, by a
-    calculator of its own (phi 30°, tan psi = 0.24/1.12: 0.4856177)."""
+    """K_AE of (30°, 15°) and (35°, 17.5°) for kh = 0 … 0.3 as tabulated to four digits; K of EN
+    1998-5, annex E, by a calculator of its own (phi 30°, tan psi = 0.24/1.12: 0.4856177)."""
     table = {
         (30.0, 15.0): (0.3014, 0.3679, 0.4520, 0.5626),
         (35.0, 17.5): (0.2461, 0.3056, 0.3797, 0.4743),
@@ -65,7 +67,8 @@ def test_mononobe_okabe_of_tables() -> None:
 
 
 def test_mononobe_okabe_in_a_run() -> None:
-    """The largest thrust of the run is compared; without earthquake it is Coulomb's; kv lightens and turns."""
+    """The largest thrust of the run is compared; without earthquake it is Coulomb's; kv lightens
+    and turns."""
     history = run(0.2 * G * np.sin(T))
     given = MononobeOkabe(**WALL, phi=30.0 * DEGREE, delta=15.0 * DEGREE, kh=0.3).compare(history)
     assert given.expected == pytest.approx(
@@ -82,8 +85,9 @@ def test_mononobe_okabe_in_a_run() -> None:
 
 
 def mode(nu: float, k: float) -> tuple[float, float]:
-    """(shear, vertical stress) on the rock, G = H = 1, of u = U sin k x, v = V cos k x under a unit force -sin k x:
-    shares of exp(±k y), y exp(±k y) that satisfy equilibrium, from u = v = 0 below and no stresses above."""
+    """(shear, vertical stress) on the rock, G = H = 1, of u = U sin k x, v = V cos k x under a unit
+    force -sin k x: shares of exp(±k y), y exp(±k y) that satisfy equilibrium, from u = v = 0 below
+    and no stresses above."""
     lam = 2.0 * nu / (1.0 - 2.0 * nu)
     stiff, d = lam + 2.0, (3.0 - 4.0 * nu) / k
     s, linear = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([0.0, 1.0, 0.0, 1.0])
@@ -102,7 +106,8 @@ def mode(nu: float, k: float) -> tuple[float, float]:
 
 
 def test_smooth_wall_in_equilibrium() -> None:
-    """The closed sums are those of modes whose shares are solved for: to round-off, for any nu and distance."""
+    """The closed sums are those of modes whose shares are solved for: to round-off, for any nu and
+    distance."""
     for nu, length in ((0.0, 20.0), (0.3, 2.0), (0.45, 5.0)):
         n = 2.0 * np.arange(1, 201) - 1.0
         k = n * np.pi / length
@@ -117,7 +122,8 @@ def test_smooth_wall_in_equilibrium() -> None:
 
 
 def test_smooth_wall_is_the_published_one() -> None:
-    """Thrust and height of finite elements that were published to 0.2 % and three digits; few terms are enough."""
+    """Thrust and height of finite elements that were published to 0.2 % and three digits; few terms
+    are enough."""
     for nu, thrust, height in ((0.3, 0.960, 0.576), (1 / 3, 0.987, 0.572), (0.4, 1.049, 0.564)):
         assert smooth_wall(nu, 20.0) == pytest.approx((thrust, height), rel=4e-3)
     exact = smooth_wall(0.3, 20.0, 32000)
@@ -166,8 +172,8 @@ def test_wood_of_slow_motions_only() -> None:
 
 
 def test_veletsos_and_younan() -> None:
-    """Slow: their static thrust and height; steady harmonics: the sum of moduli in closed form, at half of the lowest
-    frequency and at one and a half of it."""
+    """Slow: their static thrust and height; steady harmonics: the sum of moduli in closed form, at
+    half of the lowest frequency and at one and a half of it."""
     slow = run(2.0 * np.sin(0.1 * np.pi * T) ** 2)
     static = RigidWall(10.0, 1900.0, 0.3)
     found = VeletsosYounan(**LAYER).compare(slow)
@@ -198,7 +204,8 @@ def block(acceleration: Any, **fields: Any) -> float:
 
 
 def test_newmark_of_a_pulse_and_of_a_record() -> None:
-    """The printed 0.4905 m of 0.4 g for 0.5 s, mu = 0.2 (g = 9.81); a noise as solved exactly in pieces."""
+    """The printed 0.4905 m of 0.4 g for 0.5 s, mu = 0.2 (g = 9.81); a noise as solved exactly in
+    pieces."""
     t = np.array([0.0, 0.5, 0.5, 2.0])
     a = 0.4 * 9.81 * (t < 0.6) * np.array([1, 1, 0, 0])
     history = {"t": t, "a_g_x": a, "a_g_y": 0 * t, "sliding_base": 3.0 + t}
@@ -239,8 +246,9 @@ def test_newmark_on_a_slope() -> None:
 
 
 def test_newmark_slides_to_the_side_that_is_named() -> None:
-    """Mirrored motions, planes and sides slide alike; the pulse of 0.4 g to +x takes a wall whose fill is on its right
-    0.4905 m to -x, and one on a plane that falls by nothing to +x, not at all; a plane that falls to either side."""
+    """Mirrored motions, planes and sides slide alike; the pulse of 0.4 g to +x takes a wall whose
+    fill is on its right 0.4905 m to -x, and one on a plane that falls by nothing to +x, not at all;
+    a plane that falls to either side."""
     noise = 8.0 * np.convolve(
         np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same"
     )
@@ -282,7 +290,8 @@ def test_newmark_slides_to_the_side_that_is_named() -> None:
 def rocking(
     check: Housner, a: Any, theta: float, end: float, up: float = 0.0
 ) -> tuple[float, float]:
-    """(the largest angle, the time of the first impact) by an integrator that finds the landings itself."""
+    """(the largest angle, the time of the first impact) by an integrator that finds the landings
+    itself."""
     alpha, p2 = (
         math.atan(check.width / check.height),
         1.5 * G / math.hypot(check.width, check.height),
@@ -308,8 +317,8 @@ def rocking(
 
 
 def test_housner_free_and_shaken() -> None:
-    """Against an integrator with events: free rocking and a block released under a harmonic; 0.1 % of angle and time.
-    A slender block has the closed form of the first landing to 0.2 %."""
+    """Against an integrator with events: free rocking and a block released under a harmonic; 0.1 %
+    of angle and time. A slender block has the closed form of the first landing to 0.2 %."""
     check = {"width": 1.0, "height": 5.0}
     for amplitude, theta in ((0.0, 0.1), (1.2, 0.05)):
         motion = amplitude * np.sin(3.0 * T)
@@ -340,7 +349,8 @@ def test_housner_free_and_shaken() -> None:
 
 
 def test_housner_on_ground_that_rises_or_falls() -> None:
-    """A released block under a steady vertical acceleration, as an integrator with events has it."""
+    """A released block under a steady vertical acceleration, as an integrator with events has
+    it."""
     check = {"width": 1.0, "height": 5.0}
     history = {"t": T, "a_g_x": 0.8 * np.sin(3.0 * T), "theta_base": np.where(T < 1.0, 0.05, -0.02)}
     for up in (-2.0, 2.0):
@@ -361,7 +371,8 @@ def test_housner_on_ground_that_rises_or_falls() -> None:
 
 
 def test_housner_where_it_does_not_apply() -> None:
-    """Onset at g b/h; a pulse a little longer than the closed form overturns the block, a shorter one does not."""
+    """Onset at g b/h; a pulse a little longer than the closed form overturns the block, a shorter
+    one does not."""
     check = {"width": 0.4, "height": 4.0}
     slender = HousnerBlock(0.4, 4.0, G)
 
@@ -398,7 +409,8 @@ BOX = {
 
 
 def test_racking_of_a_run() -> None:
-    """The example of F = 2.565 (G = 42.75 MPa, members of 0.4 m); the largest changes of racking since the start."""
+    """The example of F = 2.565 (G = 42.75 MPa, members of 0.4 m); the largest changes of racking
+    since the start."""
     stiff = 30e9 / (1.0 - 0.2**2) * 0.4**3 / 12.0
     box = BOX | dict.fromkeys(("wall", "roof", "invert"), stiff)
     history = {"racking_box": 0.1 + 1.6e-3 * np.sin(T), "racking_free_field": 1e-3 * np.sin(T)}

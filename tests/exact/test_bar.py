@@ -55,7 +55,8 @@ def test_thrown_bar_is_a_free_bar_under_its_contact_force():
     ],
 )
 def test_bar_obeys_its_equations(bar, length, E, rho, until):
-    """V1.1, V1.3: wave equation, derivatives, force = -E strain at the foot, complementarity, energy."""
+    """V1.1, V1.3: wave equation, derivatives, force = -E strain at the foot, complementarity,
+    energy."""
     c = (E / rho) ** 0.5
     x, t = length * (0.1 + 0.8 * RANDOM.random(2000)), until * (0.1 + 0.8 * RANDOM.random(2000))
     top = np.abs(bar.displacement(x, t)).max()

@@ -58,7 +58,8 @@ def test_modal_form():
 
 
 def test_release_after_the_first_impact():
-    """V1.2: uniform velocity v0, strain -2g(L-x)/c², stored energy 74.074, impulse 266.6667 twice."""
+    """V1.2: uniform velocity v0, strain -2g(L-x)/c², stored energy 74.074, impulse 266.6667
+    twice."""
     x = (np.arange(1000) + 0.5) / 100.0
     t2 = 5 / 3
     assert BAR.velocity(x, t2) == pytest.approx(np.full(1000, V0), rel=1e-12)
@@ -71,7 +72,8 @@ def test_release_after_the_first_impact():
 
 @pytest.mark.parametrize("height", [5.0, 4.1, 1.7, 0.3, 0.0])
 def test_bar_obeys_its_equations(height):
-    """V1.2 for integer and other ratios of the times, and for a bar put on the wall: equations, contact, energy."""
+    """V1.2 for integer and other ratios of the times, and for a bar put on the wall: equations,
+    contact, energy."""
     bar = BouncingBar(height=height)
     until = 6.0
     x, t = LENGTH * (0.1 + 0.8 * RANDOM.random(2000)), until * (0.1 + 0.8 * RANDOM.random(2000))

@@ -20,7 +20,8 @@ CELLS = (np.arange(20000) + 0.5)[:, np.newaxis] / 20000
 
 
 def test_bars_of_the_same_material():
-    """V1.4: p = rho c v0/2, duration 2 L1/c, bar 1 stops, bar 2 moves with v0 L1/L2, e = L1/L2; longer striker too."""
+    """V1.4: p = rho c v0/2, duration 2 L1/c, bar 1 stops, bar 2 moves with v0 L1/L2, e = L1/L2;
+    longer striker too."""
     bars = TwoBars(length1=1.0, length2=2.0)
     assert (bars.pressure, bars.duration, bars.velocity1, bars.velocity2, bars.restitution) == (
         0.5,
@@ -54,8 +55,8 @@ def test_bars_of_two_materials():
 def lattice_collision(bars, n1):
     """Impulse, duration, mean velocities: explicit steps at the exact limit of lumped chains.
 
-    Both chains have cells of one step's travel, where the lumped scheme moves waves exactly; the end nodes share one
-    velocity while they push, then part for good.
+    Both chains have cells of one step's travel, where the lumped scheme moves waves exactly; the
+    end nodes share one velocity while they push, then part for good.
     """
     dt = bars.length1 / bars.c1 / n1
     sides = ((n1, bars.z1, bars.speed), (round(bars.length2 / bars.c2 / dt), bars.z2, 0.0))
@@ -110,7 +111,8 @@ def test_oblique_impact_that_sticks():
 
 @pytest.mark.parametrize("nu", [0.0, 0.3])
 def test_oblique_impact_obeys_its_equations(nu):
-    """V1.5: two wave equations, velocities, energy before and after, traction = shear stress of the base."""
+    """V1.5: two wave equations, velocities, energy before and after, traction = shear stress of the
+    base."""
     material = LinearElastic(E=2.0, nu=nu, rho=1.3)
     column = ObliqueImpact(height=1.5, material=material, speed_n=1.0, speed_t=1.0, mu=0.3)
     y, t = 1.5 * (0.1 + 0.8 * RANDOM.random(1000)), 0.2 + 7.0 * RANDOM.random(1000)

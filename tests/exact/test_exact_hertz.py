@@ -1,4 +1,5 @@
-"""Hertz contact, punches and the quasi-static impact: V2.3, V2.5, V3.3 and the integral equations of the half-space."""
+"""Hertz contact, punches and the quasi-static impact: V2.3, V2.5, V3.3 and the integral equations
+of the half-space."""
 
 import math
 
@@ -47,7 +48,8 @@ def test_points_numbers():
 
 
 def test_line_pressure_bends_the_half_plane_to_the_cylinder():
-    """V2.3: integral of p is P; Flamant: u(x) - u(0) = -2/(pi E*) integral of p(s) ln|(x - s)/s| is -x²/(2R)."""
+    """V2.3: integral of p is P; Flamant: u(x) - u(0) = -2/(pi E*) integral of p(s) ln|(x - s)/s| is
+    -x²/(2R)."""
     line = HertzLine(0.02, RIGID_PLANE, 1.0)
     a = line.half_width
     assert quad(line.pressure, -a, a, epsabs=0.0)[0] == pytest.approx(line.force, rel=1e-6)

@@ -94,7 +94,8 @@ def test_energy_lost_in_impacts():
 
 
 def test_overturning_pulse():
-    """V3.1: 0.409014 s for A = 1.5; Housner's cosh form; just shorter and just longer pulses integrated in time."""
+    """V3.1: 0.409014 s for A = 1.5; Housner's cosh form; just shorter and just longer pulses
+    integrated in time."""
     g_alpha = 9.81 * ALPHA
     assert BLOCK.overturning_time(1.5 * g_alpha) == pytest.approx(0.409014, abs=5e-7)
     for A in (1.1, 1.5, 4.0):
@@ -104,7 +105,8 @@ def test_overturning_pulse():
 
 
 def overturns(A, t1):
-    """Whether phi'' = p²(phi - 1 + A [t < t1]) from rest reaches 1 before it returns to 0 (slender block)."""
+    """Whether phi'' = p²(phi - 1 + A [t < t1]) from rest reaches 1 before it returns to 0 (slender
+    block)."""
 
     def rate(t, y, push):
         return y[1], BLOCK.p**2 * (y[0] - 1.0 + push)

@@ -132,14 +132,16 @@ def test_a_lining_without_stiffness_is_a_hole(slip: bool):
 
 
 def test_a_lining_of_soil_is_no_lining():
-    """Tied and of the ground's own material around a tiny hole: the ground's own shear, dD = gamma D/2."""
+    """Tied and of the ground's own material around a tiny hole: the ground's own shear, dD = gamma
+    D/2."""
     whole = ThickLining(1e-3, 3.0, SOIL, SOIL, slip=False)
     assert whole.diameter_change(GAMMA) == pytest.approx(0.5 * GAMMA * 6.0, rel=1e-5)
     assert whole.pressure(GAMMA) == pytest.approx(SOIL.shear_modulus * GAMMA, rel=1e-5)
 
 
 def test_thick_lining_is_in_equilibrium():
-    """(r sigma_r)' - sigma_theta + 2 tau = 0 for fields cos 2 theta, sin 2 theta; the inside is free."""
+    """(r sigma_r)' - sigma_theta + 2 tau = 0 for fields cos 2 theta, sin 2 theta; the inside is
+    free."""
     lining = ThickLining(2.7, 3.0, CONCRETE, SOIL)
     r, h = 2.85, 1e-4
     slope = (

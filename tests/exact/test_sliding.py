@@ -32,7 +32,8 @@ def test_weak_pulse_moves_nothing():
 
 
 def harmonic(steps):
-    """u at t = 1/2, 1, ... 4 for a = 3 sin 2 pi t, mu g = 1.5, sampled `steps` times per half second."""
+    """u at t = 1/2, 1, ... 4 for a = 3 sin 2 pi t, mu g = 1.5, sampled `steps` times per half
+    second."""
     t = np.linspace(0.0, 4.0, 8 * steps + 1)
     return SlidingBlock(mu=0.15, gravity=10.0).history(t, 3.0 * np.sin(2.0 * math.pi * t))[0][
         steps::steps
@@ -40,7 +41,8 @@ def harmonic(steps):
 
 
 def test_harmonic_base():
-    """V3.2: seven digits from closed pieces (sines joined at roots), which the printed ones meet within 3e-6.
+    """V3.2: seven digits from closed pieces (sines joined at roots), which the printed ones meet
+    within 3e-6.
 
     Printed: -0.080077, -0.017956, -0.080767, -0.018030, then -0.080774/-0.018030.
     """
@@ -81,7 +83,8 @@ def test_ramp_onto_the_threshold():
 
 
 def test_refinement_changes_nothing():
-    """Exact for piecewise linear acceleration: points added in between change nothing, nor without friction."""
+    """Exact for piecewise linear acceleration: points added in between change nothing, nor without
+    friction."""
     random = np.random.default_rng(3)
     t, a = np.arange(60) * 0.1, 8.0 * random.standard_normal(60)
     dense = np.sort(np.concatenate([t, 5.9 * random.random(500)]))

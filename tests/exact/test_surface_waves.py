@@ -1,4 +1,5 @@
-"""Closed forms of waves in soil: layers, Rayleigh waves, dashpots (V8.1, V8.2, V8.3), and their column of elements."""
+"""Closed forms of waves in soil: layers, Rayleigh waves, dashpots (V8.1, V8.2, V8.3), and their
+column of elements."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ def test_dashpots_at_right_angles():
 
 
 def test_rayleigh_waves():
-    """V8.3: printed digits; seed 003's speed of steel; the motion at the surface leaves it free of stress."""
+    """V8.3: printed digits; seed 003's speed of steel; the motion at the surface leaves it free of
+    stress."""
     for nu, ratio in (
         (0.0, 0.874032),
         (0.1, 0.893106),
@@ -116,7 +118,8 @@ def harmonic_amplitude(values, t, f):
 
 @pytest.mark.parametrize("f", [1.0, 2.0])
 def test_the_column_answers_like_the_layer(f):
-    """V8.2 with stiffness damping, 5 % at this frequency, 30 elements, steady state: 1 %, and 0.5 % of its own k*."""
+    """V8.2 with stiffness damping, 5 % at this frequency, 30 elements, steady state: 1 %, and 0.5 %
+    of its own k*."""
     beta = 0.05 / (np.pi * f)
     column = column_of(SOIL, np.linspace(0.0, 30.0, 31), beta=beta)
     shake = vc.Harmonic(1.0, f)
@@ -133,7 +136,8 @@ def test_the_column_answers_like_the_layer(f):
 
 @pytest.mark.parametrize("speed, peak", [(1000.0, 3.141), (2000.0, 5.041)])
 def test_the_column_on_rock_answers_like_the_layer(speed, peak):
-    """Seismic practice 3.2: largest amplification of an outcrop motion, 20 m on two rocks, damping 5 % there: 1 %."""
+    """Seismic practice 3.2: largest amplification of an outcrop motion, 20 m on two rocks, damping
+    5 % there: 1 %."""
     soil = vc.LinearElastic.from_wave_speeds(600.0, 300.0, 2000.0)
     rock = vc.LinearElastic.from_wave_speeds(2.0 * speed, speed, 2500.0)
     layer, fine = SoilLayer(20.0, soil, xi=0.05), np.linspace(2.0, 5.0, 601)
@@ -150,7 +154,8 @@ def test_the_column_on_rock_answers_like_the_layer(speed, peak):
 
 
 def test_upgoing_velocity():
-    """Half the integral of a record, exact between its samples; all of it when it is upgoing already."""
+    """Half the integral of a record, exact between its samples; all of it when it is upgoing
+    already."""
     record = Record(np.array([0.0, 2.0, -1.0, 0.0]), 0.1)
     half, whole = upgoing(record, direction=(0.0, 2.0)), upgoing(record, outcrop=False)
     assert half(0.0).tolist() == [0.0, 0.0] and half(-1.0).tolist() == [0.0, 0.0]

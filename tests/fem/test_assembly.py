@@ -1,4 +1,5 @@
-"""Assembly: masses, stiffnesses and damping against exact values in 1D, 2D and 3D; floating bodies; static stages."""
+"""Assembly: masses, stiffnesses and damping against exact values in 1D, 2D and 3D; floating bodies;
+static stages."""
 
 from __future__ import annotations
 
@@ -48,13 +49,15 @@ def rotations(d: int) -> list:
     return turns
 
 
-# Mass and stiffness ---------------------------------------------------------------------------------------------------
+# Mass and stiffness
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 @bodies
 def test_rigid_modes_have_no_strain_energy(name):
-    """K r = 0 for every translation and rotation, relative to the forces that single entries of K would make."""
+    """K r = 0 for every translation and rotation, relative to the forces that single entries of K
+    would make."""
     system = free_body(name)
     d = system.space.dimension
     modes = [nodal(system, lambda x, i=i: np.tile(np.eye(d)[i], (len(x), 1))) for i in range(d)]
@@ -67,7 +70,8 @@ def test_rigid_modes_have_no_strain_energy(name):
 
 @bodies
 def test_mass_of_rigid_motions(name):
-    """½ rᵀMr: the whole mass in translation, the exact moment of inertia in rotation (linear fields are exact)."""
+    """½ rᵀMr: the whole mass in translation, the exact moment of inertia in rotation (linear fields
+    are exact)."""
     system = free_body(name)
     d = system.space.dimension
     lengths = np.array(BODIES[name]["lengths"])
@@ -93,7 +97,8 @@ def test_mass_of_rigid_motions(name):
     "section, thickness", [(PlaneStress(0.2), 0.2), (PlaneStrain(3.0), 3.0), (None, 1.0)]
 )
 def test_thickness_multiplies_all_integrals(section, thickness):
-    """M, K, C and loads of a section are its thickness times those of unit thickness; plane strain is the default."""
+    """M, K, C and loads of a section are its thickness times those of unit thickness; plane strain
+    is the default."""
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
     unit = PlaneStress(1.0) if isinstance(section, PlaneStress) else PlaneStrain(1.0)
     data = {
@@ -116,7 +121,8 @@ def test_thickness_multiplies_all_integrals(section, thickness):
     [("stress", (3.0, 0.5)), ("strain", (3.0, 0.5)), ("solid", (3.0, 0.5, 0.4)), ("bar", (3.0,))],
 )
 def test_uniaxial_bar(section, lengths, simplices):
-    """u = sigma x / E', lateral contraction nu' y, rollers on the sides at zero (exact, it is linear).
+    """u = sigma x / E', lateral contraction nu' y, rollers on the sides at zero (exact, it is
+    linear).
 
     E' = E in plane stress and in 3D, E/(1 - nu²) in plane strain, lambda + 2 mu in 1D.
     """
@@ -144,7 +150,8 @@ def test_uniaxial_bar(section, lengths, simplices):
 
 @pytest.mark.two_ranks
 def test_two_materials_in_series():
-    """Two halves of a bar share the stress; their elongations and masses add. Cells are chosen by position."""
+    """Two halves of a bar share the stress; their elongations and masses add. Cells are chosen by
+    position."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     soft, hard = (
         LinearElastic(E=1.0e9, nu=0.0, rho=1000.0),
@@ -170,7 +177,8 @@ def test_two_materials_in_series():
         assemble(mesh, halves[:1])
 
 
-# Damping --------------------------------------------------------------------------------------------------------------
+# Damping
+# --------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -192,7 +200,8 @@ def test_mass_proportional_damping_is_a_force_per_volume():
     assert free_body("hexahedra").C is None
 
 
-# Static and gravity stages --------------------------------------------------------------------------------------------
+# Static and gravity stages
+# --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -238,7 +247,8 @@ def test_floating_in_space(sides, floating):
 
 
 def test_static_stage_is_the_start_of_an_equilibrium():
-    """A clamped block under its weight, without contact: the dynamic stage that continues stays still."""
+    """A clamped block under its weight, without contact: the dynamic stage that continues stays
+    still."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3, 5))
     weight = BodyForce((0.0, -CONCRETE.rho * 9.80665))
     problem = linear(
@@ -254,7 +264,8 @@ def test_static_stage_is_the_start_of_an_equilibrium():
 
 
 def test_assemble_stays_a_function() -> None:
-    """``fem.assemble`` is the function also after its module was imported: they must not share a name."""
+    """``fem.assemble`` is the function also after its module was imported: they must not share a
+    name."""
     assert callable(fem.assemble)
     assert all(callable(getattr(fem, name)) for name in fem.__all__)
 

@@ -1,4 +1,5 @@
-"""Pressures of nodes of a contact boundary without a condition: the order of convergence of the contact pressure."""
+"""Pressures of nodes of a contact boundary without a condition: the order of convergence of the
+contact pressure."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ E, A, B = 1e9, 1e-3, 1e-3
 
 
 def lowering(x: Any, t: float) -> Any:
-    """u = (0, -(A + B x) y): with nu = 0 the pressure at y = 0 is E (A + B x), and there is no shear."""
+    """u = (0, -(A + B x) y): with nu = 0 the pressure at y = 0 is E (A + B x), and there is no
+    shear."""
     return np.column_stack([0.0 * x[:, 0], -(A + B * x[:, 0]) * x[:, 1]])
 
 
@@ -49,14 +51,16 @@ def error(n: int) -> float:
 
 
 def test_order_of_the_contact_pressure_beside_held_nodes():
-    """At both ends the neighbour's value is off by E B h, on one facet: sqrt(2 h / 3) E B h. Zero there has order ½."""
+    """At both ends the neighbour's value is off by E B h, on one facet: sqrt(2 h / 3) E B h. Zero
+    there has order ½."""
     found = [error(n) for n in (4, 8, 16)]
     exact = [np.sqrt(2.0 / 3.0 / n) * E * B / n for n in (4, 8, 16)]
     assert found == pytest.approx(exact, rel=1e-6)
 
 
 def test_nodes_beyond_the_edge_of_the_other_side_have_the_pressure_of_their_neighbours():
-    """Uniform pressure on ground that is side 1, with the ends of the block a tenth of a facet beyond nodes."""
+    """Uniform pressure on ground that is side 1, with the ends of the block a tenth of a facet
+    beyond nodes."""
     lower = BlockMesh(lengths=(2.0, 0.5), divisions=(20, 5))
     upper = BlockMesh(lengths=(1.02, 1.0), divisions=(23, 6))
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(0.49,)), COMM)

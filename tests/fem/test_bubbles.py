@@ -1,7 +1,9 @@
-"""Contact of tetrahedra of second order: conditions at vertices with the mean bubbles of edges in them.
+"""Contact of tetrahedra of second order: conditions at vertices with the mean bubbles of edges in
+them.
 
-Shares of bubbles on flat and curved facets, patch tests with one body, at a corner and between two, sticking and
-sliding, turned bodies, moved supports, thrown bodies with friction, the same on any number of ranks.
+Shares of bubbles on flat and curved facets, patch tests with one body, at a corner and between two,
+sticking and sliding, turned bodies, moved supports, thrown bodies with friction, the same on any
+number of ranks.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ curved = pytest.mark.parametrize("curved", [False, True], ids=["straight", "curv
 
 @pytest.mark.two_ranks
 def test_the_shares_of_bubbles_on_flat_and_curved_facets() -> None:
-    """A/5 for the edges at a vertex, -A/15 for the other; their sum over vertices is ∫ b_k on any facet."""
+    """A/5 for the edges at a vertex, -A/15 for the other; their sum over vertices is ∫ b_k on any
+    facet."""
     corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.3, 0.1], [0.4, 1.0, -0.2]])
     flat = np.concatenate([corners, corners[OTHERS].mean(axis=1)])[None]
     area = 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
@@ -71,7 +74,8 @@ def test_the_shares_of_bubbles_on_flat_and_curved_facets() -> None:
 
 
 def sheared(x: Array) -> Array:
-    """Displacements under sigma_yy = -P and sigma_xy = MU P without Poisson's effect, zero at y = 0."""
+    """Displacements under sigma_yy = -P and sigma_xy = MU P without Poisson's effect, zero at y =
+    0."""
     return np.column_stack(
         [2.0 * MU * P / STIFF.E * x[:, 1], -P / STIFF.E * x[:, 1], np.zeros(len(x))]
     )
@@ -118,7 +122,8 @@ def at_rest(
     slip: float,
     tolerance: float,
 ) -> tuple[vc.ContactProblem, vc.State]:
-    """The equilibrium: its pressure and shear are uniform to 1e-10, its slip is this to the tolerance."""
+    """The equilibrium: its pressure and shear are uniform to 1e-10, its slip is this to the
+    tolerance."""
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(limit))
     state = vc.static_equilibrium(problem, tolerance=1e-13)
     assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
@@ -136,7 +141,8 @@ def at_rest(
 @curved
 @pytest.mark.parametrize("limit", [2.0 * MU, MU], ids=["sticks", "slides"])
 def test_pressure_and_shear_are_exact_with_friction(curved: bool, limit: float) -> None:
-    """A block under uniform pressure and shear, its top moved along: below Coulomb's limit and just at it."""
+    """A block under uniform pressure and shear, its top moved along: below Coulomb's limit and just
+    at it."""
     slip = 0.0 if limit > MU else 0.01
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", curved), COMM)
     top = float(sheared(np.array([[0.0, 1.5, 0.0]]))[0, 0]) + slip
@@ -155,7 +161,8 @@ def test_pressure_and_shear_are_exact_with_friction(curved: bool, limit: float) 
 
 
 def bent_bodies(x: Array) -> Array:
-    """Bend two blocks of heights 1 on one another inside, the sides and the interface stay where they are."""
+    """Bend two blocks of heights 1 on one another inside, the sides and the interface stay where
+    they are."""
     bump = np.prod(np.sin(np.pi * x / np.array([1.5, 1.0, 1.2])), axis=1)
     return x + 0.06 * bump[:, None] * np.array([1.0, -0.7, 0.5])
 
@@ -217,7 +224,8 @@ def test_a_corner_carries_the_pressure_of_both_faces() -> None:
 
 @pytest.mark.serial
 def test_turning_everything_changes_nothing() -> None:
-    """A block pressed obliquely onto a half-space with friction, and the same turned in space: equal reactions."""
+    """A block pressed obliquely onto a half-space with friction, and the same turned in space:
+    equal reactions."""
     turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
     turn *= np.linalg.det(turn)
     reactions = []
@@ -237,7 +245,8 @@ def test_turning_everything_changes_nothing() -> None:
 
 @pytest.mark.two_ranks
 def test_moved_supports_move_the_conditions_beside_them() -> None:
-    """A side that is moved along the ground takes the free body with it: every condition slips by as much."""
+    """A side that is moved along the ground takes the free body with it: every condition slips by
+    as much."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
     way = np.array([0.02, 0.01])
     held = fem.Prescribed(tags["left"], displacement=(way[0], 0.0, way[1]), components=(0, 2))
@@ -284,7 +293,8 @@ def test_a_thrown_block_keeps_its_energy_on_any_number_of_ranks() -> None:
 
 
 def test_a_tied_layer_carries_the_same_along_it_on_any_number_of_ranks() -> None:
-    """A layer hung over a plane that it presses, tied and pulled along x: reactions that depend on y alone."""
+    """A layer hung over a plane that it presses, tied and pulled along x: reactions that depend on
+    y alone."""
     found = []
     for comm in (COMM, MPI.COMM_SELF):
         mesh = dolfinx.mesh.create_box(comm, [np.zeros(3), np.array([2.0, 1.0, 1.0])], [4, 3, 3])
@@ -315,7 +325,8 @@ def test_a_tied_layer_carries_the_same_along_it_on_any_number_of_ranks() -> None
 
 @pytest.mark.serial
 def test_mass_of_rigid_motions_is_kept() -> None:
-    """Redistributed mass has the total mass, centre and inertia of the body and none at the contact nodes."""
+    """Redistributed mass has the total mass, centre and inertia of the body and none at the contact
+    nodes."""
     problem = thrown_block(COMM)
     system, equations = problem.system, problem.equations
     x = system.space.points - np.array([1.0, 0.75, 0.6])
@@ -361,8 +372,9 @@ def test_two_thrown_blocks_keep_momentum_and_energy() -> None:
 @pytest.mark.slow
 @pytest.mark.serial  # blocks and layers above are the same on any number of ranks
 def test_a_sphere_of_curved_cells_on_a_plane() -> None:
-    """Hertz: P2 tetrahedra with their mid-points on the sphere, 2 and 3 cells across the contact's half-width; in the
-    mean over three approaches the force is 7 % and 4 % too small, the pressures are 21 % and 14 % off in L2."""
+    """Hertz: P2 tetrahedra with their mid-points on the sphere, 2 and 3 cells across the contact's
+    half-width; in the mean over three approaches the force is 7 % and 4 % too small, the pressures
+    are 21 % and 14 % off in L2."""
     errors = []
     for cells in (2.0, 3.0):
         caps = Caps(
@@ -422,7 +434,8 @@ def test_wrong_uses_are_refused() -> None:
 
 @pytest.mark.serial
 def test_fields_have_the_pressure_at_all_nodes_of_the_contact(tmp_path: Any) -> None:
-    """Vertices have that of their condition, mid-points the mean of two; the Function is the same."""
+    """Vertices have that of their condition, mid-points the mean of two; the Function is the
+    same."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
     system = fem.assemble(mesh, SOFT, loads=fem.Traction(tags["top"], (0.0, -P, 0.0)), degree=2)
     problem = vc.ContactProblem(

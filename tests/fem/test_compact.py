@@ -1,4 +1,5 @@
-"""Compact matrices of large bodies: what AIJ holds, and the steps that go with it, in any basis and on any ranks."""
+"""Compact matrices of large bodies: what AIJ holds, and the steps that go with it, in any basis and
+on any ranks."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ def pair() -> vc.ContactProblem:
 
 
 def shaken() -> vc.ContactProblem:
-    """A block between a roller and a moving top: nodes with some of their components, and the pull of the top."""
+    """A block between a roller and a moving top: nodes with some of their components, and the pull
+    of the top."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0, 1.0), divisions=(3, 5, 3))
     top = fem.Prescribed(tags["top"], lambda x, t: np.full_like(x, -1e-3 * np.sin(40.0 * t)))
     system = fem.assemble(
@@ -80,7 +82,8 @@ def alike(one: Any, two: Any) -> bool:
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_matrices(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """M, C, K and A in every basis: products, diagonals, rows, and the whole when it is asked for."""
+    """M, C, K and A in every basis: products, diagonals, rows, and the whole when it is asked
+    for."""
     plain, packed = both(name, monkeypatch)
     x = probe(np.asarray(plain.system.space.ids), 0)
     rows = np.flatnonzero(np.arange(len(x)) % 5 == 0)

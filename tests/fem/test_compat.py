@@ -90,6 +90,7 @@ def _raise(error):
 
 
 def test_waiting_for_another_process_that_compiles_has_patience():
-    """A form takes seconds to compile, on a machine with eight other processes five times as many."""
+    """A form takes seconds to compile, on a machine with eight other processes five times as
+    many."""
     options = getattr(dolfinx.jit, "get_options", None) or dolfinx.jit.get_parameters
     assert options()["timeout"] >= 100

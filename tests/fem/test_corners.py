@@ -1,4 +1,5 @@
-"""Contact boundaries that turn: one condition for every face of a node, at any angle between the faces (V2.8)."""
+"""Contact boundaries that turn: one condition for every face of a node, at any angle between the
+faces (V2.8)."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ SIDES = ("left", "bottom", "right", "top", "back", "front")
 
 
 def trapezoid(x: Array) -> Array:
-    """Of a 3 x 1 rectangle: base 3, sides at 60 degrees. The boundary turns by 120 degrees below, by 60 above."""
+    """Of a 3 x 1 rectangle: base 3, sides at 60 degrees. The boundary turns by 120 degrees below,
+    by 60 above."""
     return np.column_stack([x[:, 0] + (1.0 - x[:, 0] / 1.5) * x[:, 1] / np.sqrt(3.0), x[:, 1]])
 
 
@@ -109,13 +111,15 @@ def same(one: ContactSurface, other: ContactSurface) -> None:
         )
 
 
-# One group is as many groups as it has faces --------------------------------------------------------------------------
+# One group is as many groups as it has faces
+# --------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", on_ranks(BODIES, "turned trapezoid", "leaning tetrahedra"))
 def test_one_group_is_a_group_for_each_face(name):
-    """All sides of a body as one group and as four (six), joined: nodes, normals, weights, 2 (3) of each at corners."""
+    """All sides of a body as one group and as four (six), joined: nodes, normals, weights, 2 (3) of
+    each at corners."""
     system, tags = body(name)
     sides = sides_of(name)
     one = fem.contact_surface(system, group(tags, *sides))
@@ -130,7 +134,8 @@ def test_one_group_is_a_group_for_each_face(name):
 
 
 def thrown(name: str, surface_of: Any, **how: Any) -> tuple[ContactSurface, Array, Array, Array]:
-    """(surface, r_n and active of every step, last u along the axes) of a body thrown about in a box 1 mm wider."""
+    """(surface, r_n and active of every step, last u along the axes) of a body thrown about in a
+    box 1 mm wider."""
     near = vc.AnalyticGap(lambda x: np.full(len(x), 1e-3))
     d = len(BODIES[name]["lengths"])
     speed = np.array([-1.0, -2.0, 0.7])[:d]
@@ -195,7 +200,8 @@ def test_a_turned_corner_is_the_same(scheme):
 
 @pytest.mark.serial
 def test_mirror_symmetry_of_an_oblique_wall():
-    """The trapezoid shaken to the right is the mirror image of the one shaken to the left, to 1e-10."""
+    """The trapezoid shaken to the right is the mirror image of the one shaken to the left, to
+    1e-10."""
     system, tags = body("trapezoid")
     near = vc.AnalyticGap(lambda x: np.full(len(x), 1e-3))
     surface = fem.contact_surface(system, group(tags, *SIDES[:4]), obstacle=near)
@@ -216,14 +222,15 @@ def test_mirror_symmetry_of_an_oblique_wall():
     assert np.any([report.new.active[seen(surface).corners[0]].all() for report in images[0][0]])
 
 
-# Oblique frames -------------------------------------------------------------------------------------------------------
+# Oblique frames
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", ["trapezoid", "leaning box"])
 def test_the_oblique_system_is_the_same_system(name):
-    """u = T û with u_n = u·n on every face; energies, work of loads, inertia loads; forces on the conditions are r_n n.
-    T⁻ᵀ is the ``dual``."""
+    """u = T û with u_n = u·n on every face; energies, work of loads, inertia loads; forces on the
+    conditions are r_n n. T⁻ᵀ is the ``dual``."""
     d = len(BODIES[name]["lengths"])
     pull = {"loads": fem.BodyForce(tuple(np.arange(1.0, d + 1.0)))}
 
@@ -265,7 +272,8 @@ def test_the_oblique_system_is_the_same_system(name):
 
 
 def test_redistributed_mass_at_oblique_corners():
-    """No inertia on contact unknowns; all of the body's own: mass, centre and moments of inertia, with lumping too."""
+    """No inertia on contact unknowns; all of the body's own: mass, centre and moments of inertia,
+    with lumping too."""
     from vi_contact.laws.mass_transfer import rigid_motions
 
     for name, count, lumpings in (("trapezoid", 3, (0.0, 0.4, 1.0)), ("leaning box", 6, (0.4,))):
@@ -287,7 +295,8 @@ def test_redistributed_mass_at_oblique_corners():
 
 @pytest.mark.serial
 def test_lumped_mass_does_not_depend_on_the_frames():
-    """Lumped mass before the contact nodes give theirs away: the kinetic energy of any rigid motion."""
+    """Lumped mass before the contact nodes give theirs away: the kinetic energy of any rigid
+    motion."""
     from vi_contact.core.corners import lumped_entries
 
     system, tags = body("trapezoid")
@@ -302,13 +311,14 @@ def test_lumped_mass_does_not_depend_on_the_frames():
     assert masses[0] == pytest.approx(masses[1], rel=1e-12, abs=1e-12 * masses[1].max())
 
 
-# Against other answers ------------------------------------------------------------------------------------------------
+# Against other answers
+# ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", on_ranks(("trapezoid", "turned trapezoid"), "turned trapezoid"))
 def test_static_answer_by_enumeration(name):
-    """The trapezoid, its top moved into a notch with gaps: r_n of all sets of contacts tried, on dense matrices along
-    the axes."""
+    """The trapezoid, its top moved into a notch with gaps: r_n of all sets of contacts tried, on
+    dense matrices along the axes."""
     angle = BODIES[name].get("angle", 0.0)
     push = turned((0.004, -0.02), angle)
     mesh, tags = fem.build_mesh(BlockMesh(**(BODIES[name] | {"divisions": (3, 1)})), COMM)
@@ -343,8 +353,9 @@ def test_static_answer_by_enumeration(name):
 
 @pytest.mark.parametrize("name", on_ranks(("trapezoid", "leaning box"), "leaning box"))
 def test_a_block_wedged_in_a_notch(name):
-    """Held by contact alone, without friction: the reactions of the faces are the components of the weight along their
-    normals. Contact force of the recorder, resultants of each face, nodal forces along the axes: all the same."""
+    """Held by contact alone, without friction: the reactions of the faces are the components of the
+    weight along their normals. Contact force of the recorder, resultants of each face, nodal forces
+    along the axes: all the same."""
     d = len(BODIES[name]["lengths"])
     down = np.array([-0.3, 1.0]) if d == 2 else np.array([-0.5, -1.0, -0.4])
     sides = ("left", "top") if d == 2 else ("left", "bottom", "back")
@@ -373,7 +384,8 @@ def test_a_block_wedged_in_a_notch(name):
 
 @pytest.mark.serial
 def test_ledger_of_a_block_that_slams_into_a_notch():
-    """Contact work and impact losses at oblique corners, by several schemes and a law; the ledger closes to 1e-11."""
+    """Contact work and impact losses at oblique corners, by several schemes and a law; the ledger
+    closes to 1e-11."""
     cases: list[dict[str, Any]] = [
         {"scheme": None},
         {"scheme": vc.MoreauJean(e=0.5)},
@@ -401,7 +413,8 @@ def test_ledger_of_a_block_that_slams_into_a_notch():
 
 @pytest.mark.serial
 def test_an_inelastic_impact_on_one_face_of_a_corner():
-    """The velocity of the corner node changes along the normal of the closed face, not along the open one."""
+    """The velocity of the corner node changes along the normal of the closed face, not along the
+    open one."""
     system, tags = body("trapezoid")
     surface = fem.contact_surface(system, group(tags, "left", "bottom"))
     corner = seen(surface).corners[0]
@@ -417,13 +430,15 @@ def test_an_inelastic_impact_on_one_face_of_a_corner():
     assert values == pytest.approx(np.array([0.3, -0.7]) - n * (n @ (0.3, -0.7)), abs=1e-14)
 
 
-# Obstacles ------------------------------------------------------------------------------------------------------------
+# Obstacles
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 def test_one_direction_is_one_condition():
-    """A half-space below a group that goes round its corners: one condition for a node, with the weight of all faces,
-    to the last digit as if the boundary were smooth; so with listed points, and an obstacle of the user's own."""
+    """A half-space below a group that goes round its corners: one condition for a node, with the
+    weight of all faces, to the last digit as if the boundary were smooth; so with listed points,
+    and an obstacle of the user's own."""
     system, tags = body("rectangle")
     wall = group(tags, "left", "bottom", "right")
     ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
@@ -467,7 +482,8 @@ def test_one_direction_is_one_condition():
 
 @pytest.mark.serial
 def test_a_wall_moved_with_its_ground():
-    """Oblique corners on an obstacle that moves with the base: the same as in the frame of the ground."""
+    """Oblique corners on an obstacle that moves with the base: the same as in the frame of the
+    ground."""
     shake = (
         vc.Harmonic(8.0, 6.0, direction=(1.0, 0.0)),
         vc.Harmonic(5.0, 9.0, direction=(0.0, 1.0)),
@@ -493,8 +509,8 @@ def test_a_wall_moved_with_its_ground():
 
 @pytest.mark.serial
 def test_supports_released_beside_an_oblique_notch(tmp_path):
-    """A static stage whose top is held goes on without that support, and nothing moves. The field file has the pressure
-    of the corner's face that is pressed most."""
+    """A static stage whose top is held goes on without that support, and nothing moves. The field
+    file has the pressure of the corner's face that is pressed most."""
     mesh, tags = fem.build_mesh(BlockMesh(**BODIES["trapezoid"]), COMM)
     weight = fem.BodyForce((-300.0, -2e3))
     systems = [fem.assemble(mesh, SOFT, loads=weight, clamped=held) for held in (tags["top"], ())]
@@ -529,14 +545,15 @@ def test_supports_released_beside_an_oblique_notch(tmp_path):
     )
 
 
-# The feature angle ----------------------------------------------------------------------------------------------------
+# The feature angle
+# ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("turn", on_ranks((29.0, 31.0, 45.0), 31.0))
 def test_the_angle(turn, caplog: pytest.LogCaptureFixture):
-    """A ring of chords that turn by this many degrees is smooth up to the feature angle, 30 degrees by default; the log
-    says how many nodes are corners, and where."""
+    """A ring of chords that turn by this many degrees is smooth up to the feature angle, 30 degrees
+    by default; the log says how many nodes are corners, and where."""
     caplog.set_level(logging.INFO)
 
     def ring(x: Array) -> Array:
@@ -568,7 +585,8 @@ def test_the_angle(turn, caplog: pytest.LogCaptureFixture):
 
 @dataclass(frozen=True)
 class Blade:
-    """A triangle whose edge at the origin is sharper than a node's directions may be: 0.3 degrees."""
+    """A triangle whose edge at the origin is sharper than a node's directions may be: 0.3
+    degrees."""
 
     def build(self, gmsh: Any) -> None:
         points = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.005)])
@@ -599,7 +617,8 @@ class Pyramid:
 
 @pytest.mark.two_ranks
 def test_refusals():
-    """More faces than dimensions, angles that are none, friction on two faces: a sentence with the remedy."""
+    """More faces than dimensions, angles that are none, friction on two faces: a sentence with the
+    remedy."""
     mesh, tags = fem.build_mesh(Pyramid(), COMM)
     system = fem.assemble(mesh, SOFT)
     with pytest.raises(
@@ -629,7 +648,8 @@ def test_refusals():
     ContactProblem(system, surface)
 
 
-# Pairs ----------------------------------------------------------------------------------------------------------------
+# Pairs
+# ----------------------------------------------------------------------------------------------------------------
 
 
 def notch(gap: float = 0.0, upper: int = 2) -> tuple[Any, Any]:
@@ -686,8 +706,8 @@ def test_a_pair_that_bends_round_corners(matching):
 
 @pytest.mark.serial
 def test_a_pair_with_gaps_round_corners():
-    """The partner of a corner lies on the mean of its normals; its gaps are those of both faces. Faces in front of
-    nothing have no conditions with mortar, and are refused by nodes."""
+    """The partner of a corner lies on the mean of its normals; its gaps are those of both faces.
+    Faces in front of nothing have no conditions with mortar, and are refused by nodes."""
     system, tags = notch(gap=0.125)
     one = fem.contact_pair(system, *(group(tags, *names) for names in zip(*PAIRS, strict=True)))
     assert one.gap0 == pytest.approx(np.full(one.count, 0.125)) and len(one.corners) == 2

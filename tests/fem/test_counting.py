@@ -1,4 +1,5 @@
-"""The census of a contact boundary: how many nodes, how many conditions, and where the others are."""
+"""The census of a contact boundary: how many nodes, how many conditions, and where the others
+are."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""Pressures where side 1 reaches beyond side 2: uniform ones to round-off, whichever side is named first."""
+"""Pressures where side 1 reaches beyond side 2: uniform ones to round-off, whichever side is named
+first."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ ROUNDED = (
 
 
 def pressed(mesh: Any, *, clamped: str, names: tuple[str, str]) -> tuple[ContactSurface, Array]:
-    """A soft block without Poisson's ratio on stiff ground under the pressure Q: (surface, pressures over Q)."""
+    """A soft block without Poisson's ratio on stiff ground under the pressure Q: (surface,
+    pressures over Q)."""
     built, tags = build_mesh(mesh, COMM)
     materials = [
         (tags["lower"], LinearElastic(E=STIFF, nu=0.0, rho=1.0)),
@@ -56,7 +58,8 @@ def pressed(mesh: Any, *, clamped: str, names: tuple[str, str]) -> tuple[Contact
 @pytest.mark.parametrize("beyond", [0.1, 0.05, 0.01, 0.6, 0.9])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_uniform_pressure_in_the_plane(beyond, simplices):
-    """The block's ends are inside facets of the ground, which is side 1: by these shares of one beyond a node."""
+    """The block's ends are inside facets of the ground, which is side 1: by these shares of one
+    beyond a node."""
     lower = BlockMesh(lengths=(2.0, 0.5), divisions=(20, 5), simplices=simplices)
     upper = BlockMesh(lengths=(1.0, 1.0), divisions=(23, 6), simplices=simplices)
     mesh = TwoBlocks(lower=lower, upper=upper, offset=(0.6 - 0.1 * beyond,))
@@ -94,8 +97,8 @@ def test_uniform_pressure_in_space(beyond, angle, simplices):
 
 
 def on_soil(cells: int, names: tuple[str, str]) -> tuple[ContactSurface, Array, Array]:
-    """A wall under its weight and a lateral load on soil of so many cells along 10 m: (surface, reactions, pressures
-    [Pa]) of the conditions of all ranks."""
+    """A wall under its weight and a lateral load on soil of so many cells along 10 m: (surface,
+    reactions, pressures [Pa]) of the conditions of all ranks."""
     lower = BlockMesh(lengths=(10.0, 4.0), divisions=(cells, 8))
     upper = BlockMesh(lengths=(2.0, 4.0), divisions=(8, 16))
     mesh, tags = build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(4.03,)), COMM)
@@ -120,8 +123,8 @@ def on_soil(cells: int, names: tuple[str, str]) -> tuple[ContactSurface, Array, 
 @pytest.mark.serial
 @pytest.mark.parametrize("cells", [40, 43, 80, 87])
 def test_toe_of_a_wall_whichever_side_is_named_first(cells):
-    """The force on the last eighth of the base, as a mean pressure: the edge is singular, so that a mean over a smaller
-    patch is larger."""
+    """The force on the last eighth of the base, as a mean pressure: the edge is singular, so that a
+    mean over a smaller patch is larger."""
     found = {}
     for names in (("upper_bottom", "lower_top"), ("lower_top", "upper_bottom")):
         surface, r_n, pressures = on_soil(cells, names)

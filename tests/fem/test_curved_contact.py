@@ -1,4 +1,5 @@
-"""Overlaps of facets: round-off on plane sides, what polygons of one curve leave out on curved ones, refused beyond."""
+"""Overlaps of facets: round-off on plane sides, what polygons of one curve leave out on curved
+ones, refused beyond."""
 
 import numpy as np
 import pytest
@@ -49,8 +50,8 @@ def press_fit(n, m, overlap=0.0, d=2, loads=()):
 
 
 def lame():
-    """Return the pressure of the press fit [Pa]: Lamé's rings in plane strain, by Timoshenko and Goodier, Theory of
-    Elasticity (1970), article 28."""
+    """Return the pressure of the press fit [Pa]: Lamé's rings in plane strain, by Timoshenko and
+    Goodier, Theory of Elasticity (1970), article 28."""
     E, nu = STEEL.E, STEEL.nu
     k = (1.0 + nu) / E
     shaft = k * ((1.0 - 2.0 * nu) * B**3 + A**2 * B) / (B**2 - A**2)
@@ -84,7 +85,8 @@ def test_plane_sides_may_not_overlap(matching, overlap):
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("n", [8, 16, 32])
 def test_a_press_fit_that_is_drawn_with_its_overlap_is_refused(n, d):
-    """Seats of a shaft and a hub that are meshed alike: no facet leaves out anything of the other, on any mesh."""
+    """Seats of a shaft and a hub that are meshed alike: no facet leaves out anything of the other,
+    on any mesh."""
     if d == 3 and n > 8:
         n = 12
     system, one, two = press_fit(n, n, TOO_LARGE, d)
@@ -98,7 +100,8 @@ def test_a_press_fit_that_is_drawn_with_its_overlap_is_refused(n, d):
 
 @pytest.mark.parametrize("n, m", [(8, 11), (11, 8), (8, 16), (24, 7), (7, 24), (16, 17)])
 def test_polygons_of_one_curve_touch(n, m):
-    """Seats of the same radius with unlike divisions: their polygons overlap by up to h²/(8R) and count as touching."""
+    """Seats of the same radius with unlike divisions: their polygons overlap by up to h²/(8R) and
+    count as touching."""
     system, one, two = press_fit(n, m)
     for sides in ((one, two), (two, one)):
         surface = fem.contact_pair(system, *sides, matching=fem.DualMortar())
@@ -116,7 +119,8 @@ def test_a_larger_overlap_of_unlike_polygons_is_refused(n, m):
 
 
 def test_curved_sides_in_space_touch():
-    """Rings of one radius with unlike divisions, in space; their overlap is refused beyond five times h²/(8R)."""
+    """Rings of one radius with unlike divisions, in space; their overlap is refused beyond five
+    times h²/(8R)."""
     system, one, two = press_fit(7, 9, 0.0, 3)
     surface = fem.contact_pair(system, one, two, matching=fem.DualMortar())
     assert surface.total == 8 * 3
@@ -154,7 +158,8 @@ def test_both_remedies_give_the_pressure_of_the_press_fit():
 
 @pytest.mark.serial
 def test_the_curvature_of_a_circle_and_a_sphere():
-    """H is 1/R along a circle's polygon, also of unequal facets, and q is the square of a chord over R."""
+    """H is 1/R along a circle's polygon, also of unequal facets, and q is the square of a chord
+    over R."""
     angle = np.linspace(0.0, 1.0, 21) ** 1.2
     x = 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
     facets = np.column_stack([np.arange(20), np.arange(1, 21)])

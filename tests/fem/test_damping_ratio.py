@@ -48,8 +48,8 @@ def test_one_ratio_everywhere_is_rayleigh(comm, second):
 
 
 def test_from_cell_to_cell(comm):
-    """A Function of DG0; one material with a ratio and one without; stiffness in the upper cells only: C is the same.
-    It is zero in the lower ones, all cells of some ranks."""
+    """A Function of DG0; one material with a ratio and one without; stiffness in the upper cells
+    only: C is the same. It is zero in the lower ones, all cells of some ranks."""
     mesh, tags = strip(comm, 2.0, 4.0, (2, 4))
     upper = fem.Cells.where("upper", mesh, lambda x: x[1] > 2.0 - 1e-9)
     ratio = fem.compat.function(fem.compat.cell_space(mesh))
@@ -67,7 +67,8 @@ def test_from_cell_to_cell(comm):
 
 @pytest.mark.serial
 def test_a_mode_is_damped_by_its_ratio(comm):
-    """The first mode of a column, at its frequency: the logarithmic decrement is 2 pi xi / sqrt(1 - xi²)."""
+    """The first mode of a column, at its frequency: the logarithmic decrement is 2 pi xi / sqrt(1 -
+    xi²)."""
     mesh, tags = strip(comm, 1.0, 10.0, (1, 10))
     f, xi = SOIL.c_s / 40.0, 0.05
     system = fem.assemble(

@@ -1,4 +1,5 @@
-"""Absorbing boundaries: dashpots at right angles and oblique (V8.1), compliant base (V8.2), and what is refused."""
+"""Absorbing boundaries: dashpots at right angles and oblique (V8.1), compliant base (V8.2), and
+what is refused."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ def hit_column(comm, wave, factor=1.0, **data):
 
 @pytest.mark.parametrize("wave", WAVES)
 def test_waves_at_right_angles_leave(comm, wave):
-    """V8.1: what is left of the energy after the passage is below 1e-4 at 20 points per wavelength."""
+    """V8.1: what is left of the energy after the passage is below 1e-4 at 20 points per
+    wavelength."""
     problem, dt = hit_column(comm, wave)
     energy = energies(problem, dt=0.5 * dt, steps=2 * (CELLS + 60))
     assert energy[-1] < 1e-4 * energy.max()
@@ -49,7 +51,8 @@ def test_waves_at_right_angles_leave(comm, wave):
 @pytest.mark.serial  # ranks change nothing of it: the column above shows that
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_mistuned_dashpots_reflect(comm, factor):
-    """V8.1: R = (1 - a)/(1 + a), 1/3 and -1/3: size and sign of the velocity that comes back, energy R²."""
+    """V8.1: R = (1 - a)/(1 + a), 1/3 and -1/3: size and sign of the velocity that comes back,
+    energy R²."""
     problem, dt = hit_column(comm, "S", factor)
     steps = CELLS + 50
     v = history(problem, [(0.0, 0.5 * HEIGHT)], derivative=1, dt=dt, steps=steps)[:, 0, 0]
@@ -62,7 +65,8 @@ def test_mistuned_dashpots_reflect(comm, factor):
 
 @pytest.mark.serial
 def test_other_material_and_thickness(comm):
-    """A half-space four times as heavy below is like dashpots with a = 4; the section's thickness changes nothing."""
+    """A half-space four times as heavy below is like dashpots with a = 4; the section's thickness
+    changes nothing."""
     mesh, tags = strip(comm, 0.25, HEIGHT, (1, CELLS))
     heavy = vc.LinearElastic(E=4.0 * SOIL.E, nu=SOIL.nu, rho=4.0 * SOIL.rho)
     found = []
@@ -99,7 +103,8 @@ CASES = [("P", 60, 2.2), ("S", 60, 1.5)]
 @pytest.mark.serial  # ranks change nothing of it: the columns above show that
 @pytest.mark.parametrize("wave, angle, length", CASES)
 def test_oblique_waves(comm, wave, angle, length):
-    """V8.1: a packet on a periodic strip, 10 cells per wavelength: within 20 % of the table, and of its own mean."""
+    """V8.1: a packet on a periodic strip, 10 cells per wavelength: within 20 % of the table, and of
+    its own mean."""
     material = vc.LinearElastic(E=1.0, nu=0.25, rho=1.0)
     slope = math.radians(angle)
     share, theory = energy_sent_back(comm, material, wave, slope, length=length, cells=10)
@@ -119,7 +124,8 @@ def soil_on_compliant_base(comm, motion, **data):
 @pytest.mark.slow
 @pytest.mark.parametrize("wave", WAVES)
 def test_compliant_base(comm, wave):
-    """V8.2: the surface moves with 2 v_up(t - H/c), the base with v_up(t) + v_up(t - 2H/c); then silence. 1 %."""
+    """V8.2: the surface moves with 2 v_up(t - H/c), the base with v_up(t) + v_up(t - 2H/c); then
+    silence. 1 %."""
     speed, direction = WAVES[wave]
     shake = vc.Ricker(
         1.0, speed / 15.0, direction=direction
@@ -156,7 +162,8 @@ def resistance(system):
 @pytest.mark.parametrize("simplices", [False, True])
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_faces_of_a_box_have_their_impedance(comm, simplices, angle):
-    """Together rho c_P A along the normals and rho c_S A along the faces, exactly, however the box is turned."""
+    """Together rho c_P A along the normals and rho c_S A along the faces, exactly, however the box
+    is turned."""
     mesh, tags = block(
         comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3), simplices=simplices, angle=angle
     )
@@ -181,7 +188,8 @@ def test_faces_of_a_box_have_their_impedance(comm, simplices, angle):
 
 
 def test_nodes_on_edges_and_corners_have_the_dashpots_of_all_their_faces(comm):
-    """A quarter of the area of every cell face round a node, P along its normal, S along it: one face, two, three."""
+    """A quarter of the area of every cell face round a node, P along its normal, S along it: one
+    face, two, three."""
     mesh, tags = block(
         comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3)
     )  # cells of 1 m x 0.5 m x 1 m
@@ -209,7 +217,8 @@ def test_nodes_on_edges_and_corners_have_the_dashpots_of_all_their_faces(comm):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("simplices", [False, True])
 def test_a_curved_face_has_its_impedance_in_the_limit(comm, simplices):
-    """A patch of a sphere, whose facets of hexahedra are not plane: the integral over the sphere, of second order."""
+    """A patch of a sphere, whose facets of hexahedra are not plane: the integral over the sphere,
+    of second order."""
 
     def bulging(x):  # from y = 1 on to y = 2, where the points are 2 m from the origin
         rays = np.column_stack([x[:, 0], np.ones(len(x)), x[:, 2]])
@@ -251,8 +260,9 @@ def test_a_curved_face_has_its_impedance_in_the_limit(comm, simplices):
     ],
 )
 def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
-    """V8.1: P and both S waves, along every axis, sides tied both ways: what is left of the energy falls with the
-    fourth power of h, as the square of the mesh's reflection, which is that of its error of dispersion."""
+    """V8.1: P and both S waves, along every axis, sides tied both ways: what is left of the energy
+    falls with the fourth power of h, as the square of the mesh's reflection, which is that of its
+    error of dispersion."""
     speed, left = WAVES[wave][0], []
     for cells in (50, 100):
         h = HEIGHT / cells
@@ -283,8 +293,8 @@ def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
     ],
 )
 def test_compliant_base_of_a_box(comm, simplices, solver):
-    """V8.2 in three components at once, P impedance for the vertical one: the discrete column to round-off, and the
-    outcrop's motion at the surface (1 %)."""
+    """V8.2 in three components at once, P impedance for the vertical one: the discrete column to
+    round-off, and the outcrop's motion at the surface (1 %)."""
     mesh, tags = block(comm, lengths=(1.0, 15.0, 0.5), divisions=(1, 30, 1), simplices=simplices)
     waves = [
         vc.Ricker(1.0, c / length, direction=tuple(e))
@@ -321,8 +331,9 @@ def test_compliant_base_of_a_box(comm, simplices, solver):
 
 @pytest.mark.slow
 def test_contact_between_dashpots(comm):
-    """Contact nodes on edges that have dashpots too: a box falls on a plane between absorbing sides. What leaves is in
-    the ledger, the forces are as symmetric as the box, both routes and one rank alone find the same."""
+    """Contact nodes on edges that have dashpots too: a box falls on a plane between absorbing
+    sides. What leaves is in the ledger, the forces are as symmetric as the box, both routes and one
+    rank alone find the same."""
     plane, found = vc.HalfSpace((0.0, -1e-4, 0.0), (0.0, 1.0, 0.0)), []
     condensed, iterative = vc.Condensed(), vc.Iterative(tolerance=1e-12)
     for ranks, solver in ((comm, condensed), (comm, iterative), (MPI.COMM_SELF, condensed)):
@@ -366,7 +377,8 @@ def test_the_base_says_what_it_expects(comm, caplog):
 
 @pytest.mark.two_ranks
 def test_held_and_dashed_is_refused(comm):
-    """One component of one boundary is held or damped, never both; corners of rollers may touch dashpots."""
+    """One component of one boundary is held or damped, never both; corners of rollers may touch
+    dashpots."""
     mesh, tags = strip(comm, 2.0, 2.0, (2, 2))
     rollers = [fem.Prescribed(tags[side], components=(1,)) for side in ("left", "right")]
     system = fem.assemble(mesh, SOIL, prescribed=rollers, dashpots=fem.Dashpots(tags["bottom"]))
@@ -387,7 +399,8 @@ def test_held_and_dashed_is_refused(comm):
 
 @pytest.mark.two_ranks
 def test_what_does_not_fit_a_box_is_refused(comm):
-    """A motion of two components, several motions that disagree or none at all, a side that is held and damped."""
+    """A motion of two components, several motions that disagree or none at all, a side that is held
+    and damped."""
     mesh, tags = block(comm, lengths=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
     plane, space = vc.Ricker(1.0, 10.0), vc.Ricker(1.0, 10.0, direction=(0.0, 1.0, 0.0))
     with pytest.raises(

@@ -1,5 +1,6 @@
-"""Nearly incompressible bodies of quadrilaterals and hexahedra: Cook's membrane free and against a stop, patch test,
-rigid motions only without energy, damping, section forces and stresses of the same forms, refusals and the warning."""
+"""Nearly incompressible bodies of quadrilaterals and hexahedra: Cook's membrane free and against a
+stop, patch test, rigid motions only without energy, damping, section forces and stresses of the
+same forms, refusals and the warning."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ LIMIT = {
 
 
 def cook(nu: float, n: int, simplices: bool = False, **data: Any) -> tuple[Any, Any, Any]:
-    """(system, mesh groups, load) of Cook's membrane in plane strain, E = 1, a shear force of 1 on its right end."""
+    """(system, mesh groups, load) of Cook's membrane in plane strain, E = 1, a shear force of 1 on
+    its right end."""
 
     def deform(x: np.ndarray) -> np.ndarray:
         return np.column_stack([48.0 * x[:, 0], 44.0 * x[:, 0] + x[:, 1] * (44.0 - 28.0 * x[:, 0])])
@@ -70,7 +72,8 @@ def test_cooks_membrane(nu: float, integration: str, low: float, high: float) ->
     ids=["Q1", "selective", "P2"],
 )
 def test_cooks_membrane_against_a_stop(nu: float, data: dict[str, Any]) -> None:
-    """The corner is stopped half way: the force is (free deflection - gap) / (deflection under a unit force there)."""
+    """The corner is stopped half way: the force is (free deflection - gap) / (deflection under a
+    unit force there)."""
     system, tags, _ = cook(nu, 8, **data)
     free = deflection(system, vc.static_equilibrium(linear(system), solver=vc.Condensed()))
     stop = fem.contact_surface(
@@ -125,7 +128,8 @@ def outer_facets(mesh: Any) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["quadrilaterals", "hexahedra"])
 def test_damping_and_stresses_are_of_the_same_forms(name: str) -> None:
-    """C = beta K; the stress of a uniform strain, in the geometric stiffness, is that of full integration."""
+    """C = beta K; the stress of a uniform strain, in the geometric stiffness, is that of full
+    integration."""
     mesh, _ = block(COMM, **BODIES[name])
     full, selective = (
         fem.assemble(mesh, NEARLY, integration=one, damping=vc.Rayleigh(0.0, 0.25))

@@ -1,4 +1,5 @@
-"""Direct factorisations of a PETSc that lacks packages: the same answers, what is taken in the log, known causes."""
+"""Direct factorisations of a PETSc that lacks packages: the same answers, what is taken in the log,
+known causes."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ EVERY = packages.petsc_has
 
 
 def without(monkeypatch: Any, *missing: str) -> None:
-    """Be a PETSc that was built without these packages, in a process that has asked for none yet."""
+    """Be a PETSc that was built without these packages, in a process that has asked for none
+    yet."""
     gone = {*missing, *packages.OF_SUITESPARSE} if "suitesparse" in missing else {*missing}
     monkeypatch.setattr(
         packages, "petsc_has", lambda package: package not in gone and EVERY(package)
@@ -55,7 +57,8 @@ def falling_block(d: int, friction: bool) -> vc.ContactProblem:
 
 
 def last_step(problem: vc.ContactProblem, solver: Any) -> tuple[Any, Any]:
-    """Displacements of this rank and all reactions after some steps in contact, all of them certified."""
+    """Displacements of this rank and all reactions after some steps in contact, all of them
+    certified."""
     steps = list(vc.march(problem, steps=12, dt=4e-4, solver=solver))
     assert max(report.certificate.worst for _, report in steps) <= 1e-9
     state = steps[-1][0]
@@ -91,7 +94,8 @@ MISSING = {
 @pytest.mark.parametrize("missing", MISSING)
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_petsc_that_lacks_packages_gives_the_same_answer(name, missing, monkeypatch):
-    """Without friction every solver goes on, whatever is missing; by CHOLMOD and MUMPS first, then by what there is."""
+    """Without friction every solver goes on, whatever is missing; by CHOLMOD and MUMPS first, then
+    by what there is."""
     problem = falling_block(2, friction=False)
     u, r_n = last_step(problem, SOLVERS[name])
     without(monkeypatch, *MISSING[missing])
@@ -104,7 +108,8 @@ def test_a_petsc_that_lacks_packages_gives_the_same_answer(name, missing, monkey
 @pytest.mark.parametrize("missing", MISSING)
 @pytest.mark.parametrize("name", ["condensed", "volume", "iterative"])
 def test_friction_beside_missing_packages(name, missing, monkeypatch):
-    """The same with friction; Volume() needs rows exchanged, and says so where PETSc has nothing that does it."""
+    """The same with friction; Volume() needs rows exchanged, and says so where PETSc has nothing
+    that does it."""
     problem = falling_block(2, friction=True)
     u, _ = last_step(problem, SOLVERS[name])
     without(monkeypatch, *MISSING[missing])
@@ -120,7 +125,8 @@ def test_friction_beside_missing_packages(name, missing, monkeypatch):
 
 
 def test_the_log_says_what_is_taken(monkeypatch, caplog):
-    """Nothing while all is there; what is missing and what stands in for it otherwise, without any option left over."""
+    """Nothing while all is there; what is missing and what stands in for it otherwise, without any
+    option left over."""
     caplog.set_level(logging.INFO, logger="vi_contact")
     problem = falling_block(2, friction=False)
     if EVERY("cholmod") and EVERY("mumps"):
@@ -187,7 +193,8 @@ def test_singular_is_said_of_singular_matrices(algebra, value, missing, monkeypa
 
 
 def test_no_cause_is_guessed(monkeypatch):
-    """An order of elimination that PETSc does not know is what PETSc says, and no word of a singular matrix."""
+    """An order of elimination that PETSc does not know is what PETSc says, and no word of a
+    singular matrix."""
     monkeypatch.setattr("vi_contact.fem.petsc_algebra.ordering", lambda: "of nobody")
     with pytest.raises(
         InputError, match=r"cannot factorise the effective matrix \(error 63, .*of nobody"
@@ -232,7 +239,8 @@ def test_errors_of_petsc_keep_their_causes():
 
 
 def test_options_of_a_volume_solver(monkeypatch):
-    """MUMPS where it is; PETSc's own on one rank, a copy of it on several; what exchanges rows where that is needed."""
+    """MUMPS where it is; PETSc's own on one rank, a copy of it on several; what exchanges rows
+    where that is needed."""
     if EVERY("mumps"):
         assert direct_of_volume("lu", 2)["pc_factor_mat_solver_type"] == "mumps"
     without(monkeypatch, "mumps")

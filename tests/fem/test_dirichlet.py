@@ -1,4 +1,5 @@
-"""Dirichlet data as dirichletbc objects: equal to clamped and Prescribed in everything, and what is refused."""
+"""Dirichlet data as dirichletbc objects: equal to clamped and Prescribed in everything, and what is
+refused."""
 
 from __future__ import annotations
 
@@ -41,14 +42,16 @@ def constant(mesh: Any, value: Any) -> Any:
 
 
 def on_all_components(values: Any) -> Any:
-    """Values as dirichletbc takes them on V: since DOLFINx 0.11 a number where V has one component."""
+    """Values as dirichletbc takes them on V: since DOLFINx 0.11 a number where V has one
+    component."""
     return (
         float(values[0]) if len(values) == 1 and compat.VERSION >= (0, 11) else np.asarray(values)
     )
 
 
 def same(one: Any, other: Any) -> None:
-    """Two systems: unknowns, matrices on a vector, loads, influence, initial state, and whether they float."""
+    """Two systems: unknowns, matrices on a vector, loads, influence, initial state, and whether
+    they float."""
     assert one.space.unknowns == other.space.unknowns and one.floating == other.floating
     assert np.array_equal(one.space.ids, other.space.ids)
     x = np.cos(np.asarray(one.space.ids, dtype=float))
@@ -69,7 +72,8 @@ def same(one: Any, other: Any) -> None:
 @cells
 @pytest.mark.parametrize("degree", [1, 2])
 def test_conditions_are_those_of_prescribed(cell, degree):
-    """On V and on each V.sub(i): arrays, Constants, Functions; with the user's space, without, with another alike."""
+    """On V and on each V.sub(i): arrays, Constants, Functions; with the user's space, without, with
+    another alike."""
     mesh = own_mesh(COMM, cell)
     d = mesh.geometry.dim
     V, alike = compat.vector_space(mesh, degree), compat.vector_space(mesh, degree)
@@ -115,7 +119,8 @@ def test_conditions_are_those_of_prescribed(cell, degree):
 
 @cells
 def test_contact_beside_them(cell):
-    """Impacts, ledger, reactions and a static stage of a body that is held and rolled by dirichletbc or by hand."""
+    """Impacts, ledger, reactions and a static stage of a body that is held and rolled by
+    dirichletbc or by hand."""
     mesh = own_mesh(COMM, cell)
     d = mesh.geometry.dim
     V = compat.vector_space(mesh)
@@ -166,7 +171,8 @@ def test_contact_beside_them(cell):
 
 
 def test_where_conditions_meet_the_last_one_counts():
-    """Beside clamped and Prescribed, among themselves, and on tied boundaries; values are those at assembly."""
+    """Beside clamped and Prescribed, among themselves, and on tied boundaries; values are those at
+    assembly."""
     mesh = own_mesh(COMM, "quadrilateral")
     V, value = compat.vector_space(mesh), constant(mesh, (1e-4, 2e-4))
     left = fem.Facets.where("left", mesh, at(0, 0.0))
@@ -281,14 +287,16 @@ def test_lists_that_differ_between_ranks_are_refused():
     bcs = [dfem.dirichletbc(dfem.Function(V), on(V, at(0, x))) for x in (0.0, 2.0)]
     given = bcs[: 1 if COMM.rank == COMM.size - 1 else 2]
     assert refusal(COMM, lambda: fem.assemble(mesh, CONCRETE, bcs=given)) == (
-        "assemble: bcs has 2 items on one rank and 1 on another; give all ranks the same list, also where a rank has "
+        "assemble: bcs has 2 items on one rank and 1 on another; give all ranks the same list, "
+        "also where a rank has "
         "none of its unknowns"
     )
 
 
 @pytest.mark.two_ranks
 def test_own_forms_beside_own_conditions():
-    """The whole problem in the user's own words: V, forms, load and conditions; equal to the usual route."""
+    """The whole problem in the user's own words: V, forms, load and conditions; equal to the usual
+    route."""
     mesh = own_mesh(COMM, "triangle")
     V = compat.vector_space(mesh)
     lame, shear = CONCRETE.lame_lambda, CONCRETE.E / (2.0 * (1.0 + CONCRETE.nu))
@@ -314,7 +322,8 @@ def test_own_forms_beside_own_conditions():
 
 @pytest.mark.two_ranks
 def test_stages_and_functions_beside_them():
-    """Supports released after a static stage, stiffness of its stresses, u on the user's own space; a unit square."""
+    """Supports released after a static stage, stiffness of its stresses, u on the user's own space;
+    a unit square."""
     mesh = dolfinx.mesh.create_unit_square(COMM, 4, 3)
     V, push = compat.vector_space(mesh), np.array([1e-5, 0.0])
     side = fem.Facets.where("left", mesh, at(0, 0.0))

@@ -1,5 +1,6 @@
-"""Faces, edges and vertices in space: one to three conditions at a node at any angle, against rigid faces and between
-bodies, beside symmetry planes, with friction along edges, with redistributed mass; refusals (V2.8)."""
+"""Faces, edges and vertices in space: one to three conditions at a node at any angle, against rigid
+faces and between bodies, beside symmetry planes, with friction along edges, with redistributed
+mass; refusals (V2.8)."""
 
 from __future__ import annotations
 
@@ -71,8 +72,9 @@ def group(tags: Any, names: list[str], name: str = "hull") -> Facets:
 
 @dataclass(frozen=True)
 class Corner:
-    """A box of one cell in the corner of three rigid faces, or of three blocks, all on springs in proportion to their
-    mass, so that nothing floats; ``n``: divisions of the blocks, which need not be those of the box."""
+    """A box of one cell in the corner of three rigid faces, or of three blocks, all on springs in
+    proportion to their mass, so that nothing floats; ``n``: divisions of the blocks, which need not
+    be those of the box."""
 
     shape: str
     place: str
@@ -83,7 +85,8 @@ class Corner:
         return SHAPES[self.shape] @ PLACED[self.place].T
 
     def build(self) -> tuple[ContactProblem, Array]:
-        """(problem, B (12, unknowns)): rows of B in the order of faces, then of nodes; unknowns by their ids."""
+        """(problem, B (12, unknowns)): rows of B in the order of faces, then of nodes; unknowns by
+        their ids."""
         boxes = {"box": ((0.0, 0.0, 0.0), 1)}
         if self.n:
             boxes |= {name: (tuple(-np.eye(3)[axis]), self.n) for name, (_, _, axis) in PIT.items()}
@@ -119,7 +122,8 @@ class Corner:
         return ContactProblem(system, surface), self.rows(system)
 
     def rows(self, system: Any) -> Array:
-        """n·u of the box, less that of the block that it faces there, by products of the mortar weights of lines."""
+        """n·u of the box, less that of the block that it faces there, by products of the mortar
+        weights of lines."""
         x = np.round(field(system, system.u0)[0] @ np.linalg.inv(self.map), 9)
         rows, ways = [], range(self.n + 1 if self.n else 0)
         for block, (_, _, axis) in enumerate(PIT.values()):
@@ -150,7 +154,8 @@ def gap_of(x: Array) -> Array:
 
 
 def line(n: int) -> Array:
-    """P (2, n + 1) of one element of side 1 in front of n: D = ½, psi = 2 - 3 s and 3 s - 1, hats of length 1/n."""
+    """P (2, n + 1) of one element of side 1 in front of n: D = ½, psi = 2 - 3 s and 3 s - 1, hats
+    of length 1/n."""
     s, w = np.polynomial.legendre.leggauss(3)
     P = np.zeros((2, n + 1))
     for k in range(n):
@@ -163,7 +168,8 @@ def line(n: int) -> Array:
 
 
 def numbered(problem: ContactProblem, B: Array) -> Array:
-    """The numbers of the rows of B in the order of the conditions: each selects the displacements of its node."""
+    """The numbers of the rows of B in the order of the conditions: each selects the displacements
+    of its node."""
     surface = seen(problem.surface)
     own = B[:, :24].reshape(-1, 8, 3)
     keys = [(int(np.abs(row).sum(axis=1).argmax()), row.sum(axis=0)) for row in own]
@@ -184,8 +190,8 @@ def numbered(problem: ContactProblem, B: Array) -> Array:
     ],
 )
 def test_a_box_in_a_corner_by_enumeration(shape, n):
-    """A vertex of three, edges of two conditions: reactions of all sets of contacts tried, on dense matrices along the
-    axes; turned and mirrored as a whole they are the same to 1e-9."""
+    """A vertex of three, edges of two conditions: reactions of all sets of contacts tried, on dense
+    matrices along the axes; turned and mirrored as a whole they are the same to 1e-9."""
     problem, B = built = Corner(shape, "as it is", n).build()
     system, surface = problem.system, seen(problem.surface)
     assert surface.count == 12 and sorted(len(corner) for corner in surface.corners) == [2, 2, 2, 3]
@@ -213,8 +219,9 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(("shape", "n"), [("prism", 2), pytest.param("leaning", 3, marks=serial)])
 def test_a_pit_of_one_body(shape, n):
-    """Floor and wall of one body, whose nodes in the bend belong to both: every condition is the relative displacement
-    along the normal of its face, exactly where both bodies deform linearly."""
+    """Floor and wall of one body, whose nodes in the bend belong to both: every condition is the
+    relative displacement along the normal of its face, exactly where both bodies deform
+    linearly."""
     places = {
         "box": (0.0, 0.0, 0.0),
         "below": (-1.0, -1.0, 0.0),
@@ -247,7 +254,8 @@ def test_a_pit_of_one_body(shape, n):
     assert found.normal_values(u) == pytest.approx(np.sum(jump * found.normals, axis=1), abs=1e-12)
 
 
-# Beside welds and symmetry planes -------------------------------------------------------------------------------------
+# Beside welds and symmetry planes
+# -------------------------------------------------------------------------------------
 
 PRESSURE = 1e3
 
@@ -258,7 +266,8 @@ def pressed(x: Array) -> Array:
 
 
 def uniform(mesh: Any, rollers: list[str], tops: list[str], surface_of: Any) -> ContactProblem:
-    """Blocks between smooth planes under pressure: that of the contact and the displacements are exact to 1e-10."""
+    """Blocks between smooth planes under pressure: that of the contact and the displacements are
+    exact to 1e-10."""
     built, tags = build_mesh(mesh, COMM)
     d, along = built.geometry.dim, {"left": (0,), "bottom": (1,), "back": (2,)}
     held = [Prescribed(tags[name], components=along[name.split("_")[1]]) for name in rollers]
@@ -287,8 +296,9 @@ def uniform(mesh: Any, rollers: list[str], tops: list[str], surface_of: Any) -> 
     ],
 )
 def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
-    """Two bodies welded on one half of their interface, meshed unlike each other on the rest: nodes of the weld have no
-    condition, and the pressure beside it is what it is elsewhere; also where every facet has nodes of the weld."""
+    """Two bodies welded on one half of their interface, meshed unlike each other on the rest: nodes
+    of the weld have no condition, and the pressure beside it is what it is elsewhere; also where
+    every facet has nodes of the weld."""
     d = 2 if kind == "triangles" else 3
     places = {
         "lower0": (0.0, 0.0, 0.0),
@@ -335,8 +345,8 @@ def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
     ],
 )
 def test_the_pressure_is_uniform_up_to_symmetry_planes(simplices, upper, lower):
-    """A quarter of a block on a quarter of another on rigid ground, facets of up to ten times the size of those
-    opposite, one a side; distorted where there are several."""
+    """A quarter of a block on a quarter of another on rigid ground, facets of up to ten times the
+    size of those opposite, one a side; distorted where there are several."""
 
     def moved(x: Array) -> Array:
         a, b = np.pi * x[:, 0] / 1.5, np.pi * x[:, 2] / 1.2
@@ -362,15 +372,16 @@ def test_the_pressure_is_uniform_up_to_symmetry_planes(simplices, upper, lower):
 
 
 def bent(x: Array, along: float) -> Array:
-    """A floor that hangs and a wall that bulges, symmetric about z = 0; not ``along`` z where facets of two bodies look
-    past one another at the plane: nothing is behind it in half the model."""
+    """A floor that hangs and a wall that bulges, symmetric about z = 0; not ``along`` z where
+    facets of two bodies look past one another at the plane: nothing is behind it in half the
+    model."""
     a, b, c = x.T
     return x + 0.04 * np.column_stack([along * c**2 + b**2, along * c**2 + a**2, 0.0 * c])
 
 
 def half(way: float, two: bool) -> tuple[ContactProblem, Array]:
-    """(problem, r_n by place and face, displacements of the box) of a box on a floor beside a wall, rigid or two other
-    blocks; of the half z > 0 with way 0, of the whole with way 1."""
+    """(problem, r_n by place and face, displacements of the box) of a box on a floor beside a wall,
+    rigid or two other blocks; of the half z > 0 with way 0, of the whole with way 1."""
     n = round(1.0 + way)
     places = {
         "box": ((0.0, 0.0), (2, 2, 2)),
@@ -417,8 +428,8 @@ def half(way: float, two: bool) -> tuple[ContactProblem, Array]:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
 def test_an_edge_that_ends_in_a_symmetry_plane(two):
-    """Curved faces that meet in a curved edge, and half of them: the same conditions and displacements, at nodes of the
-    plane half of the weights and reactions; some open."""
+    """Curved faces that meet in a curved edge, and half of them: the same conditions and
+    displacements, at nodes of the plane half of the weights and reactions; some open."""
     (_, whole, u), (problem, rows, u_half) = half(1.0, two), half(0.0, two)
     assert sorted(len(corner) for corner in seen(problem.surface).corners) == [2, 2, 2]
     share = np.where(np.abs(rows[:, 2]) < 1e-9, 0.5, 1.0)
@@ -433,9 +444,10 @@ def test_an_edge_that_ends_in_a_symmetry_plane(two):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
 def test_an_edge_between_tied_ends(two):
-    """A box on a floor beside a wall, of which both ends move alike: one condition for each face of the nodes that are
-    one, with the weight of both; loads that do not depend on z leave every plane, of uneven ones, with the same
-    pressures, and a uniform pressure arrives at the blocks as the same forces in every plane."""
+    """A box on a floor beside a wall, of which both ends move alike: one condition for each face of
+    the nodes that are one, with the weight of both; loads that do not depend on z leave every
+    plane, of uneven ones, with the same pressures, and a uniform pressure arrives at the blocks as
+    the same forces in every plane."""
     places = {
         "box": ((0.0, 0.0), (2, 2, 3)),
         "under": ((0.0, -1.0), (3, 1, 4)),
@@ -491,12 +503,13 @@ def test_an_edge_between_tied_ends(two):
     assert np.count_nonzero(rows[0, :, 7]) >= 2
 
 
-# Friction along edges -------------------------------------------------------------------------------------------------
+# Friction along edges
+# -------------------------------------------------------------------------------------------------
 
 
 def trough(shape: str, kind: str) -> ContactProblem:
-    """A block that slides along z in a trough of floor and wall, pressed on both: rigid ones, one group or two joined,
-    or blocks with meshes of their own, held all over."""
+    """A block that slides along z in a trough of floor and wall, pressed on both: rigid ones, one
+    group or two joined, or blocks with meshes of their own, held all over."""
     way = SHAPES[shape] @ PLACED["turned"].T
     places = {"box": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 2)}
     if kind == "mortar":
@@ -560,8 +573,8 @@ def trough(shape: str, kind: str) -> ContactProblem:
     ],
 )
 def test_edges_rub_along_themselves_by_one_face(shape, kind):
-    """The first condition of a node on an edge rubs, along the edge, with its own r_n; the others do not. What the body
-    loses of its momentum along the trough is the sum, step by step."""
+    """The first condition of a node on an edge rubs, along the edge, with its own r_n; the others
+    do not. What the body loses of its momentum along the trough is the sum, step by step."""
     problem, along = trough(shape, kind), PLACED["turned"] @ SHAPES[shape][2]
     surface = seen(problem.surface)
     first, other = np.transpose(surface.corners)
@@ -597,11 +610,13 @@ def test_edges_rub_along_themselves_by_one_face(shape, kind):
         before = now
 
 
-# Redistributed mass across meshes that do not match -------------------------------------------------------------------
+# Redistributed mass across meshes that do not match
+# -------------------------------------------------------------------
 
 
 def inertia_of(problem: ContactProblem) -> Array:
-    """RᵀMR (6, 6) of the rigid motions of each of two bodies: masses, centres, moments and products of inertia."""
+    """RᵀMR (6, 6) of the rigid motions of each of two bodies: masses, centres, moments and products
+    of inertia."""
     space, found = problem.system.space, []
     for body in (0, 1):
         x = space.points
@@ -617,9 +632,9 @@ def inertia_of(problem: ContactProblem) -> Array:
 
 @pytest.mark.parametrize(("simplices", "mu"), [(False, 0.3), pytest.param(True, 0.0, marks=serial)])
 def test_massless_nodes_between_meshes_that_do_not_match(simplices, mu):
-    """Two bodies that touch and approach each other, curved sides of warped facets, partly covered: inertia of each to
-    1e-12, no mass at the nodes of either side that meet, momenta to 1e-12; the impact starts without a jump, no
-    energy is gained or unaccounted for (1e-10)."""
+    """Two bodies that touch and approach each other, curved sides of warped facets, partly covered:
+    inertia of each to 1e-12, no mass at the nodes of either side that meet, momenta to 1e-12; the
+    impact starts without a jump, no energy is gained or unaccounted for (1e-10)."""
     mesh = unlike(
         turn=2,
         upper=(0.8, 0.6, 0.7),
@@ -663,7 +678,8 @@ def test_massless_nodes_between_meshes_that_do_not_match(simplices, mu):
     assert force[0] == 0.0 and 0.0 < force[1] < 0.2 * force.max()
 
 
-# Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
+# Refusals, each with its sentence, on all ranks
+# -----------------------------------------------------------------------
 
 
 def part(side: Facets, name: str, low: float, high: float) -> Facets:
@@ -674,8 +690,8 @@ def part(side: Facets, name: str, low: float, high: float) -> Facets:
 
 @pytest.mark.two_ranks
 def test_refused_pairs():
-    """Groups of another kind and without facets, sides of one body, facets and pairs that are given twice, sides before
-    which there is nothing."""
+    """Groups of another kind and without facets, sides of one body, facets and pairs that are given
+    twice, sides before which there is nothing."""
     built, tags = build_mesh(unlike(), COMM)
     system = assemble(built, SOFT)
     lower, upper = tags["lower_top"], tags["upper_bottom"]
@@ -702,7 +718,8 @@ def test_refused_pairs():
         r"a facet of both 'hull' and 'lower_top' at \(.*\): a facet cannot": lambda: pair(
             group(tags, ["upper_bottom", "lower_top"]), lower
         ),
-        "on several contact surfaces with one contact direction: list every boundary and every pair once, and "
+        "on several contact surfaces with one contact direction: list every boundary and every "
+        "pair once, and "
         "join boundaries that continue one another": lambda: joined_surfaces(
             pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)
         ),
@@ -737,17 +754,20 @@ def spoilt(corner: tuple[float, float, float], to: tuple[float, float, float]) -
         (
             True,
             (1e-9, 1.0, 0.6),
-            "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot be trusted",
+            "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot be "
+            "trusted",
         ),
         (
             True,
             (0.5, 0.8, 0.6),
-            r"'lower_top' lies 0\..* m behind 'upper_bottom' at \(.*\): the bodies overlap there, or",
+            r"'lower_top' lies 0\..* m behind 'upper_bottom' at \(.*\): the bodies overlap there, "
+            r"or",
         ),
     ],
 )
 def test_refused_facets_of_a_mesh(simplices, to, sentence):
-    """Nodes without a place, cells turned inside out, quadrilaterals with a straight corner, slivers, overlap."""
+    """Nodes without a place, cells turned inside out, quadrilaterals with a straight corner,
+    slivers, overlap."""
     upper = BlockMesh(
         lengths=(1.5, 1.0, 1.2),
         divisions=(3, 2, 2),

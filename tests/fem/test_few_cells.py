@@ -1,4 +1,5 @@
-"""Bodies of fewer cells and nodes than there are ranks: a rank that owns nothing takes part in everything."""
+"""Bodies of fewer cells and nodes than there are ranks: a rank that owns nothing takes part in
+everything."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Field output: stresses against closed forms, frames in the input's order on any number of ranks, always readable."""
+"""Field output: stresses against closed forms, frames in the input's order on any number of ranks,
+always readable."""
 
 from __future__ import annotations
 
@@ -58,7 +59,8 @@ def run(
 
 
 def frames(folder: Path) -> list[dict[str, Any]]:
-    """What a reader of XDMF finds: for every grid its time and the arrays that its data items point to."""
+    """What a reader of XDMF finds: for every grid its time and the arrays that its data items point
+    to."""
     found = []
     for grid in ET.parse(folder / "fields.xdmf").getroot().iter("Grid"):
         if grid.get("GridType") != "Uniform":
@@ -89,7 +91,8 @@ def read(folder: Path, item: Any) -> Any:
 
 
 def measure(points: Any, cells: Any) -> Any:
-    """Area or volume of cells in VTK's order, by the divergence theorem over its faces; a wrong order gives another."""
+    """Area or volume of cells in VTK's order, by the divergence theorem over its faces; a wrong
+    order gives another."""
     x = points[cells]
     if np.ptp(points[:, 2]) == 0.0:
         after = np.roll(x, -1, axis=1)
@@ -110,7 +113,8 @@ def measure(points: Any, cells: Any) -> Any:
     )
 
 
-# Stresses ------------------------------------------------------------------------------------------------------------
+# Stresses
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -120,7 +124,8 @@ def measure(points: Any, cells: Any) -> Any:
 def test_von_mises_of_uniform_plane_stress_and_strain(
     comm: Any, section: Section, simplices: bool
 ) -> None:
-    """sigma_v² = s_x² + s_y² + s_z² - s_x s_y - s_y s_z - s_z s_x + 3 s_xy², with Hooke's law written out."""
+    """sigma_v² = s_x² + s_y² + s_z² - s_x s_y - s_y s_z - s_z s_x + 3 s_xy², with Hooke's law
+    written out."""
     mesh, _ = block(comm, lengths=(2.0, 1.0), divisions=(3, 2), simplices=simplices, angle=0.4)
     system = assemble(mesh, RUBBER, section=section)
     gradient = np.array([[1e-3, 4e-4], [-2e-4, 2.5e-3]])
@@ -153,7 +158,8 @@ def test_von_mises_in_three_dimensions(comm: Any, simplices: bool) -> None:
 
 @pytest.mark.two_ranks
 def test_von_mises_of_bending_is_a_cell_mean(comm: Any) -> None:
-    """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_x = y, sigma_xy = x/2, so the mean of √(y² + 3 x²/4)."""
+    """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_x = y, sigma_xy = x/2, so the mean of √(y² +
+    3 x²/4)."""
     mesh, _ = block(comm, lengths=(1.0, 1.0), divisions=(1, 2), corner=(0.0, 1.0))
     system = assemble(mesh, LinearElastic(E=1.0, nu=0.0, rho=1.0), section=PlaneStress())
     x, y = system.space.points.T
@@ -174,11 +180,13 @@ def test_von_mises_of_bending_is_a_cell_mean(comm: Any) -> None:
         assert value == pytest.approx(mean, rel=2e-3)  # two Gauss points per axis
 
 
-# Frames --------------------------------------------------------------------------------------------------------------
+# Frames
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
-    """Frames at steps 0, 18, 36 with the displacement, velocity and contact of a march, turned back to the axes."""
+    """Frames at steps 0, 18, 36 with the displacement, velocity and contact of a march, turned back
+    to the axes."""
     problem = shaken_wall(comm, angle=0.3, gap=1e-7)
     run(problem, shared_tmp, 40, 18)
     found = frames(shared_tmp)
@@ -214,7 +222,8 @@ def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
 
 @pytest.mark.slow
 def test_friction_in_the_frames(comm: Any, shared_tmp: Path) -> None:
-    """Status 2 where a point sticks and 3 where it slipped; traction and slip as vectors along the turned tangents."""
+    """Status 2 where a point sticks and 3 where it slipped; traction and slip as vectors along the
+    turned tangents."""
     problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
     surface = seen(problem.surface)
     simulate(
@@ -277,7 +286,8 @@ class Counting:
 
 
 def test_contact_beside_the_frames(comm: Any) -> None:
-    """Where frames hold the arrays, Contact(arrays=False) finds the same numbers and reduces a dozen at a time."""
+    """Where frames hold the arrays, Contact(arrays=False) finds the same numbers and reduces a
+    dozen at a time."""
     problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
     counting = Counting(problem.surface.comm)
     thin, whole = Contact(arrays=False), Contact()
@@ -334,7 +344,8 @@ def test_acceleration_is_that_of_the_step(comm: Any, shared_tmp: Path) -> None:
 
 @pytest.mark.two_ranks
 def test_prescribed_motion_is_in_the_fields(comm: Any, shared_tmp: Path) -> None:
-    """Nodes that are moved by hand have their displacement, velocity and acceleration in every frame."""
+    """Nodes that are moved by hand have their displacement, velocity and acceleration in every
+    frame."""
     mesh, tags = block(comm, lengths=(1.0, 2.0), divisions=(2, 3))
     w = 2.0 * pi * 5.0
     motion = Prescribed(
@@ -382,7 +393,8 @@ def test_cells_in_the_order_of_vtk(
 
 
 def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
-    """The frames of all ranks together and of one rank alone: same mesh, same order, fields to 1e-10."""
+    """The frames of all ranks together and of one rank alone: same mesh, same order, fields to
+    1e-10."""
     from mpi4py import MPI
 
     def wall(ranks: Any) -> ContactProblem:
@@ -412,7 +424,8 @@ def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
 
 @pytest.mark.slow
 def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) -> None:
-    """Frames behind the checkpoint are removed, and the index never names a frame that is not there."""
+    """Frames behind the checkpoint are removed, and the index never names a frame that is not
+    there."""
     problem = shaken_wall(comm)
     run(problem, shared_tmp, 12, 2, checkpoint_every=100)
     late = shared_tmp / "fields" / "frame_000014.h5"
@@ -438,7 +451,8 @@ def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) 
 
 @pytest.mark.slow
 def test_several_frames_in_a_file(comm: Any, shared_tmp: Path) -> None:
-    """What a reader finds is the same as with a file for each, also after a restart that drops some of a file."""
+    """What a reader finds is the same as with a file for each, also after a restart that drops some
+    of a file."""
     problem, folders = (
         shaken_wall(comm, angle=0.3, gap=1e-7),
         (shared_tmp / "each", shared_tmp / "packed"),
@@ -469,7 +483,8 @@ def test_several_frames_in_a_file(comm: Any, shared_tmp: Path) -> None:
 
 @pytest.mark.slow
 def test_restart_drops_late_frames_of_a_file(comm: Any, shared_tmp: Path) -> None:
-    """A run killed behind its checkpoint has later frames in a file with earlier ones: only those are kept."""
+    """A run killed behind its checkpoint has later frames in a file with earlier ones: only those
+    are kept."""
     problem, checkpoint, kept = shaken_wall(comm), shared_tmp / "checkpoint.npz", b""
     for steps in (8, 12, 9):
         simulate(

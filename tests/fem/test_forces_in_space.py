@@ -1,4 +1,5 @@
-"""Section forces through elements, reactions and contact resultants of bodies in space against statics and momentum."""
+"""Section forces through elements, reactions and contact resultants of bodies in space against
+statics and momentum."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def rotation(number: int) -> Array:
 
 
 def level_cut(y: float, slope: float = 0.0) -> Array:
-    """a, b, c of a cut of the column, e_2 up the slope from the left to the right, e_3 to the back, n upwards."""
+    """a, b, c of a cut of the column, e_2 up the slope from the left to the right, e_3 to the back,
+    n upwards."""
     return np.array([(0.0, y, DEPTH), (WIDTH, y + slope * WIDTH, DEPTH), (0.0, y, 0.0)])
 
 
@@ -39,7 +41,8 @@ def six_of(row: Any, name: str) -> Array:
     return np.array([row[f"{quantity}_{name}"] for quantity in SIX])
 
 
-# Section forces -------------------------------------------------------------------------------------------------------
+# Section forces
+# -------------------------------------------------------------------------------------------------------
 
 TIP, WIND, WEIGHT = (
     np.array([2e3, -5e3, 700.0]),
@@ -49,7 +52,8 @@ TIP, WIND, WEIGHT = (
 
 
 def above(y: float, slope: float) -> Array:
-    """N, V_2, V_3, M_t, M_2, M_3 of a column from what is above a cut: loads of tip, left face and body."""
+    """N, V_2, V_3, M_t, M_2, M_3 of a column from what is above a cut: loads of tip, left face and
+    body."""
     e_2 = np.array([1.0, slope, 0.0]) / np.hypot(1.0, slope)
     e_3 = np.array([0.0, 0.0, -1.0])
     axes = np.array([np.cross(e_2, e_3), e_2, e_3])
@@ -72,8 +76,8 @@ def above(y: float, slope: float) -> Array:
 @shapes
 @pytest.mark.parametrize("turn", [0, 3])
 def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, turn: int) -> None:
-    """Along faces of the mesh, through elements, inclined, in any orientation: all six to 1e-10; the foot's are minus
-    its reactions."""
+    """Along faces of the mesh, through elements, inclined, in any orientation: all six to 1e-10;
+    the foot's are minus its reactions."""
     Q = rotation(turn)
     mesh, tags = block(
         comm,
@@ -121,8 +125,8 @@ def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, t
 
 @pytest.mark.two_ranks
 def test_uniform_stress_on_any_plane(comm: Any) -> None:
-    """A block of distorted elements under a uniform stress: sigma n A and no moment on planes that are inclined both
-    ways, from a rectangle that is larger than the section."""
+    """A block of distorted elements under a uniform stress: sigma n A and no moment on planes that
+    are inclined both ways, from a rectangle that is larger than the section."""
     stress = 1e5 * np.array([(2.0, 0.6, -0.3), (0.6, -1.0, 0.5), (-0.3, 0.5, 0.4)])
     E, nu = CONCRETE.E, CONCRETE.nu
     strain = ((1.0 + nu) * stress - nu * np.trace(stress) * np.eye(3)) / E
@@ -169,9 +173,9 @@ def shaken_column(comm: Any) -> tuple[vc.ContactProblem, Any]:
 
 @pytest.mark.two_ranks
 def test_sections_carry_inertia(comm: Any) -> None:
-    """Of a shaken column with damping: forces on the planes of a layer of tetrahedra and inside it are one polynomial
-    of the height, of degree four, as linear accelerations in tetrahedra make it; at the foot they are minus the
-    reactions."""
+    """Of a shaken column with damping: forces on the planes of a layer of tetrahedra and inside it
+    are one polynomial of the height, of degree four, as linear accelerations in tetrahedra make it;
+    at the foot they are minus the reactions."""
     problem, tags = shaken_column(comm)
     heights = {"foot": 0.0} | {f"at_{k}": 1.0 + 0.2 * k for k in range(6)}
     sections = fem.SectionForces({name: level_cut(y) for name, y in heights.items()})
@@ -192,7 +196,8 @@ def test_sections_carry_inertia(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_one_leg_of_two(comm: Any) -> None:
-    """The rectangle says which part of a plane is meant; it may not end inside a body, and has a right angle."""
+    """The rectangle says which part of a plane is meant; it may not end inside a body, and has a
+    right angle."""
     legs = {
         name: BlockMesh(lengths=(0.5, 2.0, 0.5), divisions=(1, 3, 1), corner=(x, 0.0, 0.0))
         for name, x in (("left", 0.0), ("right", 2.0))
@@ -228,12 +233,13 @@ def test_one_leg_of_two(comm: Any) -> None:
             fem.SectionForces({"bad": corners}).start(problem, state)
 
 
-# Reactions ------------------------------------------------------------------------------------------------------------
+# Reactions
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_a_compliant_base_carries_all_momentum(comm: Any) -> None:
-    """Base shear in three components of a block on soil that lets a wave in: rates of momentum and angular momentum of
-    all masses, and rho c A (2 v_up - v) of the dashpots."""
+    """Base shear in three components of a block on soil that lets a wave in: rates of momentum and
+    angular momentum of all masses, and rho c A (2 v_up - v) of the dashpots."""
     mesh, tags = block(comm, lengths=(3.0, 2.0, 2.0), divisions=(3, 2, 2))
     system, free = (
         fem.assemble(mesh, CONCRETE, dashpots=wave_on(tags["bottom"])),
@@ -278,11 +284,13 @@ def wave_on(facets: Any) -> fem.CompliantBase:
     return fem.CompliantBase(facets, motion=wave)
 
 
-# Resultants of contact ------------------------------------------------------------------------------------------------
+# Resultants of contact
+# ------------------------------------------------------------------------------------------------
 
 
 def pushed(problem: vc.ContactProblem) -> vc.State:
-    """Some reactions, of friction too, the same on any number of ranks; tangents that do not rub carry none."""
+    """Some reactions, of friction too, the same on any number of ranks; tangents that do not rub
+    carry none."""
     surface, random = problem.surface, np.random.default_rng(8)
     r_n, r_t = random.random(surface.total), random.standard_normal((surface.total, 2))
     mine = np.where(surface.tangents >= 0, r_t[surface.slots], 0.0)
@@ -293,7 +301,8 @@ def pushed(problem: vc.ContactProblem) -> vc.State:
 def of_nodes(
     problem: vc.ContactProblem, state: vc.State, centre: Any, body: int | None = None
 ) -> Array:
-    """(6,) force and moment about a centre of the contact reactions on the nodes, of one body or of all."""
+    """(6,) force and moment about a centre of the contact reactions on the nodes, of one body or of
+    all."""
     load = problem.surface.reaction_load(state.r_n, problem.system.rows, state.r_t)
     every, points = -forces(problem, load), field(problem.system, np.zeros(problem.system.rows))[0]
     if body is not None:
@@ -313,8 +322,9 @@ CENTRE = (0.3, -0.2, 0.4)
 
 @pytest.mark.two_ranks
 def test_edges_and_corners_rub_as_their_nodes_do(comm: Any) -> None:
-    """Three faces that meet at oblique angles, turned: force and moment are those of the nodal forces, the parts of the
-    faces add up, and the summary of a run agrees, whether it knows the nodes or only the places."""
+    """Three faces that meet at oblique angles, turned: force and moment are those of the nodal
+    forces, the parts of the faces add up, and the summary of a run agrees, whether it knows the
+    nodes or only the places."""
     Q = rotation(5)
 
     def leaning(x: Array) -> Array:
@@ -372,8 +382,8 @@ class Places:
 
 @pytest.mark.parametrize("gap", [0.0, 0.1])
 def test_action_is_reaction_between_faces_that_do_not_match(comm: Any, gap: float) -> None:
-    """The resultant of a mortar pair is what side 1 feels, side 2 minus that, moment included; across a gap the couple
-    of gap and friction remains."""
+    """The resultant of a mortar pair is what side 1 feels, side 2 minus that, moment included;
+    across a gap the couple of gap and friction remains."""
     Q = rotation(2)
     meshes = blocks(3, upper=(3, 2, 2), lower=(2, 2, 3), gap=gap).blocks()
     turned = Blocks(
@@ -397,8 +407,9 @@ def test_action_is_reaction_between_faces_that_do_not_match(comm: Any, gap: floa
 
 @pytest.mark.two_ranks
 def test_turn_and_settlement_of_a_footing(comm: Any) -> None:
-    """A stiff block on springs, level and in any orientation, under its weight, a push and an overturning: forces and
-    moments are those of the loads, theta = M/(k I), settlement = N/(k A), e = M/N; vectors turn with the block."""
+    """A stiff block on springs, level and in any orientation, under its weight, a push and an
+    overturning: forces and moments are those of the loads, theta = M/(k I), settlement = N/(k A), e
+    = M/N; vectors turn with the block."""
     size, k, force = (2.0, 1.0, 1.5), 1e7, np.array([4e3, -6e4, -3e3])  # m, Pa/m, N/m³
     rows = []
     for turn in (0, 4):

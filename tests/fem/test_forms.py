@@ -1,4 +1,5 @@
-"""Forms of the user's own: those of materials, prestress, springs, K that is not symmetric, outputs and misuse."""
+"""Forms of the user's own: those of materials, prestress, springs, K that is not symmetric, outputs
+and misuse."""
 
 from __future__ import annotations
 
@@ -86,7 +87,8 @@ def same(comm: Any, one: Any, other: Any) -> None:
 
 
 def both(comm: Any, name: str, section: str) -> tuple[Any, Forms, Any, Any, dict[str, Any]]:
-    """(mesh, forms, the body stated by them and by its material, what else is given), damped, pushed and moved."""
+    """(mesh, forms, the body stated by them and by its material, what else is given), damped,
+    pushed and moved."""
     name, _, degree = name.partition(", degree ")
     mesh, tags = block(comm, **BODIES[name])
     pushed = fem.Prescribed(tags["top"], lambda x, t: (1 + t) * 1e-3 * x, components=(1,))
@@ -141,7 +143,8 @@ def test_mass_of_a_material_and_damping_of_ones_own(comm: Any) -> None:
 
 
 def test_outputs_of_own_isotropic_forms_are_those_of_the_material(comm: Any) -> None:
-    """Stresses, with sigma_zz of plane strain, reactions, section forces, geometric stiffness: to round-off."""
+    """Stresses, with sigma_zz of plane strain, reactions, section forces, geometric stiffness: to
+    round-off."""
     _, _, ours, theirs, data = both(comm, "quadrilaterals", "strain")
     stresses, numbers = [], []
     for system in (ours, theirs):
@@ -169,13 +172,14 @@ def test_viscous_damping_beside_own_forms(comm: Any) -> None:
     same(comm, ours, fem.assemble(mesh, CONCRETE, section=section, damping=damping))
 
 
-# Prestress, springs and layers ----------------------------------------------------------------------------------------
+# Prestress, springs and layers
+# ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 def test_a_prestressed_string(comm: Any) -> None:
-    """A line with one transverse displacement, T u'v' and rho A u v: f1 = sqrt(T / rho A) / 2L, on 16 elements as the
-    lattice has it, w² = 6 c²/h² (1 - cos kh)/(2 + cos kh)."""
+    """A line with one transverse displacement, T u'v' and rho A u v: f1 = sqrt(T / rho A) / 2L, on
+    16 elements as the lattice has it, w² = 6 c²/h² (1 - cos kh)/(2 + cos kh)."""
     n, length, tension, line = 16, 3.0, 400.0, 0.1
     mesh, tags = block(comm, lengths=(length,), divisions=(n,))
     T = compat.constant(mesh, tension)
@@ -195,7 +199,8 @@ def test_a_prestressed_string(comm: Any) -> None:
 
 @pytest.mark.serial
 def test_a_prestressed_beam_in_shear(comm: Any) -> None:
-    """nu = 0, sigma_xx = s0 for a start: w² = k² (G + s0)/rho of u_y = sin(pi x/L), on the lattice; sides tied.
+    """nu = 0, sigma_xx = s0 for a start: w² = k² (G + s0)/rho of u_y = sin(pi x/L), on the lattice;
+    sides tied.
 
     And K + K_G of the package, its s0 from a static stage, has the same frequency."""
     n, length, G, s0, rho = 12, 4.0, 2.0e6, 1.5e6, 1000.0
@@ -244,7 +249,8 @@ def test_springs_on_a_side_and_a_measure_of_ones_own(comm: Any) -> None:
     assert np.abs(u[:, 1] - exact).max() < 1e-11 * np.abs(exact).max()
 
 
-# Contact --------------------------------------------------------------------------------------------------------------
+# Contact
+# --------------------------------------------------------------------------------------------------------------
 
 WOOD = {
     "E1": 2.0e6,
@@ -290,8 +296,8 @@ def thrown(comm: Any, *material: Any, **body: Any) -> vc.ContactProblem:
 
 
 def test_a_thrown_body_stated_by_forms(comm: Any, shared_tmp: Path) -> None:
-    """Step by step that of the material; certified to 1e-9, the energy ledger closed; no von Mises stress in its fields
-    where no stress is told, and pictures know of it."""
+    """Step by step that of the material; certified to 1e-9, the energy ledger closed; no von Mises
+    stress in its fields where no stress is told, and pictures know of it."""
     rows: dict[str, list[Any]] = {}
     for name, problem in (
         ("law", thrown(comm, vc.Orthotropic(**WOOD))),
@@ -328,7 +334,8 @@ def test_a_thrown_body_stated_by_forms(comm: Any, shared_tmp: Path) -> None:
 
 
 def leaning(comm: Any) -> tuple[Any, Any]:
-    """A block pressed and pushed on its foundation, K with a skew part: (problem, what pushes it)."""
+    """A block pressed and pushed on its foundation, K with a skew part: (problem, what pushes
+    it)."""
     mesh, tags = block(comm, lengths=(1.5, 1.0), divisions=(6, 4))
     forms = isotropic(mesh, LinearElastic(1e6, 0.3, 1000.0), PlaneStrain())
 
@@ -346,8 +353,9 @@ def leaning(comm: Any) -> tuple[Any, Any]:
 
 @pytest.mark.two_ranks
 def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
-    """Both methods of the volume route and Lemke's agree, statically, certified and partly open, and in dynamics;
-    reactions are rows of K u - f; routes that need symmetry say so, as does the log of a run."""
+    """Both methods of the volume route and Lemke's agree, statically, certified and partly open,
+    and in dynamics; reactions are rows of K u - f; routes that need symmetry say so, as does the
+    log of a run."""
     problem, push = leaning(comm)
     assert problem.system.algebra.symmetric is False and "not symmetric" in problem.system.notes[1]
     solvers = (Volume(ReducedNewton()), Volume(SemismoothNewton()), vc.Condensed(Lemke()))
@@ -425,9 +433,10 @@ def test_a_restart_sees_the_sense_of_a_skew_damping(comm: Any) -> None:
 
 @pytest.mark.serial
 def test_gyroscopic_damping_takes_no_energy(comm: Any) -> None:
-    """A block on springs k per volume in a frame that turns with W, C skew: z'' + 2iW z' + (k/rho) z = 0 of z = x + iy,
-    so that z = v0 (exp(iat) - exp(ibt)) / (i (a - b)), a, b = -W ± sqrt(W² + k/rho); the midpoint rule has the phases
-    2 arctan(a dt/2). In contact the energy ledger is closed, for such a C does no work."""
+    """A block on springs k per volume in a frame that turns with W, C skew: z'' + 2iW z' + (k/rho)
+    z = 0 of z = x + iy, so that z = v0 (exp(iat) - exp(ibt)) / (i (a - b)), a, b = -W ± sqrt(W² +
+    k/rho); the midpoint rule has the phases 2 arctan(a dt/2). In contact the energy ledger is
+    closed, for such a C does no work."""
     mesh, tags = block(comm, lengths=(1.5, 1.0), divisions=(3, 2), simplices=True)
     forms, rho, W, k, dt = (
         isotropic(mesh, LinearElastic(1e6, 0.3, 1000.0), PlaneStrain()),
@@ -467,7 +476,8 @@ def test_gyroscopic_damping_takes_no_energy(comm: Any) -> None:
     assert struck > 0.0 and defect < 1e-11 * system.kinetic_energy(system.v0)
 
 
-# Misuse and outputs that need a material ------------------------------------------------------------------------------
+# Misuse and outputs that need a material
+# ------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -542,7 +552,8 @@ def test_forms_that_cannot_be_a_body(comm: Any) -> None:
 
 
 def test_facets_between_ranks_need_ghosts(comm: Any) -> None:
-    """u = (|x - 1|, 0) has a kink of 2 on a line of length 1.5: ∫ jump·jump dS = 6; without ghosts one sentence."""
+    """u = (|x - 1|, 0) has a kink of 2 on a line of length 1.5: ∫ jump·jump dS = 6; without ghosts
+    one sentence."""
 
     def jumps(u: Any, v: Any) -> Any:
         return ufl.inner(ufl.jump(ufl.grad(u)), ufl.jump(ufl.grad(v))) * ufl.dS
@@ -553,8 +564,8 @@ def test_facets_between_ranks_need_ghosts(comm: Any) -> None:
         if ghosts == "none" and comm.size > 1:
             said = refusal(comm, lambda: fem.assemble(mesh, forms=given))  # noqa: B023
             assert (
-                "stiffness integrates over interior facets (dS), which on several ranks needs a mesh with"
-                in said
+                "stiffness integrates over interior facets (dS), which on several ranks needs a "
+                "mesh with" in said
             )
             continue
         system = fem.assemble(mesh, forms=given)
@@ -592,8 +603,8 @@ def test_complex_numbers_are_refused(comm: Any, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.two_ranks
 def test_outputs_that_need_a_material(comm: Any) -> None:
-    """Stresses ask for the form of stress; dashpots and free fields for a material, and take it from beside the forms;
-    a cut through elements for their density."""
+    """Stresses ask for the form of stress; dashpots and free fields for a material, and take it
+    from beside the forms; a cut through elements for their density."""
     mesh, tags = block(comm, **BODIES["quadrilaterals"])
     forms, low = isotropic(mesh, section=PlaneStrain()), {"clamped": tags["bottom"]}
     mute = fem.assemble(mesh, forms=replace(forms, stress=None), **low)

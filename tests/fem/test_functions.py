@@ -1,4 +1,5 @@
-"""Functions of states and frames: nodal values, stresses and pressures against closed forms, on any number of ranks."""
+"""Functions of states and frames: nodal values, stresses and pressures against closed forms, on any
+number of ranks."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ def with_field(problem: ContactProblem, A: Any) -> vc.State:
 def on_sides(
     comm: Any, A: Any, integration: Any = "full", degree: int = 1, **spec: Any
 ) -> ContactProblem:
-    """A body whose left side is moved by the field A x, and whose right side may touch an obstacle that is oblique."""
+    """A body whose left side is moved by the field A x, and whose right side may touch an obstacle
+    that is oblique."""
     mesh, tags = block(comm, **spec)
     grown = fem.Prescribed(
         tags["left"],
@@ -74,8 +76,9 @@ def on_sides(
     ids=str,
 )
 def test_values_of_a_state(comm: Any, body: str, options: dict[str, Any]) -> None:
-    """u and v are those of the state in Cartesian axes, though contact frames are turned, with the prescribed sides and
-    with ghosts; the stress of a patch is Hooke's, in every cell and projected."""
+    """u and v are those of the state in Cartesian axes, though contact frames are turned, with the
+    prescribed sides and with ghosts; the stress of a patch is Hooke's, in every cell and
+    projected."""
     d = len(BODIES[body]["lengths"])
     A = 1e-4 * np.array([[1.0, 2.0, -1.0], [0.5, -3.0, 0.25], [2.0, 0.125, 1.5]])[:d, :d]
     problem = on_sides(comm, A, **options, **BODIES[body])
@@ -94,7 +97,8 @@ def test_values_of_a_state(comm: Any, body: str, options: dict[str, Any]) -> Non
 
 
 def test_tied_sides_move_together(comm: Any) -> None:
-    """A layer under its weight whose sides are tied: u is that of a column at every node, those that follow too."""
+    """A layer under its weight whose sides are tied: u is that of a column at every node, those
+    that follow too."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 3))
     system = fem.assemble(
         mesh,
@@ -112,7 +116,8 @@ def test_tied_sides_move_together(comm: Any) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("continuous", [False, True])
 def test_stress_of_bending_is_in_the_space_of_a_quadrilateral(comm: Any, continuous: bool) -> None:
-    """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_xx = y, sigma_xy = x/2, sigma_yy = 0: bilinear in every cell."""
+    """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_xx = y, sigma_xy = x/2, sigma_yy = 0:
+    bilinear in every cell."""
     mesh, _ = block(comm, lengths=(1.0, 1.0), divisions=(2, 3))
     problem = linear(
         fem.assemble(mesh, vc.LinearElastic(1.0, 0.0, 1.0), section=vc.PlaneStress(0.2))
@@ -128,7 +133,8 @@ def test_stress_of_bending_is_in_the_space_of_a_quadrilateral(comm: Any, continu
 
 @pytest.mark.two_ranks
 def test_projection_of_a_jump(comm: Any) -> None:
-    """A bar of three cells, E = 1, strains 1, 0, 2: the L2 projection onto P1 solves M s = b of hat functions."""
+    """A bar of three cells, E = 1, strains 1, 0, 2: the L2 projection onto P1 solves M s = b of hat
+    functions."""
     mesh, _ = block(comm, lengths=(3.0,), divisions=(3,))
     problem = linear(fem.assemble(mesh, vc.LinearElastic(1.0, 0.0, 1.0)))
     x = problem.system.space.points[:, 0]
@@ -153,8 +159,9 @@ def test_projection_of_a_jump(comm: Any) -> None:
 
 
 def test_contact_pressure_integrates_to_the_resultant(comm: Any) -> None:
-    """∫ p ds over the contact side, p zero at its clamped end, is the sum of the reactions over the thickness: weights
-    are integrals of hats. The function has the pressure of the neighbour there."""
+    """∫ p ds over the contact side, p zero at its clamped end, is the sum of the reactions over the
+    thickness: weights are integrals of hats. The function has the pressure of the neighbour
+    there."""
     problem = shaken_wall(comm, angle=0.3, simplices=True)
     solution = vc.simulate(problem, steps=33, **RUN)
     pressure, whole = solution.function("contact_pressure"), problem.surface.whole()
@@ -176,7 +183,8 @@ def test_contact_pressure_integrates_to_the_resultant(comm: Any) -> None:
 
 
 def test_stored_frames(comm: Any, shared_tmp: Path) -> None:
-    """A frame by its time or number is what XDMF shows, in the numbers of the input; a restart ends in the same."""
+    """A frame by its time or number is what XDMF shows, in the numbers of the input; a restart ends
+    in the same."""
     problem = shaken_wall(comm, angle=0.3)
     first = vc.simulate(problem, steps=22, out=shared_tmp, fields=fem.XDMF(11), **RUN)
     solution = vc.simulate(

@@ -1,4 +1,5 @@
-"""Groups of a user's own mesh, from MeshTags and from markers: contact on them, and every refusal."""
+"""Groups of a user's own mesh, from MeshTags and from markers: contact on them, and every
+refusal."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ cells = pytest.mark.parametrize("cell", OWN)
 
 
 def beside_a_wall(mesh: Any, base: fem.Facets, face: fem.Facets) -> ContactProblem:
-    """A body held at its base, x = 0, that shaking drives into a wall 10 µm from its face, x = 2."""
+    """A body held at its base, x = 0, that shaking drives into a wall 10 µm from its face, x =
+    2."""
     d = mesh.geometry.dim
     system = fem.assemble(
         mesh, CONCRETE, clamped=base, loads=fem.BodyForce(tuple(2e6 * np.eye(d)[0]))
@@ -90,7 +92,8 @@ def test_a_mesh_of_dolfinx_on_all_ranks_is_the_one_on_one(cell, ghosts):
 
 @cells
 def test_tags_and_markers_name_what_gmsh_names(cell):
-    """On meshes of build_mesh: the same measures, cells and facets, and the same contact surface."""
+    """On meshes of build_mesh: the same measures, cells and facets, and the same contact
+    surface."""
     kinds = {
         "interval": "bar",
         "triangle": "triangles",
@@ -128,7 +131,8 @@ def test_tags_and_markers_name_what_gmsh_names(cell):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("ghosts", ["none", "shared_facet"])
 def test_parts_and_refinements_of_meshes(ghosts, shared_tmp):
-    """A submesh, a refined mesh, one read from XDMF: contact and fields in numbers that start from 0 without gaps."""
+    """A submesh, a refined mesh, one read from XDMF: contact and fields in numbers that start from
+    0 without gaps."""
     whole = own_mesh(COMM, "triangle", ghosts, times=2)
     near = fem.Cells.where("near", whole, lambda x: x[1] < 0.8)
     part = dolfinx.mesh.create_submesh(whole, 2, near.indices)[0]
@@ -198,7 +202,8 @@ def test_a_model_of_gmsh_as_dolfinx_reads_it():
 
 
 def checkered(comm: Any, ghosts: str, owned: bool) -> tuple[Any, Any, Any]:
-    """A mesh of 10 by 8 squares of two triangles, and its dark and light squares as a chessboard has them."""
+    """A mesh of 10 by 8 squares of two triangles, and its dark and light squares as a chessboard
+    has them."""
     mesh = own_mesh(comm, "triangle", ghosts, times=2)
     dofs = compat.geometry_dofmap(mesh)[: mesh.topology.index_map(2).size_local if owned else None]
     square = (
@@ -215,7 +220,8 @@ def checkered(comm: Any, ghosts: str, owned: bool) -> tuple[Any, Any, Any]:
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_later_pair_of_initial_values_counts_where_cells_meet(degree):
-    """A chessboard, of which some nodes touch light cells on other ranks only; with tags of ghosts and without."""
+    """A chessboard, of which some nodes touch light cells on other ranks only; with tags of ghosts
+    and without."""
     for (ghosts, owned), later in product(
         (("none", True), ("shared_facet", True), ("shared_facet", False)), (0, 1)
     ):
@@ -235,8 +241,8 @@ def test_the_later_pair_of_initial_values_counts_where_cells_meet(degree):
 
 
 def test_bodies_are_counted_without_ghosts():
-    """One block on many ranks, whose parts share nodes and no cells, is one body; two strips of it are two,
-    or refused where the parts leave nodes to ranks without their cells."""
+    """One block on many ranks, whose parts share nodes and no cells, is one body; two strips of it
+    are two, or refused where the parts leave nodes to ranks without their cells."""
     mesh = own_mesh(COMM, "quadrilateral", "none", times=2)
     system = fem.assemble(mesh, CONCRETE)
     assert system.space.comm.max(np.max(system.space.bodies, initial=0)) == 0
@@ -271,7 +277,8 @@ def test_what_is_refused():
     )
     said = refusal(COMM, lambda: fem.Facets.tagged("base", whole, 7, mesh))
     assert said == (
-        "Facets.tagged: the tags of 'base' are of dimension 2 and facets of this mesh have dimension 1; "
+        "Facets.tagged: the tags of 'base' are of dimension 2 and facets of this mesh have "
+        "dimension 1; "
         "give the tags of its facets"
     )
     assert "cells of this mesh have dimension 2" in refusal(

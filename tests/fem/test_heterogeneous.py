@@ -1,4 +1,5 @@
-"""Materials given by functions and anisotropic ones: closed forms, patch tests, layered meshes, any number of ranks."""
+"""Materials given by functions and anisotropic ones: closed forms, patch tests, layered meshes, any
+number of ranks."""
 
 from __future__ import annotations
 
@@ -111,7 +112,8 @@ def test_functions_constant_on_cells_are_pairs_of_cells_and_materials(
 
 
 def test_linear_E_on_simplices_is_its_mean_on_every_cell(comm: Any) -> None:
-    """P1 strains are constant, so that ∫ E over a cell is all that counts; by points, a P1 Function, UFL."""
+    """P1 strains are constant, so that ∫ E over a cell is all that counts; by points, a P1
+    Function, UFL."""
     mesh, tags = block(comm, **BODIES["triangles"])
     cellwise = compat.function(compat.cell_space(mesh))
 
@@ -134,7 +136,8 @@ def test_linear_E_on_simplices_is_its_mean_on_every_cell(comm: Any) -> None:
 
 
 def test_a_bar_of_linear_modulus_against_its_closed_form(comm: Any) -> None:
-    """E' = E0 (1 + x/L) pulled by s: u(L) = s L ln 2 / E0', second order; 16 layers of constant modulus likewise."""
+    """E' = E0 (1 + x/L) pulled by s: u(L) = s L ln 2 / E0', second order; 16 layers of constant
+    modulus likewise."""
     length, pull, nu = 2.0, 3.0e6, 0.2
     E, modulus = lambda x: 1e9 * (1.0 + x[0] / length), (1 - nu) / ((1 + nu) * (1 - 2 * nu)) * 1e9
     exact, errors = pull * length * log(2.0) / modulus, []
@@ -165,7 +168,8 @@ def test_a_bar_of_linear_modulus_against_its_closed_form(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_a_column_of_quadrilaterals_under_its_own_weight(comm: Any) -> None:
-    """nu = 0, E = E0 (1 + y/H), rho = r (1 + y/H): u_y(H) = -∫ g m(y) / E dy with m the mass above; u is no polynomial.
+    """nu = 0, E = E0 (1 + y/H), rho = r (1 + y/H): u_y(H) = -∫ g m(y) / E dy with m the mass above;
+    u is no polynomial.
 
     m(y) = r H ((1 + 1)² - (1 + y/H)²)/2, so that u_y(H) = -g r H²/(2 E0) (4 ln 2 - 3/2).
     """
@@ -189,7 +193,8 @@ def test_a_column_of_quadrilaterals_under_its_own_weight(comm: Any) -> None:
     assert errors[0] < 1.2e-2 and 3.8 < errors[0] / errors[1] < 4.2
 
 
-# Orthotropic cells ----------------------------------------------------------------------------------------------------
+# Orthotropic cells
+# ----------------------------------------------------------------------------------------------------
 
 
 def compliance(rotation: Any) -> Any:
@@ -223,8 +228,9 @@ def compliance(rotation: Any) -> Any:
     ],
 )
 def test_orthotropic_patch_test(comm: Any, name: str, section: str) -> None:
-    """Constant stresses on the sides strain the body by its compliance, in axes turned against the mesh: to 1e-10; and
-    their von Mises stress is that of the stresses, with sigma_zz of plane strain."""
+    """Constant stresses on the sides strain the body by its compliance, in axes turned against the
+    mesh: to 1e-10; and their von Mises stress is that of the stresses, with sigma_zz of plane
+    strain."""
     spec = {key: value for key, value in BODIES[name].items() if key != "angle"}
     mesh, tags = block(comm, **spec)
     d, angle = mesh.geometry.dim, 0.5
@@ -285,12 +291,14 @@ def test_equal_moduli_beside_isotropic_cells_are_isotropic(comm: Any) -> None:
         assert stresses[0] == pytest.approx(stresses[1], rel=1e-12)
 
 
-# Viscous stresses -----------------------------------------------------------------------------------------------------
+# Viscous stresses
+# -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 def test_damping_ratio_of_the_first_mode_of_a_rod(comm: Any) -> None:
-    """A rod without lateral strain: xi = ½ w eta/modulus, eta = bulk + 4/3 shear; the mode decays so, from C itself."""
+    """A rod without lateral strain: xi = ½ w eta/modulus, eta = bulk + 4/3 shear; the mode decays
+    so, from C itself."""
     mesh, tags = block(comm, lengths=(2.0,), divisions=(24,))
     damping = KelvinVoigt(shear=3.0e5, bulk=4.0e5)
     system = fem.assemble(mesh, CONCRETE, clamped=tags["left"], damping=damping)
@@ -316,12 +324,14 @@ def test_one_retardation_time_is_rayleigh_damping(comm: Any, name: str) -> None:
     same(comm, ours, theirs)
 
 
-# Quadrature, outputs and bad input ------------------------------------------------------------------------------------
+# Quadrature, outputs and bad input
+# ------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 def test_quadrature_degree(comm: Any) -> None:
-    """Exact from degree 2 on for rectangles (0 is not); facets too: a traction that is linear needs degree 2."""
+    """Exact from degree 2 on for rectangles (0 is not); facets too: a traction that is linear needs
+    degree 2."""
     mesh, tags = block(comm, **BODIES["quadrilaterals"])
     load = Traction(tags["top"], lambda x, t: np.column_stack([x[:, 0], 0.0 * x[:, 0]]))
     exact, fine, coarse = (

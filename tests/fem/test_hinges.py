@@ -1,4 +1,5 @@
-"""Nodes at which bodies hang together by a point or a line: refused, told from the tips of cracks, or meant."""
+"""Nodes at which bodies hang together by a point or a line: refused, told from the tips of cracks,
+or meant."""
 
 from dataclasses import replace
 from typing import Any
@@ -39,7 +40,8 @@ def problem_on(mesh, **data):
 @shapes
 @pytest.mark.parametrize("d", [2, 3])
 def test_the_rim_of_a_contact_between_two_bodies_is_refused(d, simplices):
-    """Both blocks are drawn between the same points: 2 in the plane, 6 in space, are in both bodies."""
+    """Both blocks are drawn between the same points: 2 in the plane, 6 in space, are in both
+    bodies."""
     tags, system = problem_on(Merged(stacked(d, simplices), rim))
     one, two = tags["upper_bottom"], tags["lower_top"]
     count = {2: r"2 nodes, at \(0, 1\) and \(2, 1\)", 3: r"6 nodes, the first at \(0, 1, 0\)"}[d]
@@ -145,7 +147,8 @@ class Inner:
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_cracks_end_at_tips_and_fronts(d):
-    """A crack inside a body, from x = 0.5 to 1.5 (in space to z = 0.5): all its ends are shared and none is a hinge."""
+    """A crack inside a body, from x = 0.5 to 1.5 (in space to z = 0.5): all its ends are shared and
+    none is a hinge."""
     mesh = CutOpen(
         Inner(d, lambda x: (np.abs(x[:, 0] - 1.0) < 0.5) & (x[:, -1] < 0.5 if d == 3 else True)),
         "crack",
@@ -160,7 +163,8 @@ def test_cracks_end_at_tips_and_fronts(d):
 
 
 def test_the_mouth_of_a_crack_that_was_left_closed_is_refused():
-    """A crack through a body whose end points at the outside are still one node each, as meshers leave them."""
+    """A crack through a body whose end points at the outside are still one node each, as meshers
+    leave them."""
     mesh, tags = fem.build_mesh(
         Merged(stacked(2), lambda x: np.isclose(x[1], 1.0) & (x[0] > 1.99)), COMM
     )
@@ -209,7 +213,8 @@ Physical Curve("base") = {1}; Physical Curve("ground") = {16}; Physical Curve("r
 
 @pytest.mark.serial
 def test_case_files_are_refused_and_may_mean_hinges(tmp_path):
-    """The two corner points that a block and its ground are drawn between; hinges = true in the table means them."""
+    """The two corner points that a block and its ground are drawn between; hinges = true in the
+    table means them."""
     (tmp_path / "rim.geo").write_text(RIM_GEO)
     case = tmp_path / "rim.toml"
     case.write_text(RIM)

@@ -1,4 +1,5 @@
-"""Initial strains (V8.10): free bodies expand without stress; held ones press; warmed bars send waves; dislocations."""
+"""Initial strains (V8.10): free bodies expand without stress; held ones press; warmed bars send
+waves; dislocations."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ WOOD = Orthotropic(
 def followed(
     d: int, exact: Any, load: Any, *, material: Any = CONCRETE, **options: Any
 ) -> tuple[Any, State, float]:
-    """(problem, state, largest error of u over the largest u) of a block whose left side moves as it would free."""
+    """(problem, state, largest error of u over the largest u) of a block whose left side moves as
+    it would free."""
     simplices = options.pop("simplices", False)
     mesh, tags = block(
         COMM, lengths=(2.0, 1.0, 1.5)[:d], divisions=(3, 2, 1)[:d], simplices=simplices
@@ -82,8 +84,8 @@ def stress(problem: ContactProblem, state: State) -> Array:
     ids=["bar", "Q1", "P2", "panel", "hexahedra", "selective", "wood"],
 )
 def test_uniform_warming_leaves_a_free_body_without_stress(d, options):
-    """u = alpha dT x, (1 + nu) times that in plane strain, where sigma_zz = -E alpha dT alone remains, and
-    (1 + nu)/(1 - nu) times in a bar, which is held sideways twice."""
+    """u = alpha dT x, (1 + nu) times that in plane strain, where sigma_zz = -E alpha dT alone
+    remains, and (1 + nu)/(1 - nu) times in a bar, which is held sideways twice."""
     plane = d == 2 and not isinstance(options.get("section"), PlaneStress)
     share = 1.0 + NU if plane else (1.0 + NU) / (1.0 - NU) if d == 1 else 1.0
     problem, state, error = followed(
@@ -115,7 +117,8 @@ def test_warming_linear_in_space_bends_a_free_body_without_stress(d, simplices):
 
 @pytest.mark.two_ranks
 def test_tensors_and_parts_of_a_body():
-    """Any uniform gradient, also across the plane; a dislocation: slip b across a layer of cells moves the rest."""
+    """Any uniform gradient, also across the plane; a dislocation: slip b across a layer of cells
+    moves the rest."""
     gradient = WARM * np.array([[1.0, 3.0], [-0.5, -2.0]])
     problem, state, error = followed(2, lambda x: x @ gradient.T, fem.InitialStrain(gradient))
     sizes = [error, max_over_ranks(COMM, stress(problem, state)) / (E * WARM)]
@@ -155,8 +158,8 @@ def layer(h: float, d: int = 2) -> tuple[Any, Any, Any]:
 
 @pytest.mark.parametrize("h", [0.5, 0.125])
 def test_a_dislocation_moves_half_a_body_or_strains_one_that_is_held(h):
-    """A jump b = (opening, slip): beyond the layer u = b and no stress; between held ends -(M b_x, mu b_y) / L, which
-    no longer knows the layer."""
+    """A jump b = (opening, slip): beyond the layer u = b and no stress; between held ends -(M b_x,
+    mu b_y) / L, which no longer knows the layer."""
     b = np.array([2e-4, 5e-4])
     mesh, tags, cells = layer(h)
     load = fem.InitialStrain(np.outer(b, [1.0, 0.0]) / h, cells=cells)
@@ -200,7 +203,8 @@ def between_walls(gap: float, history: Any = None) -> ContactProblem:
 
 
 def test_warming_closes_a_gap_and_presses_by_both_routes():
-    """Plane strain, free sides: p = E / (1 - nu²) ((1 + nu) alpha dT - g / H), nothing before the gap is closed."""
+    """Plane strain, free sides: p = E / (1 - nu²) ((1 + nu) alpha dT - g / H), nothing before the
+    gap is closed."""
     free, times, answers = (1.0 + NU) * WARM, [0.2, 0.6, 1.0], []
     for solver in (Condensed(), Volume()):
         problem = between_walls(0.4 * free, lambda t: t)
@@ -217,7 +221,8 @@ def test_warming_closes_a_gap_and_presses_by_both_routes():
 
 
 def warmed_bar(n: int, gap: float) -> ContactProblem:
-    """A bar of n cells, its left end held, the right one a gap before a wall, warmed all at once at t = 0."""
+    """A bar of n cells, its left end held, the right one a gap before a wall, warmed all at once at
+    t = 0."""
     mesh, tags = block(COMM, lengths=(2.0,), divisions=(n,))
     system = fem.assemble(
         mesh, LinearElastic(E, 0.0, 2400.0), clamped=tags["left"], loads=fem.InitialStrain(WARM)
@@ -228,9 +233,9 @@ def warmed_bar(n: int, gap: float) -> ContactProblem:
 
 @pytest.mark.serial
 def test_sudden_warming_sends_waves_of_its_stress():
-    """By characteristics, g = alpha dT L, T = L/c: the tip moves by c alpha dT until T, is held by E alpha dT until 2T,
-    and leaves; the support pushes by E alpha dT until T and pulls as much from then on. The ledger holds the strain
-    energy ½ E (alpha dT)² L from the start, and no work."""
+    """By characteristics, g = alpha dT L, T = L/c: the tip moves by c alpha dT until T, is held by
+    E alpha dT until 2T, and leaves; the support pushes by E alpha dT until T and pulls as much from
+    then on. The ledger holds the strain energy ½ E (alpha dT)² L from the start, and no work."""
     n, length, c = 40, 2.0, np.sqrt(E / 2400.0)
     crossing, gap, unit = length / c, WARM * length, E * WARM
     runs = []
@@ -268,8 +273,9 @@ def test_sudden_warming_sends_waves_of_its_stress():
 
 
 def test_histories_work_on_a_body_that_is_held():
-    """A block between rigid ends, warmed by s(t) = t: N = -E alpha dT s h where a cut follows element sides and where
-    it goes through elements, the same reactions, and all the work of the source is stored."""
+    """A block between rigid ends, warmed by s(t) = t: N = -E alpha dT s h where a cut follows
+    element sides and where it goes through elements, the same reactions, and all the work of the
+    source is stored."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     level = [fem.Prescribed(tags[name], components=(1,)) for name in ("top", "bottom")]
     load = [fem.InitialStrain(np.diag([WARM, 0.0]), history=lambda t: t)]
@@ -298,7 +304,8 @@ def test_histories_work_on_a_body_that_is_held():
 
 
 def test_outputs_know_the_strain_of_their_time(shared_tmp: Path):
-    """A free panel warmed by t has no stress at any time; a frame gives the stresses of the state that it stored."""
+    """A free panel warmed by t has no stress at any time; a frame gives the stresses of the state
+    that it stored."""
     mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
     rollers = [
         fem.Prescribed(tags["left"], components=(0,)),
@@ -357,8 +364,8 @@ def test_forms_of_the_user_and_wrong_values_are_refused():
 @pytest.mark.serial
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_only_numbers_and_tensors_of_the_body_are_taken(d: int) -> None:
-    """Shapes that would be broadcast are refused, of numbers and of functions, before anything is solved; on all ranks
-    alike, where one has the points of a function and another none."""
+    """Shapes that would be broadcast are refused, of numbers and of functions, before anything is
+    solved; on all ranks alike, where one has the points of a function and another none."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.5)[:d], divisions=(3, 2, 1)[:d])
     takes = [(), (d, d), *([(3, 3)] if d == 2 else [])]
     corner = fem.Cells.where("corner", mesh, lambda x: x[0] < 0.67)
@@ -415,7 +422,8 @@ def test_only_numbers_and_tensors_of_the_body_are_taken(d: int) -> None:
 
 @pytest.mark.two_ranks
 def test_a_function_with_a_history_is_that_of_the_start() -> None:
-    """The load takes value(x, 0) s(t), as other loads do, and so must stresses: a panel that is free has none."""
+    """The load takes value(x, 0) s(t), as other loads do, and so must stresses: a panel that is
+    free has none."""
     mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
     rollers = [
         fem.Prescribed(tags["left"], components=(0,)),
@@ -434,8 +442,9 @@ def test_a_function_with_a_history_is_that_of_the_start() -> None:
 
 @pytest.mark.two_ranks
 def test_energies_are_those_of_free_unknowns_where_a_support_moves() -> None:
-    """A bar of 4 cells stretched by what warming asks has no stress, and ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0 of its
-    free nodes: strains WARM in three cells and -3 WARM in the last, 6 + 2 times ½ E WARM² / 2 of one cell."""
+    """A bar of 4 cells stretched by what warming asks has no stress, and ½ uᵀKu - f_0·u + ½ ∫ eps_0
+    : C eps_0 of its free nodes: strains WARM in three cells and -3 WARM in the last, 6 + 2 times ½
+    E WARM² / 2 of one cell."""
     mesh, tags = block(COMM, lengths=(2.0,), divisions=(4,))
     moved = fem.Prescribed(tags["right"], displacement=lambda x, t: np.full(x.shape, 2.0 * WARM))
     bar = LinearElastic(E, 0.0, 2400.0)
@@ -453,7 +462,8 @@ def test_energies_are_those_of_free_unknowns_where_a_support_moves() -> None:
 
 @pytest.mark.two_ranks
 def test_a_strain_that_never_changes_is_integrated_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its ledger is that of the same strain with a history of 1, which is integrated in every step."""
+    """Its ledger is that of the same strain with a history of 1, which is integrated in every
+    step."""
     sweeps, forces = [], InitialStrains.forces
     monkeypatch.setattr(
         InitialStrains, "forces", lambda *a, **k: sweeps.append(1) or forces(*a, **k)
@@ -477,7 +487,8 @@ def test_a_strain_that_never_changes_is_integrated_once(monkeypatch: pytest.Monk
 
 @pytest.mark.serial
 def test_shear_across_the_plane_is_refused():
-    """A body in the plane does not move across it: half of the strain's energy was missing without a word."""
+    """A body in the plane does not move across it: half of the strain's energy was missing without
+    a word."""
     for place in ((0, 2), (2, 1)):
         strain = np.zeros((3, 3))
         strain[place] = 1e-4

@@ -1,4 +1,5 @@
-"""Geometric stiffness of gravity: the virial theorem, a state that stays at rest, Euler's column, a tilted block."""
+"""Geometric stiffness of gravity: the virial theorem, a state that stays at rest, Euler's column, a
+tilted block."""
 
 from __future__ import annotations
 
@@ -72,8 +73,8 @@ def rotation(problem: ContactProblem, about: Array, axis: Array) -> Array:
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])
 def test_rigid_rotation_lowers_the_centre_of_mass(simplices, d):
-    """½ uᵀ K_G u = -½ m g h_c for a unit rotation in a vertical plane, about any point, to 1e-10; translations and, in
-    3D, the spin about the vertical cost nothing. K_G is symmetric."""
+    """½ uᵀ K_G u = -½ m g h_c for a unit rotation in a vertical plane, about any point, to 1e-10;
+    translations and, in 3D, the spin about the vertical cost nothing. K_G is symmetric."""
     problem, state = resting(simplices, d)
     K_G, system = added(problem, state), problem.system
     fall = 0.5 * 2400.0 * G * (2.0 if d == 2 else 3.0) * 0.5
@@ -98,7 +99,8 @@ def test_rigid_rotation_lowers_the_centre_of_mass(simplices, d):
 
 @pytest.mark.two_ranks
 def test_tilted_block_restores_itself_less_and_less():
-    """The moment that turns a block back about its corner is W (b - h_c theta); without K_G it stays W b."""
+    """The moment that turns a block back about its corner is W (b - h_c theta); without K_G it
+    stays W b."""
     problem = standing(material=COLUMN, lengths=(1.0, 4.0), divisions=(3, 8))
     state = static_equilibrium(problem, solver=Condensed())
     second = geometric_stiffness(problem, state)
@@ -143,8 +145,9 @@ def buckling_load(divisions: tuple[int, int]) -> float:
 
 @pytest.mark.two_ranks
 def test_euler_column():
-    """P = pi² E I / 4 L² of the cantilever, with Engesser's shear term P / (1 + P / kGA), k = 5/6 (Timoshenko and Gere,
-    Theory of Elastic Stability, sect. 2.17): plane Q1 elements (nu = 0) reach it from above with h², 3 % on 4 x 40."""
+    """P = pi² E I / 4 L² of the cantilever, with Engesser's shear term P / (1 + P / kGA), k = 5/6
+    (Timoshenko and Gere, Theory of Elastic Stability, sect. 2.17): plane Q1 elements (nu = 0) reach
+    it from above with h², 3 % on 4 x 40."""
     euler = pi**2 * 2.0e10 / 12.0 / (4.0 * 100.0)
     exact = euler / (1.0 + euler / (5.0 / 6.0 * 1.0e10))
     errors = [buckling_load(divisions) / exact - 1.0 for divisions in ((2, 20), (4, 40))]
@@ -153,7 +156,8 @@ def test_euler_column():
 
 
 def test_prescribed_displacements_pull_on_the_new_part():
-    """A side that moves by U(t): the load of K + K_G is -Pᵀ (K + K_G) (U(t) - U(0)) beside what holds the start."""
+    """A side that moves by U(t): the load of K + K_G is -Pᵀ (K + K_G) (U(t) - U(0)) beside what
+    holds the start."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     move = Prescribed(
         tags["left"], displacement=lambda x, t: np.column_stack([0.0 * x[:, 0], t * x[:, 1] + 1e-3])
@@ -190,7 +194,8 @@ def test_held_sides_keep_the_unknowns():
 
 @pytest.mark.two_ranks
 def test_warming_of_a_held_block_is_a_pressure():
-    """Nothing moves, sigma = -E alpha dT s(t) along x: uᵀ K_G u of u = (0, x) is that times the area."""
+    """Nothing moves, sigma = -E alpha dT s(t) along x: uᵀ K_G u of u = (0, x) is that times the
+    area."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     warm = InitialStrain(np.diag([3e-4, 0.0]), history=lambda t: t)
     system = assemble(mesh, COLUMN, clamped=tags["left"], loads=warm)

@@ -1,4 +1,5 @@
-"""Several contact surfaces as one: stacks of bodies, bodies on obstacles, corners with two and three directions."""
+"""Several contact surfaces as one: stacks of bodies, bodies on obstacles, corners with two and
+three directions."""
 
 from __future__ import annotations
 
@@ -64,8 +65,9 @@ def tower(angle: float = 0.4, d: int = 2) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_two_pairs_and_an_obstacle(d):
-    """Side 1: the lower sides of c and b; a stands on a plane. All conditions in order, each relative to the right
-    body; the middle body is side 1 of one pair and side 2 of the other, with different nodes."""
+    """Side 1: the lower sides of c and b; a stands on a plane. All conditions in order, each
+    relative to the right body; the middle body is side 1 of one pair and side 2 of the other, with
+    different nodes."""
     system, tags = tower(d=d)
     up = np.zeros(d)
     up[:2] = turned((0.0, 1.0), 0.4)
@@ -113,9 +115,10 @@ def leaning(x: Array) -> Array:
 @pytest.mark.parametrize("shape", [0.0, 0.4, leaning], ids=["straight", "turned", "leaning"])
 @pytest.mark.parametrize("d", [2, 3])
 def test_corners(d, shape):
-    """A block in the corner between another block and a wall (in space: two walls): its corner nodes have two (three)
-    conditions, each exact; T stays orthogonal, unless the sides lean; they rub along the edge only. The walls also
-    touch the lower block: nodes of side 2 with a turned frame of their own."""
+    """A block in the corner between another block and a wall (in space: two walls): its corner
+    nodes have two (three) conditions, each exact; T stays orthogonal, unless the sides lean; they
+    rub along the edge only. The walls also touch the lower block: nodes of side 2 with a turned
+    frame of their own."""
     mesh = blocks(d, deform=shape) if callable(shape) else blocks(d, angle=shape)
     system, tags = two_blocks(COMM, mesh)
     sides = ["left", "back"][: d - 1]
@@ -168,7 +171,8 @@ def test_corners(d, shape):
 
 
 def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
-    """(surface, r_n, active of every step) of a block thrown into the corner of a wall and another block."""
+    """(surface, r_n, active of every step) of a block thrown into the corner of a wall and another
+    block."""
     mesh = blocks(2, upper=(8, 6), lower=(8, 6), angle=angle, gap=1e-3)
     system, tags = two_blocks(COMM, mesh, loads=BodyForce(tuple(turned((-2e3, -9.81e3), angle))))
     system = thrown(
@@ -195,7 +199,8 @@ def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("scheme", [None, Midpoint()], ids=["default", "midpoint"])
 def test_a_block_thrown_into_a_corner(scheme):
-    """Gravity, speed and friction: every step certified, both conditions of the corner node active in some steps."""
+    """Gravity, speed and friction: every step certified, both conditions of the corner node active
+    in some steps."""
     surface, _, active = corner_run(0.0, scheme=scheme)
     corner = [0, 9]  # first node of the pair, first node of the wall: the same
     assert seen(surface).points[corner[0]] == pytest.approx(
@@ -206,7 +211,8 @@ def test_a_block_thrown_into_a_corner(scheme):
 
 @pytest.mark.two_ranks
 def test_a_turned_corner_is_the_same():
-    """With consistent mass; redistributed mass depends on the axes (0.1 to 3 % of the forces here)."""
+    """With consistent mass; redistributed mass depends on the axes (0.1 to 3 % of the forces
+    here)."""
     _, r_n, active = corner_run(0.0, scheme=Midpoint())
     _, turned_r_n, turned_active = corner_run(0.4, scheme=Midpoint())
     assert np.array_equal(active, turned_active)
@@ -215,7 +221,8 @@ def test_a_turned_corner_is_the_same():
 
 @pytest.mark.two_ranks
 def test_what_surfaces_know_is_kept():
-    """Gaps, springs, bilateral points, motions, each in its place; joined surfaces may be joined again."""
+    """Gaps, springs, bilateral points, motions, each in its place; joined surfaces may be joined
+    again."""
     mesh = blocks(2, gap=0.125)
     system, tags = two_blocks(COMM, mesh)
     pair = contact_pair(system, *(tags[side] for side in mesh.interface)).bilateral_everywhere()
@@ -287,7 +294,8 @@ def test_sliding_obstacles_at_corners():
     assert np.array_equal(slide[inside], np.tile(alone, (len(inside), 1)))
 
 
-# Refusals -------------------------------------------------------------------------------------------------------------
+# Refusals
+# -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -310,12 +318,14 @@ def test_refusals():
     for surfaces, sentence in (
         (
             (pair, pair),
-            r"contact node \(0, 1\) is on several contact surfaces with one contact direction: list every",
+            r"contact node \(0, 1\) is on several contact surfaces with one contact direction: "
+            r"list every",
         ),
         ((wall, wall), "list every boundary and every pair once"),
         (
             (pair, nearly),
-            r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: treat",
+            r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: "
+            r"treat",
         ),
         (
             (pair, wall, slope),
@@ -335,8 +345,8 @@ def test_refusals():
 
 
 def test_a_node_on_both_sides():
-    """Four blocks about a point: one of them on side 1 of a pair and side 2 of another at the same node is refused;
-    with the sides exchanged it has both conditions."""
+    """Four blocks about a point: one of them on side 1 of a pair and side 2 of another at the same
+    node is refused; with the sides exchanged it has both conditions."""
     parts = {
         name: BlockMesh(divisions=(2, 2), corner=corner)
         for name, corner in {"sw": (0.0, 0.0), "se": (1.0, 0.0), "ne": (1.0, 1.0)}.items()
@@ -345,7 +355,8 @@ def test_a_node_on_both_sides():
     system = assemble(mesh, SOFT)
     first = contact_pair(system, tags["sw_right"], tags["se_left"])
     sentence = (
-        r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
+        r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks "
+        r"cross, "
         "give each arm"
     )
     good = joined_surfaces(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))

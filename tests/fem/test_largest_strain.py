@@ -41,8 +41,8 @@ def followed(comm, d, strains, *, begin=None, **spec):
 @pytest.mark.parametrize("simplices", [True, False])
 @pytest.mark.parametrize(("d", "axial"), [(2, 1.0), (3, 2.0 / np.sqrt(3.0))])
 def test_uniform_strains(comm, d, axial, simplices):
-    """Simple shear is gamma_xy; along one axis it is the difference of principal strains in the plane, and in space
-    sqrt(2 dev:dev); turned bodies are not strained; the largest one stays."""
+    """Simple shear is gamma_xy; along one axis it is the difference of principal strains in the
+    plane, and in space sqrt(2 dev:dev); turned bodies are not strained; the largest one stays."""
     for gradients, value in (
         ([SHEAR], 1.0),
         ([-SHEAR], 1.0),

@@ -1,4 +1,5 @@
-"""Loads as linear forms: equal to tractions and body forces, thermal strain in closed form, and what is refused."""
+"""Loads as linear forms: equal to tractions and body forces, thermal strain in closed form, and
+what is refused."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ def same(one: Any, other: Any, t: float = 0.0) -> None:
 
 @pytest.mark.parametrize("cell", OWN)
 def test_forms_are_the_loads_they_say(cell):
-    """Traction by a user's Measure with tags, a body force by dx, both; constant, with history, with an update."""
+    """Traction by a user's Measure with tags, a body force by dx, both; constant, with history,
+    with an update."""
     mesh = own_mesh(COMM, cell)
     d = mesh.geometry.dim
     tags = tags_where(mesh, d - 1, base=at(0, 0.0), face=at(0, 2.0))
@@ -75,7 +77,8 @@ def test_forms_are_the_loads_they_say(cell):
 
 
 def test_a_function_that_an_update_changes():
-    """A pressure interpolated at every time on the user's own scalar space; sections multiply by their thickness."""
+    """A pressure interpolated at every time on the user's own scalar space; sections multiply by
+    their thickness."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     make = compat.fem.functionspace if compat.VERSION >= (0, 7) else compat.fem.FunctionSpace
     pressure, n = Function(make(mesh, ("Lagrange", 1))), ufl.FacetNormal(mesh)
@@ -98,7 +101,8 @@ def test_a_function_that_an_update_changes():
 
 @pytest.mark.two_ranks
 def test_runs_with_forms_are_runs_with_tractions(comm):
-    """Impacts beside tied sides, a roller that moves and damping; reactions know the loads too, updates as well."""
+    """Impacts beside tied sides, a roller that moves and damping; reactions know the loads too,
+    updates as well."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 4), simplices=True)
     push, factor = Constant(mesh, (0.0, -3e5)), Constant(mesh, 0.0)
     ds = compat.measure(mesh, 1, tags["top"].indices)
@@ -153,7 +157,8 @@ def test_runs_with_forms_are_runs_with_tractions(comm):
 
 
 def test_reactions_know_the_form_as_it_was_assembled():
-    """A Constant changes between bodies, of one form or of several: each is held against its own load, to round-off."""
+    """A Constant changes between bodies, of one form or of several: each is held against its own
+    load, to round-off."""
     mesh = own_mesh(COMM, "quadrilateral")
     push, base = Constant(mesh, (0.0, 0.0)), fem.Facets.where("base", mesh, at(0, 0.0))
     often = fem.LinearForm(lambda v: ufl.inner(push, v) * ufl.dx)
@@ -197,7 +202,8 @@ def test_a_free_body_that_is_heated_grows_without_stress(cell):
 
 @pytest.mark.two_ranks
 def test_a_heated_bar_between_walls():
-    """A gap g closes, then p = E (alpha dT - g/L), uniform over the face; sides are free to grow."""
+    """A gap g closes, then p = E (alpha dT - g/L), uniform over the face; sides are free to
+    grow."""
     mesh, warmer, gap = own_mesh(COMM, "quadrilateral"), 60.0, 4e-4
     heat = Constant(mesh, STEEL.E / (1.0 - STEEL.nu) * EXPANSION * warmer)
     held = [
@@ -277,7 +283,8 @@ def test_what_is_refused():
 
 
 def test_an_update_that_fails_is_told_on_all_ranks():
-    """Where it raises on one rank only, and where it makes NaN there; at the time it does, not before."""
+    """Where it raises on one rank only, and where it makes NaN there; at the time it does, not
+    before."""
     mesh = own_mesh(COMM, "triangle")
     value = Constant(mesh, 1.0)
 

@@ -1,4 +1,5 @@
-"""Tractions and body forces: resultants, exact integration, time dependence; wrong data told on all ranks."""
+"""Tractions and body forces: resultants, exact integration, time dependence; wrong data told on all
+ranks."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ def test_traction_resultant(name):
 
 @pytest.mark.parametrize("simplices", [False, True])
 def test_traction_that_varies_is_integrated_exactly(simplices):
-    """Hydrostatic pressure 7 y on the left side of a square of side 2: resultant 14, moment about the base 7 · 8/3."""
+    """Hydrostatic pressure 7 y on the left side of a square of side 2: resultant 14, moment about
+    the base 7 · 8/3."""
     mesh, tags = block(COMM, lengths=(2.0, 2.0), divisions=(3, 5), simplices=simplices)
     load = Traction(tags["left"], lambda x, t: np.column_stack([7.0 * x[:, 1], 0.0 * x[:, 1]]))
     system = assemble(mesh, CONCRETE, loads=load)
@@ -48,7 +50,8 @@ def test_traction_that_varies_is_integrated_exactly(simplices):
 
 @pytest.mark.parametrize("kind", [Traction, BodyForce])
 def test_constant_history_and_function_of_time_are_one_load(kind):
-    """(value, f(t)) = callable(x, t) at all times; a tuple is the value at all times. Several loads add up."""
+    """(value, f(t)) = callable(x, t) at all times; a tuple is the value at all times. Several loads
+    add up."""
     mesh, tags = block(COMM, **BODIES["triangles"])
     where = {"facets": tags["top"]} if kind is Traction else {}
     value = np.array([4.0, -9.0])
@@ -139,7 +142,8 @@ def test_nan_and_shapes_are_refused_on_all_ranks():
         ),
         ("initial velocity contains NaN", {"initial_velocity": (nan, 0.0)}),
         (
-            r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_loads.py, line \d+\): correct",
+            r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_loads.py, line "
+            r"\d+\): correct",
             {"loads": Traction(tags["top"], fails_there, history=sin)},
         ),
         (

@@ -1,4 +1,5 @@
-"""Distributed meshes: exact sizes by assembly, groups by name, numbers of the input; on any number of ranks."""
+"""Distributed meshes: exact sizes by assembly, groups by name, numbers of the input; on any number
+of ranks."""
 
 import math
 
@@ -34,14 +35,18 @@ def test_wall_and_its_sides_have_their_exact_sizes(options, comm):
 
 
 def test_a_script_of_gmsh_is_meshed_refined_and_cut(comm, shared_tmp):
-    """C1.2: two bodies that share an edge, from a .geo, cut open along it: sizes, and four times the cells."""
+    """C1.2: two bodies that share an edge, from a .geo, cut open along it: sizes, and four times
+    the cells."""
     script = shared_tmp / "two.geo"
     if comm.rank == 0:
         script.write_text(
-            "Point(1) = {0, 0, 0}; Point(2) = {2, 0, 0}; Point(3) = {2, 1, 0}; Point(4) = {0, 1, 0};\n"
-            "Point(5) = {2, 3, 0}; Point(6) = {0, 3, 0};\nLine(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4};\n"
+            "Point(1) = {0, 0, 0}; Point(2) = {2, 0, 0}; Point(3) = {2, 1, 0}; Point(4) = {0, 1, "
+            "0};\n"
+            "Point(5) = {2, 3, 0}; Point(6) = {0, 3, 0};\nLine(1) = {1, 2}; Line(2) = {2, 3}; "
+            "Line(3) = {3, 4};\n"
             "Line(4) = {4, 1}; Line(5) = {3, 5}; Line(6) = {5, 6}; Line(7) = {6, 4};\n"
-            "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Curve Loop(2) = {5, 6, 7, -3}; Plane Surface(2) = {2};\n"
+            "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Curve Loop(2) = {5, 6, 7, -3}; Plane "
+            "Surface(2) = {2};\n"
             'MeshSize{:} = 0.5;\nPhysical Curve("joint") = {3}; Physical Curve("foot") = {1};\n'
             'Physical Surface("rock") = {1}; Physical Surface("dam") = {2};\n',
             encoding="utf-8",
@@ -127,7 +132,8 @@ def test_there_may_be_more_ranks_than_cells(comm):
     assert comm.allreduce(len(compat.dof_to_node(compat.vector_space(mesh)))) == 4
 
 
-# Files ----------------------------------------------------------------------------------------------------------------
+# Files
+# ----------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -149,7 +155,8 @@ def test_a_missing_group_is_named_with_those_there_are(comm):
     _, tags = fem.build_mesh(WallMesh(), comm)
     sentence = refusal(comm, lambda: tags["fase"])
     assert sentence == (
-        "mesh has no group 'fase'; its boundary groups are back, face, base, top, its cell groups wall:"
+        "mesh has no group 'fase'; its boundary groups are back, face, base, top, its cell groups "
+        "wall:"
         " did you mean face or base? Else name it in Gmsh as a physical group"
     )
     assert "fase" not in tags and tags.get("fase") is None

@@ -1,4 +1,5 @@
-"""Every known defect of Gmsh files and their readers (P21) is survived, or refused in one sentence on all ranks."""
+"""Every known defect of Gmsh files and their readers (P21) is survived, or refused in one sentence
+on all ranks."""
 
 import math
 
@@ -58,7 +59,8 @@ $EndElements
 """
 
 
-# Survived -------------------------------------------------------------------------------------------------------------
+# Survived
+# -------------------------------------------------------------------------------------------------------------
 
 
 def test_node_tags_may_start_anywhere_have_holes_and_come_unsorted(comm, shared_tmp):
@@ -98,7 +100,8 @@ def test_a_half_disk_whose_named_arc_is_a_copy_of_its_boundary(comm):
 
 
 def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
-    """dolfinx#3332, in both file formats: a side "outer" of all four, "base" one of them; "body" and half of it."""
+    """dolfinx#3332, in both file formats: a side "outer" of all four, "base" one of them; "body"
+    and half of it."""
 
     class Shared:
         def build(self, gmsh):
@@ -178,7 +181,8 @@ def test_nodes_no_cell_uses_are_dropped(comm, shared_tmp):
 
 
 def test_cells_may_run_either_way_round(comm, shared_tmp):
-    """Clockwise cells next to anticlockwise ones: area by assembly and, with outward normals, by Gauss's theorem."""
+    """Clockwise cells next to anticlockwise ones: area by assembly and, with outward normals, by
+    Gauss's theorem."""
     elements = [(TRIANGLE, 1, 1, (1, 2, 3)), (TRIANGLE, 1, 1, (1, 4, 3)), *BASE]
     mesh, tags = read_text(msh(SQUARE, elements, NAMES), comm, shared_tmp)
     x, normal = ufl.SpatialCoordinate(mesh), ufl.FacetNormal(mesh)
@@ -187,7 +191,8 @@ def test_cells_may_run_either_way_round(comm, shared_tmp):
 
 
 def test_two_bodies_in_touch_keep_their_own_nodes_and_sides(comm, shared_tmp):
-    """Two squares, one above the other, with two nodes at each common place: two groups, one of each body."""
+    """Two squares, one above the other, with two nodes at each common place: two groups, one of
+    each body."""
     nodes = {**SQUARE, **{tag + 4: (x, y + 1, 0) for tag, (x, y, _) in SQUARE.items()}}
     elements = [
         (QUADRANGLE, 1, 1, (1, 2, 3, 4)), (QUADRANGLE, 2, 2, (5, 6, 7, 8)), (LINE, 3, 1, (3, 4)), (LINE, 4, 2, (5, 6))
@@ -207,7 +212,8 @@ def test_two_bodies_in_touch_keep_their_own_nodes_and_sides(comm, shared_tmp):
         )
 
 
-# Refused --------------------------------------------------------------------------------------------------------------
+# Refused
+# --------------------------------------------------------------------------------------------------------------
 
 
 def turned_quadrangle(order):

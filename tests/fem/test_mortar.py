@@ -1,5 +1,5 @@
-"""Dual mortar coupling of plane sides that are not meshed alike: linear fields, forces, partial overlap, curves, the
-patch test (V2.1), dynamics."""
+"""Dual mortar coupling of plane sides that are not meshed alike: linear fields, forces, partial
+overlap, curves, the patch test (V2.1), dynamics."""
 
 from __future__ import annotations
 
@@ -78,7 +78,8 @@ def matched(system: Any, one: Any, two: Any) -> Any:
     )
 
 
-# The matrix P ---------------------------------------------------------------------------------------------------------
+# The matrix P
+# ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -86,8 +87,9 @@ def matched(system: Any, one: Any, two: Any) -> Any:
 @pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_linear_fields_and_uniform_pressure(angle, swapped, simplices):
-    """Rows of P sum to 1 and reproduce positions: P x_2 = x_1; the nodal forces of a uniform pressure on side 1 arrive
-    as those of the same pressure on side 2: Pᵀ weights = ∫ phi_j. All to 1e-13."""
+    """Rows of P sum to 1 and reproduce positions: P x_2 = x_1; the nodal forces of a uniform
+    pressure on side 1 arrive as those of the same pressure on side 2: Pᵀ weights = ∫ phi_j. All to
+    1e-13."""
     system, one, two = sides(unlike(simplices=simplices, angle=angle), swapped=swapped)
     found = matched(system, one, two)
     nodes1, nodes2 = side_of(system.space, one).nodes, side_of(system.space, two).nodes
@@ -115,8 +117,9 @@ def test_matching_sides_are_the_special_case():
 @pytest.mark.parametrize("offset", [0.0, 0.33, 0.5, -0.41])
 @pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_partly_covered_sides(offset, swapped):
-    """A short block on a long one, at any place, over either end, from either side: weights sum to what they share,
-    linear fields are exact, the pressure on it arrives as the same force and moment."""
+    """A short block on a long one, at any place, over either end, from either side: weights sum to
+    what they share, linear fields are exact, the pressure on it arrives as the same force and
+    moment."""
     lengths = (0.6, 1.5)
     system, one, two = sides(unlike(lengths=lengths, offset=(offset,)), swapped=swapped)
     found = matched(system, one, two)
@@ -146,8 +149,8 @@ def rings(gap: float) -> Blocks:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("gap", [0.0, 0.1])
 def test_curved_sides(gap):
-    """Polygons of one curve: gaps within the height of the arcs above their chords, radius (1 - cos of half the
-    angle), zero where they overlap; rows of P sum to 1."""
+    """Polygons of one curve: gaps within the height of the arcs above their chords, radius (1 - cos
+    of half the angle), zero where they overlap; rows of P sum to 1."""
     system, tags = two_blocks(COMM, rings(gap))
     one, two = tags["inner_right"], tags["outer_left"]
     surface = contact_pair(system, one, two, matching=DualMortar())
@@ -159,7 +162,8 @@ def test_curved_sides(gap):
     assert np.asarray(found.P.sum(axis=1)).ravel() == pytest.approx(np.ones(17), rel=1e-12)
 
 
-# V2.1 -----------------------------------------------------------------------------------------------------------------
+# V2.1
+# -----------------------------------------------------------------------------------------------------------------
 
 P = 1.0e8
 STEEL, BRASS = (
@@ -174,8 +178,8 @@ STEEL, BRASS = (
 @pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 @shapes
 def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped, solver):
-    """Steel on brass, turned by 0.4 rad: one uniform strain e_xx in both, as if glued, pressure p across the interface;
-    displacements 1e-10, pressures 1e-10 at every node."""
+    """Steel on brass, turned by 0.4 rad: one uniform strain e_xx in both, as if glued, pressure p
+    across the interface; displacements 1e-10, pressures 1e-10 at every node."""
     angle = 0.4
     mesh = unlike(simplices=simplices, angle=angle)
 
@@ -208,7 +212,8 @@ def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped, solv
     assert np.abs(seen(surface).all(state.r_n) / seen(surface).weights / P - 1.0).max() < 1e-10
 
 
-# Dynamics -------------------------------------------------------------------------------------------------------------
+# Dynamics
+# -------------------------------------------------------------------------------------------------------------
 
 
 def meeting(comm: Any, *, friction: Any = None, mass: Any = None) -> ContactProblem:
@@ -237,8 +242,8 @@ frictions = pytest.mark.parametrize("friction", [None, Coulomb(0.3)], ids=["smoo
 @frictions
 @routes
 def test_what_one_body_gains_the_other_loses(scheme, mass, friction):
-    """V9.8: total momentum kept to 1e-12 in every step, every step certified to 1e-9; on all ranks together as on each
-    alone, to 1e-9."""
+    """V9.8: total momentum kept to 1e-12 in every step, every step certified to 1e-9; on all ranks
+    together as on each alone, to 1e-9."""
     problem = meeting(COMM, friction=friction, mass=mass)
     start = momenta(problem, problem.equations.v0)
     for state, report in march(problem, scheme=scheme, dt=1e-3, steps=30):
@@ -254,7 +259,8 @@ def test_what_one_body_gains_the_other_loses(scheme, mass, friction):
 
 
 def test_action_is_reaction():
-    """Force and, on touching sides, moment of the pair vanish for any reactions, tangential ones included."""
+    """Force and, on touching sides, moment of the pair vanish for any reactions, tangential ones
+    included."""
     system, one, two = sides(unlike(angle=0.4))
     surface = contact_pair(system, one, two, matching=DualMortar())
     random = np.random.default_rng(3)
@@ -279,7 +285,8 @@ def test_condensed_and_volume_agree(scheme, mass):
     )
 
 
-# Refusals -------------------------------------------------------------------------------------------------------------
+# Refusals
+# -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks

@@ -1,5 +1,6 @@
-"""Dual mortar coupling of sides in space that are not meshed alike: linear fields, forces and moments, partial overlap,
-several layers, curved sides, the patch test (V2.1), sliding, thrown bodies, refusals."""
+"""Dual mortar coupling of sides in space that are not meshed alike: linear fields, forces and
+moments, partial overlap, several layers, curved sides, the patch test (V2.1), sliding, thrown
+bodies, refusals."""
 
 from __future__ import annotations
 
@@ -71,8 +72,8 @@ def face(
     bend: Any = None,
     name: str = "face",
 ) -> Side:
-    """A side of triangles ("t") or quadrilaterals ("q") in the plane z = height, bent, then turned; nodal normals are
-    means over the facets, weights ∫ phi_i where it is plane."""
+    """A side of triangles ("t") or quadrilaterals ("q") in the plane z = height, bent, then turned;
+    nodal normals are means over the facets, weights ∫ phi_i where it is plane."""
     x = np.stack(
         np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in divisions), indexing="ij"), axis=-1
     )
@@ -121,13 +122,15 @@ def offset(one: Side, two: Side, found: Matched) -> tuple[Array, Array]:
     return along, away - along[:, None] * normals
 
 
-# Polygons -------------------------------------------------------------------------------------------------------------
+# Polygons
+# -------------------------------------------------------------------------------------------------------------
 
 
 @serial
 def test_polygons():
-    """Areas of what random quadrilaterals and triangles share, and of what is outside, make up the whole; what they
-    share does not depend on which is cut; integrals of polynomials and of shape functions are exact."""
+    """Areas of what random quadrilaterals and triangles share, and of what is outside, make up the
+    whole; what they share does not depend on which is cut; integrals of polynomials and of shape
+    functions are exact."""
     random = np.random.default_rng(5)
     square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     one = square + 0.3 * random.random((200, 4, 2))
@@ -146,15 +149,16 @@ def test_polygons():
     assert np.einsum("kqv,kvx->kqx", hats(one, inner), one) == pytest.approx(inner, abs=1e-14)
 
 
-# The matrix P ---------------------------------------------------------------------------------------------------------
+# The matrix P
+# ---------------------------------------------------------------------------------------------------------
 
 
 @serial
 @facets
 @pytest.mark.parametrize("distorted", [0.0, 0.4])
 def test_linear_fields_and_uniform_pressure(kinds, distorted):
-    """Rows of P sum to 1 and reproduce positions; the nodal forces of a uniform pressure on side 1 arrive as those of
-    the same pressure on side 2."""
+    """Rows of P sum to 1 and reproduce positions; the nodal forces of a uniform pressure on side 1
+    arrive as those of the same pressure on side 2."""
     one, two, found = faced(kinds, {"distorted": distorted}, {"distorted": distorted})
     assert np.array_equal(found.rows, np.arange(30))
     assert np.asarray(found.P.sum(axis=1)).ravel() == pytest.approx(np.ones(30), abs=1e-13)
@@ -167,8 +171,9 @@ def test_linear_fields_and_uniform_pressure(kinds, distorted):
 @facets
 @pytest.mark.parametrize("corner", [(0.33, 0.21), (0.5, 0.0), (-0.41, 0.77)])
 def test_partly_covered_sides(kinds, corner):
-    """A small face before a large one, at any place, over the ends, seen from either: weights are positive and sum to
-    the area that they share, a uniform pressure on it arrives as the same force at the same place."""
+    """A small face before a large one, at any place, over the ends, seen from either: weights are
+    positive and sum to the area that they share, a uniform pressure on it arrives as the same force
+    at the same place."""
     size = (0.6, 0.5)
     low, high = np.maximum(corner, 0.0), np.minimum(np.add(corner, size), 1.0)
     small, large = {"corner": corner, "size": size}, {}
@@ -186,8 +191,8 @@ def test_partly_covered_sides(kinds, corner):
 @facets
 @pytest.mark.parametrize("length", [1.0, 0.7])
 def test_only_what_is_nearest_counts(kinds, length):
-    """A slanting step above a part of side 2: weights arrive there, and on the rest as before, also where side 2 ends
-    below the step."""
+    """A slanting step above a part of side 2: weights arrive there, and on the rest as before, also
+    where side 2 ends below the step."""
 
     def slanting(x: Array) -> Array:
         return x + np.outer(0.3 * x[:, 0], [0.0, 0.0, 1.0])
@@ -216,7 +221,8 @@ def test_only_what_is_nearest_counts(kinds, length):
 @serial
 @facets
 def test_a_hidden_layer_of_the_same_outline_is_not_felt(kinds):
-    """Two layers with one outline, whose facets have edges in common up to round-off: only the near one counts."""
+    """Two layers with one outline, whose facets have edges in common up to round-off: only the near
+    one counts."""
     near, far = (face(kinds[1], (4, 4), up=True, height=height) for height in (-0.05, -0.1))
     count = len(near.nodes.numbers)
     behind = replace(far.nodes, numbers=far.nodes.numbers + count)
@@ -237,7 +243,8 @@ def test_a_hidden_layer_of_the_same_outline_is_not_felt(kinds):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("gap", [0.0, 0.1])
 def test_sides_of_a_block_do_not_see_the_ground_beside_it(gap):
-    """Side 1 is the bottom of a block, or the bottom and all vertical sides: the same conditions."""
+    """Side 1 is the bottom of a block, or the bottom and all vertical sides: the same
+    conditions."""
     upper = BlockMesh(lengths=(1.0,) * 3, divisions=(3,) * 3)
     lower = BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(4, 2, 5))
     mesh, tags = build_mesh(
@@ -272,8 +279,8 @@ def dome(radius: float) -> Any:
 @facets
 @pytest.mark.parametrize("gap", [0.0, 0.1, 3.0])
 def test_curved_sides(kinds, gap):
-    """Facets of two spheres: what a node faces lies on its normal, whatever the gap, so that normal forces have no
-    moment; gaps are right to the height of the caps between facets and sphere."""
+    """Facets of two spheres: what a node faces lies on its normal, whatever the gap, so that normal
+    forces have no moment; gaps are right to the height of the caps between facets and sphere."""
     one, two, found = faced(kinds, {"bend": dome(1.0)}, {"bend": dome(1.0 + gap)})
     along, beside = offset(one, two, found)
     assert len(found.rows) == 30 and np.abs(beside).max() < 1e-14 * (1.0 + gap)
@@ -294,7 +301,8 @@ def test_matching_sides_are_the_special_case():
         assert np.abs(found.P - np.eye(30)).max() < 1e-12
 
 
-# Bodies ---------------------------------------------------------------------------------------------------------------
+# Bodies
+# ---------------------------------------------------------------------------------------------------------------
 
 LENGTHS, FINER = (1.5, 1.0, 1.2), ((3, 5, 4), (5, 5, 4))
 
@@ -355,8 +363,8 @@ STEEL, BRASS = (
 @shapes
 @pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped):
-    """Steel on brass, turned in space, distorted: pressure p across the interface; displacements and pressures at every
-    node to 1e-10."""
+    """Steel on brass, turned in space, distorted: pressure p across the interface; displacements
+    and pressures at every node to 1e-10."""
     mesh, turn = unlike(turn=2, simplices=simplices, distorted=(0.08, -0.1)), rotation(2)
 
     def uniform(material: LinearElastic, height: float = 0.0) -> Any:
@@ -381,7 +389,8 @@ def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped):
 
 @shapes
 def test_action_is_reaction(simplices):
-    """Force and moment of the pair vanish for any reactions, tangential ones included, on sides that partly overlap."""
+    """Force and moment of the pair vanish for any reactions, tangential ones included, on sides
+    that partly overlap."""
     problem = paired(unlike(turn=3, simplices=simplices, distorted=(0.0, 0.05), offset=(0.4, -0.3)))
     surface = seen(problem.surface)
     random = np.random.default_rng(3)
@@ -394,7 +403,8 @@ def test_action_is_reaction(simplices):
 
 
 def sliding(comm: Any, turn: int, mu: float) -> ContactProblem:
-    """A block that slides down a longer one, inclined by 30 degrees and turned in space as a whole."""
+    """A block that slides down a longer one, inclined by 30 degrees and turned in space as a
+    whole."""
     down = 9.81e3 * rotation(turn) @ [0.5, -np.sqrt(0.75), 0.0]
     mesh = unlike(turn=turn, upper=(0.8, 0.5, 0.7), offset=(0.2, 0.3), divisions=FINER)
     problem = paired(
@@ -412,7 +422,8 @@ def sliding(comm: Any, turn: int, mu: float) -> ContactProblem:
 
 @pytest.mark.serial
 def test_a_block_slides_down_a_plane_alike_in_any_orientation():
-    """Displacements and forces turned back are the same to 1e-9, on all ranks together as on each alone."""
+    """Displacements and forces turned back are the same to 1e-9, on all ranks together as on each
+    alone."""
     first, found = (
         run(sliding(comm, turn, 0.3), scheme=Trapezoidal(), dt=1e-3, steps=8)
         for comm, turn in ((MPI.COMM_SELF, 0), (COMM, 4))
@@ -433,8 +444,8 @@ def test_a_block_slides_down_a_plane_alike_in_any_orientation():
     ids=["midpoint", "trapezoidal"],
 )
 def test_what_one_body_gains_the_other_loses(scheme):
-    """V9.8: momentum and angular momentum of two bodies thrown at each other, with curved sides of warped facets, are
-    kept to 1e-12 over the collision."""
+    """V9.8: momentum and angular momentum of two bodies thrown at each other, with curved sides of
+    warped facets, are kept to 1e-12 over the collision."""
     mesh = unlike(
         turn=2,
         upper=(0.8, 0.6, 0.7),
@@ -466,8 +477,8 @@ def test_what_one_body_gains_the_other_loses(scheme):
     "moves", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rest", "moving"]
 )
 def test_a_body_held_everywhere_is_an_obstacle(moves):
-    """A block thrown on a block that is prescribed all over rubs as on the half-space, at rest and moving: same
-    displacements (1e-10) and reactions (1e-9)."""
+    """A block thrown on a block that is prescribed all over rubs as on the half-space, at rest and
+    moving: same displacements (1e-10) and reactions (1e-9)."""
     turn = rotation(2)
     mesh = unlike(turn=2, upper=(0.8, 0.5, 0.7), offset=(0.2, 0.3), gap=1e-3, divisions=FINER)
     built, tags = build_mesh(mesh, COMM)
@@ -512,8 +523,8 @@ def test_a_body_held_everywhere_is_an_obstacle(moves):
 
 @pytest.mark.two_ranks
 def test_a_side_that_bends_round_an_edge():
-    """The bottom and a side of a box in a step of two others, as one pair and as two: the same conditions; nodes on
-    the edge have two."""
+    """The bottom and a side of a box in a step of two others, as one pair and as two: the same
+    conditions; nodes on the edge have two."""
     boxes = {
         "box": ((0, 0, 0), (1, 1, 1), (3, 3, 2)),
         "under": ((0, -1, 0), (1, 1, 1), (2, 2, 3)),
@@ -570,7 +581,8 @@ def test_a_side_that_bends_round_an_edge():
     ids=["midpoint", "trapezoidal", "rough"],
 )
 def test_routes_agree(scheme, mass, friction):
-    """Condensed, volume and iterative route, every step from the same state, partly covered sides: to 1e-9."""
+    """Condensed, volume and iterative route, every step from the same state, partly covered sides:
+    to 1e-9."""
     mesh = unlike(turn=2, upper=(0.8, 0.6, 0.7), offset=(1.0, -0.4), gap=1e-3, divisions=FINER)
     problem = paired(mesh, mass=mass, friction=friction)
     throw = np.outer([1.0, 0.2], rotation(2) @ [0.5, -2.0, 0.3])
@@ -580,7 +592,8 @@ def test_routes_agree(scheme, mass, friction):
     assert cross_check(problem, scheme=scheme, solvers=solvers, dt=1e-3, steps=3).worst <= 1e-9
 
 
-# Refusals -------------------------------------------------------------------------------------------------------------
+# Refusals
+# -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -615,7 +628,8 @@ def test_refusals():
 
 @serial
 def test_refused_facets():
-    """Facets that are so thin that their normals mean nothing, and quadrilaterals with a corner that points inwards."""
+    """Facets that are so thin that their normals mean nothing, and quadrilaterals with a corner
+    that points inwards."""
     for kind, moved in (("t", 1e-9), ("q", 0.7)):
         one, two = (
             face(kind, (5, 4), up=False, distorted=0.0, name="bad"),

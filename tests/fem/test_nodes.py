@@ -1,4 +1,5 @@
-"""Contact nodes stay with their owners: what is gathered, and refusals that no number of ranks changes."""
+"""Contact nodes stay with their owners: what is gathered, and refusals that no number of ranks
+changes."""
 
 from __future__ import annotations
 
@@ -54,8 +55,9 @@ class Weighed(MpiComm):
 
 
 def test_numbers_alone_are_gathered():
-    """A smooth boundary of 169 nodes gathers no facet, but six times their numbers: before and after faces of one
-    direction are joined, and four times in the search for hinges; and what ranks tell of nodes that they share.
+    """A smooth boundary of 169 nodes gathers no facet, but six times their numbers: before and
+    after faces of one direction are joined, and four times in the search for hinges; and what ranks
+    tell of nodes that they share.
 
     Friction and redistributed mass gather shared neighbours only."""
     system, tags = body()
@@ -93,7 +95,8 @@ def test_slots_do_not_depend_on_the_ranks():
 
 
 def test_what_one_rank_refuses_all_refuse():
-    """With the first place in the order of the numbers, whichever rank owns it; what only seemed wrong is answered."""
+    """With the first place in the order of the numbers, whichever rank owns it; what only seemed
+    wrong is answered."""
     slots = np.arange(COMM.rank, 12, COMM.size)
 
     def refuse(values: Array) -> tuple[Any, ...]:
@@ -113,7 +116,8 @@ def test_what_one_rank_refuses_all_refuse():
 
 
 def test_obstacles_that_fail_at_one_place():
-    """A user's function that raises at points of one rank ends on all ranks, and the deepest point is named on all."""
+    """A user's function that raises at points of one rank ends on all ranks, and the deepest point
+    is named on all."""
     system, tags = body((4, 1, 4))
 
     def broken(x: Array) -> Array:

@@ -60,7 +60,8 @@ def test_a_direction_of_ones_own_along_the_face_is_refused():
 
 
 def test_the_far_side_of_a_round_body_is_let_be():
-    """A disc on the ground: the normals of its upper half look away from the direction, and can never touch."""
+    """A disc on the ground: the normals of its upper half look away from the direction, and can
+    never touch."""
 
     def bend(x: Array) -> Array:
         return np.column_stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])])

@@ -1,7 +1,9 @@
-"""Systems of scipy matrices, and contact at listed nodes: against closed forms, and against what is made by hand.
+"""Systems of scipy matrices, and contact at listed nodes: against closed forms, and against what is
+made by hand.
 
-Chains and bars have displacements only; Euler–Bernoulli beams and frames (demos/problems/frame_elements.py) rotations
-too, and their cubic elements give static forms exactly. V2 of a user who brings matrices of his own.
+Chains and bars have displacements only; Euler–Bernoulli beams and frames
+(demos/problems/frame_elements.py) rotations too, and their cubic elements give static forms
+exactly. V2 of a user who brings matrices of his own.
 """
 
 from __future__ import annotations
@@ -52,7 +54,8 @@ def marched(problem, steps=60, **options):
     return states
 
 
-# Displacements --------------------------------------------------------------------------------------------------------
+# Displacements
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scheme", [vc.MoreauJean(), vc.ContactStabilisedNewmark()])
@@ -76,7 +79,8 @@ def test_chain_between_walls_is_that_made_by_hand(scheme):
 
 
 def test_thrown_bar():
-    """Force rho c v while the wave goes forth and back, 2L/c, then the speed it came with (E = 900 Pa, L = 10 m)."""
+    """Force rho c v while the wave goes forth and back, 2L/c, then the speed it came with (E = 900
+    Pa, L = 10 m)."""
     n, v, c, gap = 200, 2.0, 30.0, 0.1
     M, K = bar_matrices(n, length=10.0, E=900.0, rho=1.0)
     system = vc.system_from_arrays(
@@ -94,7 +98,8 @@ def test_thrown_bar():
 
 
 def test_two_bars_exchange_their_speeds():
-    """Node against node: the bar that comes stops when its wave has gone forth and back, and the other leaves."""
+    """Node against node: the bar that comes stops when its wave has gone forth and back, and the
+    other leaves."""
     n, v, c = 60, 1.0, 30.0
     M, K = bar_matrices(n, length=10.0, E=900.0, rho=1.0)
     points = np.concatenate([line([0.0], [10.0], n), line([10.02], [20.02], n)])
@@ -114,7 +119,8 @@ def test_two_bars_exchange_their_speeds():
 
 
 def test_corner_of_two_oblique_walls():
-    """A mass on springs is pressed into a corner of 60°: it stays, and the two reactions are the force's components."""
+    """A mass on springs is pressed into a corner of 60°: it stays, and the two reactions are the
+    force's components."""
     way = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     force = np.array([3.0, 2.0])
     system = vc.system_from_arrays(
@@ -127,11 +133,13 @@ def test_corner_of_two_oblique_walls():
         vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
 
 
-# Rotations ------------------------------------------------------------------------------------------------------------
+# Rotations
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_cantilever_on_a_stop():
-    """Tip reaction 3qL/8 - 3 EI g/L³ of an Euler–Bernoulli cantilever over a stop at the depth g."""
+    """Tip reaction 3qL/8 - 3 EI g/L³ of an Euler–Bernoulli cantilever over a stop at the depth
+    g."""
     system, gap = beam(), 0.01
     surface = vc.contact_points(system, [6], [0.0, -1.0], gap0=gap)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
@@ -157,7 +165,8 @@ def test_load_steps_of_a_cantilever():
 
 @pytest.mark.parametrize("normal", [(0.0, -1.0), (0.6, -0.8)])
 def test_plane_frame_on_a_stop(normal):
-    """A column of height H with an arm B, loaded at its end: r = (n·F p - g)/(n·F n), F the end's flexibility."""
+    """A column of height H with an arm B, loaded at its end: r = (n·F p - g)/(n·F n), F the end's
+    flexibility."""
     H, B, p, gap = 3.0, 1.5, np.array([40.0, -200.0]), 0.02
     nodes = np.concatenate([line([0.0, 0.0], [0.0, H], 4), line([0.0, H], [B, H], 3)[1:]])
     load = np.zeros(3 * len(nodes))
@@ -172,7 +181,8 @@ def test_plane_frame_on_a_stop(normal):
 
 
 def test_beam_without_a_clamp_rests_on_two_points():
-    """Its rigid rotation is found although rotations are unknowns: half of q L on each support, at unequal heights."""
+    """Its rigid rotation is found although rotations are unknowns: half of q L on each support, at
+    unequal heights."""
     system = beam(clamped=())
     assert system.floating
     surface = vc.contact_points(system, [0, 6], [0.0, -1.0], gap0=[0.0, 0.003])
@@ -201,8 +211,8 @@ def test_beam_strikes_a_stop_and_rubs(scheme):
 
 @pytest.mark.parametrize("name", ["K", "C"])
 def test_matrices_that_are_not_symmetric(name):
-    """A follower force, or gyroscopic damping, in one step of MoreauJean (theta = 1) against its 2 x 2 problem, by
-    Volume() and condensed; methods that need symmetry say which do not."""
+    """A follower force, or gyroscopic damping, in one step of MoreauJean (theta = 1) against its 2
+    x 2 problem, by Volume() and condensed; methods that need symmetry say which do not."""
     pytest.importorskip("petsc4py")
     skew = {"K": np.diag([30.0, 20.0]), "C": np.diag([3.0, 2.0])}
     skew[name] += np.array([[0.0, 5.0], [-3.0, 0.0]])
@@ -230,11 +240,13 @@ def test_matrices_that_are_not_symmetric(name):
         assert dt * state.r_n[0] == pytest.approx(1.0 - A[0, 1] * state.v[1], rel=1e-12)
 
 
-# Mass laws, weight, bodies --------------------------------------------------------------------------------------------
+# Mass laws, weight, bodies
+# --------------------------------------------------------------------------------------------
 
 
 def hung(stiff, load, *, soft=1.0):
-    """A chain of five masses on stiff springs, hung at its first node on a soft one, with a stop 0.3 m from its end."""
+    """A chain of five masses on stiff springs, hung at its first node on a soft one, with a stop
+    0.3 m from its end."""
     K = stiff * (2.0 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
     K[0, 0], K[4, 4] = stiff + soft, stiff
     system = vc.system_from_arrays(
@@ -245,8 +257,8 @@ def hung(stiff, load, *, soft=1.0):
 
 @pytest.mark.parametrize("stiff", [1.0e9, 1.0e11, 1.0e13])
 def test_a_soft_spring_holds_a_stiff_body(stiff):
-    """Also where it is 1e-13 of the body's stiffness: u = f / k, or 0.3 m and r = f - 0.3 k. Rounding is that of u,
-    magnified by the stiffness; what is 1e-17 of it is lost."""
+    """Also where it is 1e-13 of the body's stiffness: u = f / k, or 0.3 m and r = f - 0.3 k.
+    Rounding is that of u, magnified by the stiffness; what is 1e-17 of it is lost."""
     off, on, lost = hung(stiff, -0.5), hung(stiff, 0.5), hung(stiff, 0.5, soft=1e-17 * stiff)
     state = vc.static_equilibrium(off)
     assert not off.system.floating and lost.system.floating
@@ -275,7 +287,8 @@ def test_a_mass_without_stiffness_floats(stiffness):
 @pytest.mark.parametrize("size", [1.0e-6, 1.0, 1.0e9])
 @pytest.mark.parametrize("digits", [3, 16])
 def test_free_motions_in_any_units(size, digits):
-    """A frame of bars at an angle, free, pinned, on rollers, held and on springs of a millionth; rounded places too."""
+    """A frame of bars at an angle, free, pinned, on rollers, held and on springs of a millionth;
+    rounded places too."""
     X, K = (
         np.round([[0.1, 0.2], [1 / 3, 1 / 7], [0.4, 0.9], [0.05, 2 / 3]], digits) * size,
         np.zeros((8, 8)),
@@ -307,7 +320,8 @@ def test_products_do_not_grow_with_bodies(monkeypatch):
 
 
 def test_mass_of_rotations():
-    """Redistributed mass has no place for rotations; rotations without mass only beside contact nodes without any."""
+    """Redistributed mass has no place for rotations; rotations without mass only beside contact
+    nodes without any."""
     system = beam()
     problem = vc.ContactProblem(system, vc.contact_points(system, [6], [0.0, -1.0]))
     with pytest.raises(InputError, match=r"has the inertia of rotations.*mass=ConsistentMass\(\)"):
@@ -325,7 +339,8 @@ def test_mass_of_rotations():
 
 
 def test_rotations_and_tip_without_mass():
-    """The default scheme takes mass that its user has redistributed: all contact unknowns are without any."""
+    """The default scheme takes mass that its user has redistributed: all contact unknowns are
+    without any."""
     masses = np.tile([1.0, 1.0, 0.0], 7)
     masses[-3:] = 0.0
     system = beam(M=masses, v0=np.tile([0.0, -1.0, 0.0], 7))
@@ -342,7 +357,8 @@ def test_rotations_and_tip_without_mass():
 
 
 def test_weight_counts_the_mass_shared_with_the_clamp():
-    """with_weight gives the consistent load of rho A g, as if no row were left out; so does the ground's motion."""
+    """with_weight gives the consistent load of rho A g, as if no row were left out; so does the
+    ground's motion."""
     system = beam(load=None)
     heavy = vc.with_weight(system, acceleration=100.0 / RHO_A)
     assert heavy.load.constant == pytest.approx(beam().load.constant, rel=1e-12)
@@ -375,7 +391,8 @@ def test_restart_is_the_straight_run(tmp_path):
 
 
 def test_frames_for_paraview(tmp_path):
-    """A vertex for each node, clamped ones too; u, v, a, pressure and status; a restart goes on with them."""
+    """A vertex for each node, clamped ones too; u, v, a, pressure and status; a restart goes on
+    with them."""
     h5py = pytest.importorskip("h5py")
     system = beam(v0=np.tile([0.1, -1.0, 0.0], 7))
     surface = vc.contact_points(system, [6], [0.3, -1.0], gap0=0.002, weights=0.01)
@@ -419,7 +436,8 @@ def test_frames_for_paraview(tmp_path):
         plots.plot_deformed(vc.read_run(tmp_path), tmp_path / "deformed.png")
 
 
-# Bad input ------------------------------------------------------------------------------------------------------------
+# Bad input
+# ------------------------------------------------------------------------------------------------------------
 
 ONE, POINTS = np.eye(2), [[0.0, 0.0]]
 

@@ -1,4 +1,5 @@
-"""Contact between two deformable bodies: relative unknowns, action and reaction, gaps, rigid obstacles, refusals."""
+"""Contact between two deformable bodies: relative unknowns, action and reaction, gaps, rigid
+obstacles, refusals."""
 
 from __future__ import annotations
 
@@ -68,13 +69,15 @@ def of_body(problem: ContactProblem, u: Array, body: int) -> tuple[Array, Array]
     return points[inside], values[inside]
 
 
-# Relative unknowns ----------------------------------------------------------------------------------------------------
+# Relative unknowns
+# ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 @cases
 def test_unknowns_are_relative_displacements(name):
-    """B_n ǔ = (u_1 - u_2)·n and |B_t ǔ| = |tangential part| for any two fields on the bodies; all else as it was."""
+    """B_n ǔ = (u_1 - u_2)·n and |B_t ǔ| = |tangential part| for any two fields on the bodies; all
+    else as it was."""
     problem = paired(name)
     system, surface = problem.system, problem.surface
     u = per_body(system, wavy, linear)  # lower, upper: the upper block is side 1
@@ -126,8 +129,8 @@ def test_relative_system_is_the_same_system(name):
 
 @cases
 def test_action_is_reaction(name):
-    """Any reactions push with r on the nodes of side 1 and with -r on those of side 2: force and moment of the pair
-    vanish, each body feels their sum."""
+    """Any reactions push with r on the nodes of side 1 and with -r on those of side 2: force and
+    moment of the pair vanish, each body feels their sum."""
     problem = paired(name)
     system, surface = problem.system, problem.surface
     random = np.random.default_rng(3)
@@ -145,7 +148,8 @@ def test_action_is_reaction(name):
 
 
 def test_gaps_and_listed_points():
-    """Gap along the normal, partners opposite; only the nodes listed, in their order; weights times the thickness."""
+    """Gap along the normal, partners opposite; only the nodes listed, in their order; weights times
+    the thickness."""
     mesh = blocks(2, gap=0.25, angle=0.4)
     system, tags = two_blocks(COMM, mesh)
     one, two = (tags[side] for side in mesh.interface)
@@ -178,8 +182,8 @@ def rings(n: int = 12) -> Blocks:
 
 @pytest.mark.two_ranks
 def test_curved_sides_pair_along_their_normals():
-    """Rings one inside the other: radial partners, gap 0.1; at the ends, where the normal of the last chord is half an
-    angle off, its component."""
+    """Rings one inside the other: radial partners, gap 0.1; at the ends, where the normal of the
+    last chord is half an angle off, its component."""
     system, tags = two_blocks(COMM, rings())
     surface = contact_pair(
         system, tags["inner_right"], tags["outer_left"], matching=NodeToNode(0.05)
@@ -191,8 +195,8 @@ def test_curved_sides_pair_along_their_normals():
 
 
 def test_a_crack_rubs_on_itself():
-    """A crack inside one body: its tip, one node for both faces, has no condition; its faces are relative to each
-    other."""
+    """A crack inside one body: its tip, one node for both faces, has no condition; its faces are
+    relative to each other."""
 
     class Cracked:
         def build(self, gmsh: Any) -> None:
@@ -211,7 +215,8 @@ def test_a_crack_rubs_on_itself():
     assert np.abs(seen(surface).normal_values(smooth)).max() < 1e-14
 
 
-# Bodies that do not deform --------------------------------------------------------------------------------------------
+# Bodies that do not deform
+# --------------------------------------------------------------------------------------------
 
 
 def thrown_down(problem: ContactProblem, angle: float) -> ContactProblem:
@@ -228,8 +233,9 @@ def thrown_down(problem: ContactProblem, angle: float) -> ContactProblem:
 @pytest.mark.parametrize("friction", [None, Coulomb(0.4)], ids=["smooth", "rough"])
 @pytest.mark.parametrize("moves", [False, True], ids=["rest", "moving"])
 def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
-    """The upper block thrown on a lower one that is prescribed all over does what it does on the half-space, at rest
-    and moving: same displacements (1e-10) and reactions (1e-9). With friction on redistributed mass."""
+    """The upper block thrown on a lower one that is prescribed all over does what it does on the
+    half-space, at rest and moving: same displacements (1e-10) and reactions (1e-9). With friction
+    on redistributed mass."""
     angle, speed = 0.4, turned((0.4, 0.7), 0.4)
     mesh = blocks(2, gap=1e-3, angle=angle)
 
@@ -284,7 +290,8 @@ def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
 
 @pytest.mark.parametrize("held", [(0,), (1,)])
 def test_held_components_of_partners_drop_out(held):
-    """Rollers under the interface: the relative unknown keeps the free component of the partner only."""
+    """Rollers under the interface: the relative unknown keeps the free component of the partner
+    only."""
     mesh = blocks(2, angle=0.0)
     system, tags = two_blocks(
         COMM, mesh, prescribed=lambda tags: Prescribed(tags["lower_top"], components=held)
@@ -311,12 +318,13 @@ def test_nodes_clamped_on_both_sides_are_left_out():
     assert seen(surface).count == 4 and seen(surface).points[:, 0].min() > 0.0
 
 
-# Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
+# Refusals, each with its sentence, on all ranks
+# -----------------------------------------------------------------------
 
 
 def test_partners_are_looked_for_nearby():
-    """On two waved faces, touching or apart, a table holds the few nodes next to each one; partners are those that all
-    nodes of the other side would give."""
+    """On two waved faces, touching or apart, a table holds the few nodes next to each one; partners
+    are those that all nodes of the other side would give."""
     x = np.stack(
         np.meshgrid(np.linspace(0.0, 1.0, 24), np.linspace(0.0, 2.0, 24)), axis=-1
     ).reshape(-1, 2)

@@ -1,4 +1,5 @@
-"""Nodes of several bodies at one place: which of them a node of side 1 faces, and where no single one is right."""
+"""Nodes of several bodies at one place: which of them a node of side 1 faces, and where no single
+one is right."""
 
 import numpy as np
 import pytest
@@ -49,7 +50,8 @@ def bond(d, joint=0.0, order=("a", "b")):
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("order", ["ab", "ba"])
 def test_a_stone_on_two_stones_has_no_single_partner(d, order):
-    """Refused with the place, in either order of the bodies; the remedy gives the uniform pressure and settlement."""
+    """Refused with the place, in either order of the bodies; the remedy gives the uniform pressure
+    and settlement."""
     mesh, tags, system = bond(d, order=tuple(order))
     tops = facets(mesh, tags, "a_top", "b_top")
     with pytest.raises(
@@ -104,7 +106,8 @@ def test_columns_of_stones_face_their_own(d, gap):
 
 
 def test_a_stone_beside_another_column_faces_its_own():
-    """Side 2 has the tops of both columns, side 1 the bottom of one stone: its corner faces its own column."""
+    """Side 2 has the tops of both columns, side 1 the bottom of one stone: its corner faces its own
+    column."""
     mesh, tags = fem.build_mesh(
         Blocks({"b": stone(1.0, 0.0), "a": stone(0.0, 0.0), "u": stone(0.0, 1.0)}), COMM
     )
@@ -122,7 +125,8 @@ def test_a_stone_beside_another_column_faces_its_own():
 
 
 def test_bars_have_one_partner_only():
-    """Three bars of which two begin where the first one ends: the mortar method is no remedy there."""
+    """Three bars of which two begin where the first one ends: the mortar method is no remedy
+    there."""
     bar = BlockMesh(lengths=(1.0,), divisions=(2,))
     blocks = {
         "one": bar,

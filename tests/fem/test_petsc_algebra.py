@@ -1,4 +1,5 @@
-"""The algebra protocol on PETSc matrices: the same answers as scipy's, for any number of ranks and any row layout."""
+"""The algebra protocol on PETSc matrices: the same answers as scipy's, for any number of ranks and
+any row layout."""
 
 from __future__ import annotations
 
@@ -18,14 +19,16 @@ N = 200
 
 
 def layout(empty_rank: bool = False) -> tuple[int, int]:
-    """First and last row of this rank; with ``empty_rank`` the last rank owns nothing, as on a tiny mesh."""
+    """First and last row of this rank; with ``empty_rank`` the last rank owns nothing, as on a tiny
+    mesh."""
     sharing = max(COMM.size - 1, 1) if empty_rank else COMM.size
     ends = [N * min(rank, sharing) // sharing for rank in range(COMM.size + 1)]
     return ends[COMM.rank], ends[COMM.rank + 1]
 
 
 def spd(seed: int, reach: int) -> sp.csr_matrix:
-    """A sparse symmetric positive definite matrix with some far couplings, the same on all ranks."""
+    """A sparse symmetric positive definite matrix with some far couplings, the same on all
+    ranks."""
     rng = np.random.default_rng(seed)
     near = sp.diags(
         [rng.normal(size=N - k) for k in range(1, reach + 1)], range(1, reach + 1), shape=(N, N)
@@ -122,7 +125,8 @@ def test_factor_solves(empty_rank):
 @BOTH
 @pytest.mark.parametrize("m", [0, 1, 5, RIGHT_SIDES, 2 * RIGHT_SIDES + 7])
 def test_columns_of_the_inverse(empty_rank, m):
-    """A^-1 e_j in the order of the slots, across several blocks of right-hand sides, wherever the rows live."""
+    """A^-1 e_j in the order of the slots, across several blocks of right-hand sides, wherever the
+    rows live."""
     matrix = spd(4, 3)
     rows = np.random.default_rng(6).permutation(N)[:m]  # slot -> global row
     first, last = layout(empty_rank)

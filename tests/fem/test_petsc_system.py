@@ -1,5 +1,5 @@
-"""Systems of a user's own PETSc matrices on any number of ranks: those that fem.assemble made, marched once more, and
-matrices of frames, marched by scipy on every rank."""
+"""Systems of a user's own PETSc matrices on any number of ranks: those that fem.assemble made,
+marched once more, and matrices of frames, marched by scipy on every rank."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def block(d: int) -> tuple[Any, Any]:
 
 
 def history(problem: vc.ContactProblem, every: Any, **options: Any) -> tuple[Any, Any]:
-    """Displacements of these nodes and reactions of all points in every step, the same on all ranks."""
+    """Displacements of these nodes and reactions of all points in every step, the same on all
+    ranks."""
     u, r = [], []
     for state, report in vc.march(problem, steps=30, dt=4e-4, **options):
         assert report.certificate.worst <= 1e-9
@@ -58,7 +59,8 @@ def same(one: Any, two: Any, rel: float) -> bool:
 @pytest.mark.parametrize("scheme", [vc.Trapezoidal(), vc.MoreauJean()])
 @pytest.mark.parametrize("d", [2, 3])
 def test_exported_matrices_march_as_the_system_they_are_of(d, scheme):
-    """M, C and K of fem.assemble, with both kinds of mass and with friction, as PETSc and as scipy matrices."""
+    """M, C and K of fem.assemble, with both kinds of mass and with friction, as PETSc and as scipy
+    matrices."""
     system, surface = block(d)
     space, whole = system.space, surface.whole()
     every = np.arange(round(COMM.allreduce(len(space.nodes))))
@@ -88,7 +90,8 @@ def test_exported_matrices_march_as_the_system_they_are_of(d, scheme):
 
 @pytest.mark.two_ranks
 def test_other_matrices_on_the_unknowns_of_a_body():
-    """A matrix of all components, reduced to the free ones, takes the place of K: surfaces fit, no factor is old."""
+    """A matrix of all components, reduced to the free ones, takes the place of K: surfaces fit, no
+    factor is old."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), COMM)
     system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -1e3)))
     surface = fem.contact_surface(
@@ -112,7 +115,8 @@ def shared(csr: Any, per_node: int) -> tuple[Any, slice]:
 
 
 def test_frame_on_ranks():
-    """A portal with rotations, clamped feet, an oblique stop with friction: the serial run, on any number of ranks."""
+    """A portal with rotations, clamped feet, an oblique stop with friction: the serial run, on any
+    number of ranks."""
     nodes = np.concatenate(
         [
             line([0.0, 0.0], [0.0, 3.0], 4),
@@ -196,7 +200,8 @@ def test_bodies_and_node_against_node_on_ranks():
 
 
 def test_stiffness_that_is_not_symmetric_on_ranks():
-    """By Volume() and Lemke's method on any number of ranks the serial run; other solvers refuse it."""
+    """By Volume() and Lemke's method on any number of ranks the serial run; other solvers refuse
+    it."""
     M, K = bar_matrices(12, length=1.0, E=1e6, rho=1000.0)
     K = sp.csr_matrix(K + sp.diags([np.full(12, 1e6)], [1]))
     points, v0 = line([0.0], [1.0], 12), np.full(13, 1.0)

@@ -37,7 +37,8 @@ def lean(points: Array) -> Array:
 def dam(
     comm: Any, depth: float | None, simplices: bool, held: bool = True
 ) -> tuple[Any, Any, list[Any]]:
-    """A leaning dam with nodes at the water level, under water on its left face and below its base."""
+    """A leaning dam with nodes at the water level, under water on its left face and below its
+    base."""
     lengths, divisions = (BASE, HEIGHT), (3, 6)
     if depth is not None:
         lengths, divisions = (*lengths, depth), (*divisions, 2)
@@ -51,7 +52,8 @@ def dam(
 
 
 def water_above(y: float, x: float) -> tuple[float, float, float]:
-    """Force to the right, upwards, and moment about (x, y) of the water above a level, for a dam 1 m deep."""
+    """Force to the right, upwards, and moment about (x, y) of the water above a level, for a dam 1
+    m deep."""
     h = LEVEL - y
     force = 0.5 * GAMMA * h**2
     arm = h / 3.0  # of its resultant, normal to the face
@@ -63,7 +65,8 @@ def water_above(y: float, x: float) -> tuple[float, float, float]:
 def test_resultants_are_those_of_hydrostatics(
     comm: Any, depth: float | None, simplices: bool
 ) -> None:
-    """C1.1: force and moment on the foot, of water and of a linear uplift, to 1e-12 of the largest."""
+    """C1.1: force and moment on the foot, of water and of a linear uplift, to 1e-12 of the
+    largest."""
     system, tags, loads = dam(comm, depth, simplices)
     problem = linear(system)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
@@ -92,7 +95,8 @@ def test_sections_through_elements_carry_the_water_above(comm: Any, simplices: b
 
 
 def test_a_pressure_may_change_with_time(comm: Any) -> None:
-    """A number with a history, and a function of place and time: the resultants of a body that nothing holds."""
+    """A number with a history, and a function of place and time: the resultants of a body that
+    nothing holds."""
     mesh, tags = block(comm, lengths=(2.0, 3.0), divisions=(2, 3))
     for load, at_two in (
         (fem.Pressure(tags["left"], 700.0, lambda t: 3.0 * t), 700.0 * 6.0 * 3.0),

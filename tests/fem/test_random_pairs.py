@@ -1,7 +1,9 @@
-"""A block that rests on another, with random meshes and offsets: its contact forces balance its weight by hand.
+"""A block that rests on another, with random meshes and offsets: its contact forces balance its
+weight by hand.
 
-The sum of the normal forces is the weight, their moment is that of the weight at the middle of the block, and all of
-them press, whatever the facets of both sides: slivers at the ends, cells of other sizes, nodes that nearly meet."""
+The sum of the normal forces is the weight, their moment is that of the weight at the middle of the
+block, and all of them press, whatever the facets of both sides: slivers at the ends, cells of other
+sizes, nodes that nearly meet."""
 
 from __future__ import annotations
 
@@ -77,8 +79,9 @@ def test_contact_forces_balance_the_weight(
 
 
 def moments(problem: Any, state: Any, middle: float) -> tuple[float, float]:
-    """The moments of contact forces on the upper block, and on both, about the middle of its foot [N m], by virtual
-    work: a small turn moves nodes by (x - middle) upwards, and the forces do the work of the moment."""
+    """The moments of contact forces on the upper block, and on both, about the middle of its foot
+    [N m], by virtual work: a small turn moves nodes by (x - middle) upwards, and the forces do the
+    work of the moment."""
     system, surface, space = problem.static_load, problem.surface, problem.system.space
     turn = np.zeros((len(space.nodes), 2))
     turn[:, 1] = space.points[:, 0] - middle - 0.5 * LONG

@@ -1,4 +1,5 @@
-"""Supports of the gravity stage that the dynamic stage does without: their reactions go on as forces."""
+"""Supports of the gravity stage that the dynamic stage does without: their reactions go on as
+forces."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ WEIGHT = fem.BodyForce((0.0, -2000.0 * 9.81))
 def stages(
     comm: Any, *, motion: Any = None, friction: Any = None, **other: Any
 ) -> tuple[Any, Any, Any, Any]:
-    """(static problem, its state, dynamic problem, points): soil beside a rigid wall, on clamps; then on dashpots."""
+    """(static problem, its state, dynamic problem, points): soil beside a rigid wall, on clamps;
+    then on dashpots."""
     mesh, tags = strip(comm, 6.0, 4.0, (6, 4))
     rollers = fem.Prescribed(tags["left"], components=(0,))
     before = fem.assemble(mesh, SOIL, clamped=tags["bottom"], prescribed=rollers, loads=WEIGHT)
@@ -59,7 +61,8 @@ def test_nothing_moves_after_the_release(comm, friction):
 
 @pytest.mark.serial
 def test_without_the_reactions_it_falls(comm):
-    """The same start without the forces: the dashpots let the soil sink, at 0.1 s by more than it had settled."""
+    """The same start without the forces: the dashpots let the soil sink, at 0.1 s by more than it
+    had settled."""
     static, state, dynamic, points = stages(comm)
     _, start = fem.release(static, state, dynamic)
     space = dynamic.system.space
@@ -133,8 +136,9 @@ def block_on_soil(
     friction: Any = None,
     simplices: bool = False,
 ) -> tuple[Any, Any, Any]:
-    """(static problem, its state, dynamic problem): a block on a box of soil, meshes that do not match, a clamped base
-    and sides that are ``held`` by ties or rollers; then a compliant base, and the same ties or dashpots."""
+    """(static problem, its state, dynamic problem): a block on a box of soil, meshes that do not
+    match, a clamped base and sides that are ``held`` by ties or rollers; then a compliant base, and
+    the same ties or dashpots."""
     lower = BlockMesh(lengths=(6.0, 4.0, 6.0), divisions=(4, 4, 4), simplices=simplices)
     upper = BlockMesh(lengths=(3.0, 3.0, 3.0), divisions=(2, 3, 2), simplices=simplices)
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(1.2, 1.5)), comm)
@@ -180,7 +184,8 @@ def block_on_soil(
     ],
 )
 def test_a_block_on_a_box_of_soil_stays(comm, held, solver, friction, simplices):
-    """Without motion nothing moves, whatever held the sides during gravity and whatever does afterwards."""
+    """Without motion nothing moves, whatever held the sides during gravity and whatever does
+    afterwards."""
     static, state, dynamic = block_on_soil(
         comm, held, solver, friction=friction, simplices=simplices
     )
@@ -206,8 +211,8 @@ def test_a_block_on_a_box_of_soil_stays(comm, held, solver, friction, simplices)
 @pytest.mark.serial
 @pytest.mark.slow
 def test_a_block_on_a_box_of_soil_is_shaken(comm):
-    """Three components at once lift the block's edges and move it: every step certified, the ledger closed, and the
-    other route finds the same on one rank alone."""
+    """Three components at once lift the block's edges and move it: every step certified, the ledger
+    closed, and the other route finds the same on one rank alone."""
     found = []
     for ranks, solver in ((comm, vc.Condensed()), (MPI.COMM_SELF, vc.Iterative(tolerance=1e-12))):
         up = soil.upgoing(SHAKEN, dt=1e-3)

@@ -1,4 +1,5 @@
-"""Displacements of second order: numbers of mid-points on any ranks, patch tests of contact, rates, refusals."""
+"""Displacements of second order: numbers of mid-points on any ranks, patch tests of contact, rates,
+refusals."""
 
 from __future__ import annotations
 
@@ -84,7 +85,8 @@ PRESSURE = 1.0e4
 
 
 def pressed_down(x: Array) -> Array:
-    """The displacement of a free block under a uniform pressure on its top, plane strain in the plane."""
+    """The displacement of a free block under a uniform pressure on its top, plane strain in the
+    plane."""
     E, nu, d = SOFT.E, SOFT.nu, x.shape[1]
     strain = np.full(d, nu * (1.0 + nu if d == 2 else 1.0) * PRESSURE / E)
     strain[1] = -(1.0 - nu**2 if d == 2 else 1.0) * PRESSURE / E
@@ -123,7 +125,8 @@ PAIRS: dict[str, dict[str, Any]] = {
 
 
 def bent_bodies(x: Array) -> Array:
-    """Bend two blocks of heights 1 on one another inside, the sides and the interface stay where they are."""
+    """Bend two blocks of heights 1 on one another inside, the sides and the interface stay where
+    they are."""
     lengths = np.array([1.5, 1.0, 1.2])[: x.shape[1]]
     bump = np.prod(np.sin(np.pi * x / lengths), axis=1)
     return x + 0.06 * bump[:, None] * np.array([1.0, -0.7, 0.5])[: x.shape[1]]
@@ -179,7 +182,8 @@ def test_conditions_that_do_not_serve_are_refused() -> None:
 
 
 def bent_interface(x: Array) -> Array:
-    """Move the interface at the height of 1 to a wave, level at both ends; bottom and top stay where they are."""
+    """Move the interface at the height of 1 to a wave, level at both ends; bottom and top stay
+    where they are."""
     wave = 0.05 * (1.0 - np.cos(2.0 * np.pi * x[:, 0] / 1.5))
     return np.column_stack([x[:, 0], x[:, 1] + wave * (1.0 - np.abs(x[:, 1] - 1.0)), x[:, 2:]])
 
@@ -187,8 +191,8 @@ def bent_interface(x: Array) -> Array:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", PAIRS)
 def test_an_even_pressure_from_all_sides_goes_through_a_curved_interface(name: str) -> None:
-    """Reactions are p times the length of ∫ n phi_i, the strain is the same all over both bodies; r_n over the weight
-    is p but for the change of direction within a side, 3 % (measured 0.9)."""
+    """Reactions are p times the length of ∫ n phi_i, the strain is the same all over both bodies;
+    r_n over the weight is p but for the change of direction within a side, 3 % (measured 0.9)."""
     both = blocks(**PAIRS[name])
     mesh, tags = build_mesh(Curved(both, bent_interface), COMM)
     d = mesh.geometry.dim
@@ -220,8 +224,8 @@ def rounded(x: Array) -> Array:
 
 @pytest.mark.parametrize("name", ["triangles", "quadrilaterals", "hexahedra"])
 def test_few_curved_sides_are_a_smooth_face(name: str) -> None:
-    """A disk and a ball of 8 curved sides round, whose planes turn by 45°: all nodes have one condition, along the
-    radius. Those of a box keep two at its corners."""
+    """A disk and a ball of 8 curved sides round, whose planes turn by 45°: all nodes have one
+    condition, along the radius. Those of a box keep two at its corners."""
     d = 3 if name == "hexahedra" else 2
     spec = {"lengths": (2.0,) * d, "divisions": (2,) * d, "simplices": name == "triangles"}
     mesh, tags = build_mesh(Curved(BlockMesh(**spec), rounded), COMM)

@@ -1,5 +1,6 @@
-"""What is recorded and written of displacements of second order, on any number of ranks: fields with all nodes in the
-order of VTK, stress, pressure, reactions and section forces, energies of a run with friction between two bodies."""
+"""What is recorded and written of displacements of second order, on any number of ranks: fields
+with all nodes in the order of VTK, stress, pressure, reactions and section forces, energies of a
+run with friction between two bodies."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ from vi_contact.soil.free_field import FreeField
 COMM = MPI.COMM_WORLD
 P = 1.0e4
 curved = pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])
-VTK = {  # which vertices every node of a cell is the mean of, in VTK's order (VTK book, quadratic cells)
+# which vertices every node of a cell is the mean of, in VTK's order (VTK book, quadratic cells)
+VTK = {
     "triangles": [(0,), (1,), (2,), (0, 1), (1, 2), (0, 2)],
     "quadrilaterals": [(0,), (1,), (2,), (3,), (0, 1), (1, 2), (2, 3), (0, 3), (0, 1, 2, 3)],
     "tetrahedra": [(0,), (1,), (2,), (3,), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)],
@@ -77,8 +79,9 @@ WRITTEN = [*((name, False) for name in SHAPES), ("triangles", True), ("tetrahedr
 def test_fields_have_all_nodes_in_the_order_of_vtk(
     name: str, curved: bool, shared_tmp: Path
 ) -> None:
-    """The cells are turned the right way round, mid-points of straight cells lie where VTK expects them and curved ones
-    not far from there; stress and displacements of a uniform strain are exact; pictures have the vertices."""
+    """The cells are turned the right way round, mid-points of straight cells lie where VTK expects
+    them and curved ones not far from there; stress and displacements of a uniform strain are exact;
+    pictures have the vertices."""
     mesh, _ = fem.build_mesh(mesh_of(name, curved), COMM)
     d = mesh.geometry.dim
     A = STRAIN[:d, :d]
@@ -121,8 +124,8 @@ def of_reactions(problem: vc.ContactProblem, state: vc.State) -> Any:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", ["triangles", "hexahedra"])
 def test_functions_and_pressure(name: str) -> None:
-    """The stress of a quadratic displacement is projected exactly (cells with straight sides), the contact pressure is
-    on all nodes of the sides and its integral the resultant."""
+    """The stress of a quadratic displacement is projected exactly (cells with straight sides), the
+    contact pressure is on all nodes of the sides and its integral the resultant."""
     mesh, tags = block(COMM, **SHAPES[name])
     d = mesh.geometry.dim
     load = fem.Traction(tags["top"], (0.0, -2.0e4, 0.0)[:d])
@@ -194,7 +197,8 @@ def thrown(comm: Any, name: str) -> vc.ContactProblem:
 
 @pytest.mark.parametrize("name", ["triangles", "hexahedra"])
 def test_two_bodies_strike_and_rub_alike_on_any_ranks(name: str) -> None:
-    """Certificates and the energy ledger of the default scheme; the same run on all ranks as on one alone."""
+    """Certificates and the energy ledger of the default scheme; the same run on all ranks as on one
+    alone."""
     problem, alone = thrown(COMM, name), thrown(MPI.COMM_SELF, name)
     found = vc.simulate(problem, dt=2e-4, steps=40, progress=False, record=[vc.Energy()])
     facts, energy = found.facts, found.facts["energy"]
@@ -232,8 +236,8 @@ def test_pictures_have_the_contact_of_mid_points_too(name: str, tmp_path: Path) 
 
 @curved
 def test_mass_of_contact_nodes_is_handed_on(curved: bool) -> None:
-    """P2 triangles, whose row sums are zero at vertices, or of any sign with curved sides: those are not lumped. The
-    mass and the inertia of the body stay what they are."""
+    """P2 triangles, whose row sums are zero at vertices, or of any sign with curved sides: those
+    are not lumped. The mass and the inertia of the body stay what they are."""
     mesh, tags = fem.build_mesh(mesh_of("triangles", curved), COMM)
     system = fem.assemble(mesh, CONCRETE, degree=2)
     surface = fem.contact_surface(system, tags["bottom"])
@@ -257,8 +261,8 @@ def test_mass_of_contact_nodes_is_handed_on(curved: bool) -> None:
 
 @pytest.mark.two_ranks
 def test_tied_sides_and_dashpots() -> None:
-    """A layer with tied sides in shear moves as a column does; dashpots resist a motion of the whole side by the
-    impedance times its length."""
+    """A layer with tied sides in shear moves as a column does; dashpots resist a motion of the
+    whole side by the impedance times its length."""
     mesh, tags = block(COMM, lengths=(2.0, 1.5), divisions=(3, 3), simplices=True)
     loads = fem.Traction(tags["top"], (1.0e4, 0.0))
     tied = fem.Tied(tags["left"], tags["right"])
@@ -289,8 +293,8 @@ def test_what_knows_first_order_only_says_so() -> None:
 @pytest.mark.two_ranks
 @curved
 def test_reactions_hold_what_contact_does_to_held_edges(curved: bool) -> None:
-    """A block clamped beside its contact: loads, contact, friction and reactions are in balance, at rest and in steps,
-    and a cut along the clamped side has minus the reactions."""
+    """A block clamped beside its contact: loads, contact, friction and reactions are in balance, at
+    rest and in steps, and a cut along the clamped side has minus the reactions."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", curved), COMM)
     density = np.array([1e3, -3e4, 2e3])
     loads = fem.BodyForce(tuple(density))
@@ -325,7 +329,8 @@ def test_reactions_hold_what_contact_does_to_held_edges(curved: bool) -> None:
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
-    """Two blocks held beside their interface, or the lower one on it: each is in balance with its part of the loads."""
+    """Two blocks held beside their interface, or the lower one on it: each is in balance with its
+    part of the loads."""
     both = blocks(3, upper=(2, 1, 2), lower=(2, 1, 2), simplices=True)
     mesh, tags = fem.build_mesh(both, COMM)
     load = fem.Traction(tags["upper_top"], (0.0, -P, 0.0))
@@ -353,8 +358,8 @@ def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
     "points", [None, [(1.0, 0.0, 0.6), (2.0, 0.0, 1.2)]], ids=["all", "listed"]
 )
 def test_the_pressure_of_tetrahedra_has_the_contact_force(points: Any) -> None:
-    """∫ p = sum r_n of p that is zero at vertices of contact facets without a condition, clamped or not listed; as a
-    function clamped ones have the pressure of their neighbours."""
+    """∫ p = sum r_n of p that is zero at vertices of contact facets without a condition, clamped or
+    not listed; as a function clamped ones have the pressure of their neighbours."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
     system = fem.assemble(
         mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -3e4, 0.0)), degree=2

@@ -1,4 +1,5 @@
-"""Section forces, reactions and contact resultants of finite element bodies against equilibrium, on any ranks."""
+"""Section forces, reactions and contact resultants of finite element bodies against equilibrium, on
+any ranks."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³
 
 
 def cantilever(comm: Any, simplices: bool) -> tuple[vc.ContactProblem, Any, list[Any]]:
-    """A wall clamped at its foot under a tip load, a uniform pressure on its left face and a body force."""
+    """A wall clamped at its foot under a tip load, a uniform pressure on its left face and a body
+    force."""
     mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 8), simplices=simplices)
     loads = [
         fem.Traction(tags["top"], TIP),
@@ -34,7 +36,8 @@ def cantilever(comm: Any, simplices: bool) -> tuple[vc.ContactProblem, Any, list
 
 
 def above(y: float) -> dict[str, float]:
-    """N (tension), V, M by equilibrium of what is above a cut drawn from the left face to the right one."""
+    """N (tension), V, M by equilibrium of what is above a cut drawn from the left face to the right
+    one."""
     length = HEIGHT - y
     across = TIP[0] * WIDTH + (WIND + WEIGHT[0] * WIDTH) * length
     axial = (TIP[1] + WEIGHT[1] * length) * WIDTH
@@ -45,7 +48,8 @@ def above(y: float) -> dict[str, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> None:
-    """N, V, M of a cantilever under tip, uniform and body loads to 1e-10, on a mesh two elements wide."""
+    """N, V, M of a cantilever under tip, uniform and body loads to 1e-10, on a mesh two elements
+    wide."""
     problem, tags, loads = cantilever(comm, simplices)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     levels = {"foot": 0.0, "through": 1.3, "middle": 2.0, "close": 2.001, "high": 3.5}
@@ -63,7 +67,8 @@ def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> 
 
 
 def test_a_section_through_what_is_pulled_along(comm: Any) -> None:
-    """An inclined wall under a tangential traction of its left face: the part of it above a cut through elements."""
+    """An inclined wall under a tangential traction of its left face: the part of it above a cut
+    through elements."""
     angle = 0.7
     mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 5), angle=angle)
     up, right = np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
@@ -80,7 +85,8 @@ def test_a_section_through_what_is_pulled_along(comm: Any) -> None:
 
 
 def test_reactions_carry_all_loads(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
-    """Force and moment of the clamped foot balance tip, wind and weight, the part on the held nodes included."""
+    """Force and moment of the clamped foot balance tip, wind and weight, the part on the held nodes
+    included."""
     problem, tags, loads = cantilever(comm, False)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     row = fem.Reactions("foot", tags["bottom"], (0.5 * WIDTH, 0.0), loads).start(problem, state)
@@ -162,7 +168,8 @@ DT, STEPS, SCHEME = 1.0 / 360.0, 40, vc.Newmark()
 
 
 def shaken(comm: Any, moving: bool) -> tuple[vc.ContactProblem, Any]:
-    """A wall between nothing and a stop on its right, shaken in the relative frame or by its foot."""
+    """A wall between nothing and a stop on its right, shaken in the relative frame or by its
+    foot."""
     mesh, tags = block(comm, lengths=(2.0, 6.0), divisions=(2, 6))
     ground = base_motion(SHAKE)
     foot = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
@@ -186,7 +193,8 @@ def histories(comm: Any, moving: bool) -> dict[str, Array]:
 
 @pytest.mark.slow
 def test_frames_give_the_same_forces(comm: Any) -> None:
-    """The relative frame with its inertia load and the foot moved by hand: reactions, N, V, M, racking to 1e-8."""
+    """The relative frame with its inertia load and the foot moved by hand: reactions, N, V, M,
+    racking to 1e-8."""
     one, two = histories(comm, False), histories(comm, True)
     names = [name for name in one if name.startswith(("reaction", "N_", "V_", "M_", "racking"))]
     assert len(names) == 10
@@ -201,7 +209,8 @@ def test_frames_give_the_same_forces(comm: Any) -> None:
 
 
 def test_reactions_move_all_masses(comm: Any) -> None:
-    """R + contact force + weight = rᵀ M (a + a_g) of the whole body, with a mass matrix assembled without supports."""
+    """R + contact force + weight = rᵀ M (a + a_g) of the whole body, with a mass matrix assembled
+    without supports."""
     mesh, tags = block(comm, lengths=(2.0, 6.0), divisions=(2, 6))
     weight = fem.BodyForce((0.0, -9.80665 * CONCRETE.rho))
     system = fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=weight)
@@ -252,9 +261,11 @@ def block_on_springs(
 
 @pytest.mark.serial
 def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
-    """S3.7: M/(W b) = 1/3, .5286, .6667, .7892, .9333 at theta/theta_cr = 1, 2, 4, 10, 100, N = W, contact c/2b.
+    """S3.7: M/(W b) = 1/3, .5286, .6667, .7892, .9333 at theta/theta_cr = 1, 2, 4, 10, 100, N = W,
+    contact c/2b.
 
-    A stiff block is turned by its top, so far down that the Winkler bed carries W: t = theta/theta_cr - 1.
+    A stiff block is turned by its top, so far down that the Winkler bed carries W: t =
+    theta/theta_cr - 1.
     """
     ratios = np.array([1.0, 2.0, 4.0, 10.0, 100.0])
 
@@ -287,10 +298,12 @@ def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
 
 @pytest.mark.serial
 def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
-    """S3.7: a block with its weight at height h lifts off at a/g = b/(3h), later uplift = 1 - 3(1 - e/b)/2, e = h a/g.
+    """S3.7: a block with its weight at height h lifts off at a/g = b/(3h), later uplift = 1 - 3(1 -
+    e/b)/2, e = h a/g.
 
-    Load controlled: held by contact alone and a roller along its base. M is W h a/g, R_x -W a/g
-    to what the static stage of a body without supports leaves (1e-9 of the elastic forces of a stiff body).
+    Load controlled: held by contact alone and a roller along its base. M is W h a/g, R_x -W a/g to
+    what the static stage of a body without supports leaves (1e-9 of the elastic forces of a stiff
+    body).
     """
     h = 0.5 * BLOCK_HEIGHT
     for ratio, uplift in ((0.99, 0.0), (1.06, 0.09), (2.0, 0.5)):
@@ -354,7 +367,8 @@ ANGLES = [pytest.param(turns * np.pi, marks=pytest.mark.serial) for turns in (0.
 
 @pytest.mark.parametrize("angle", [*ANGLES, 0.7], ids="{:.2f}".format)
 def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
-    """Forces of a rubbing face that looks down, right, up, left or askew, against Contact's friction force."""
+    """Forces of a rubbing face that looks down, right, up, left or askew, against Contact's
+    friction force."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 2), angle=angle)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     push = fem.Traction(tags["top"], tuple(turn @ [3.0e4, -1.0e5]))
@@ -380,7 +394,8 @@ def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
 
 
 def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
-    """N, T, force and M of a rubbing surface against Contact's forces; M is what the reactions and loads leave."""
+    """N, T, force and M of a rubbing surface against Contact's forces; M is what the reactions and
+    loads leave."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 2))
     push = fem.Traction(tags["top"], (3.0e4, -1.0e5))
     system = fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=push)
@@ -410,8 +425,9 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
 
 @pytest.mark.serial
 def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
-    """Buried channel after gravity, with friction: its weight is the contact force on base and walls, and N, V, M at
-    the foot of a wall are those of the wall's weight and of the contact forces above the cut."""
+    """Buried channel after gravity, with friction: its weight is the contact force on base and
+    walls, and N, V, M at the foot of a wall are those of the wall's weight and of the contact
+    forces above the cut."""
     model = build(Channel(), comm)
     x, y = model.channel.shape.x, model.channel.shape.y
     left, inner, top_of_slab = x[1], x[2], y[2]
@@ -441,7 +457,8 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
 
 @pytest.mark.slow
 def test_reactions_in_space(comm: Any) -> None:
-    """A block on its foot under weight and a drag along its top: force and moment vectors about a corner."""
+    """A block on its foot under weight and a drag along its top: force and moment vectors about a
+    corner."""
     mesh, tags = block(comm, lengths=(2.0, 1.0, 1.5), divisions=(2, 2, 2))
     loads = [fem.BodyForce((0.0, -2.4e4, 0.0)), fem.Traction(tags["top"], (0.0, 0.0, 5.0e3))]
     problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=loads))

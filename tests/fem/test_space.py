@@ -41,7 +41,8 @@ def test_initial_values():
 
 @pytest.mark.two_ranks
 def test_rollers_hold_one_component():
-    """A roller keeps one component at zero and leaves the others free, in number and in the solution."""
+    """A roller keeps one component at zero and leaves the others free, in number and in the
+    solution."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.0), divisions=(2, 2, 2))
     rollers = [
         Prescribed(tags["left"], components=(0,)),
@@ -74,7 +75,8 @@ def test_where_conditions_meet_the_later_one_counts():
 
 
 def test_prescribed_displacement_makes_its_linear_field():
-    """Linear displacements on the whole boundary give the same linear field inside (patch test of assembly)."""
+    """Linear displacements on the whole boundary give the same linear field inside (patch test of
+    assembly)."""
     gradient = np.array([[1e-3, 4e-4], [-2e-4, 7e-4]])
     for simplices in (False, True):
         mesh, tags = block(
@@ -109,8 +111,9 @@ def moving_base(mesh, tags, damping=None, material=CONCRETE) -> SemiDiscreteSyst
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("damping", [None, Rayleigh(alpha=0.0, beta=1e-3)])
 def test_moving_base_is_the_body_force_of_the_relative_frame(damping):
-    """With u = r U(t) + w the pull of the moving base is K r U + C r U' minus the inertia of the whole body, rho U''
-    per volume, on the free unknowns: an identity, whatever the motion. (Mass-proportional damping brakes U' too.)"""
+    """With u = r U(t) + w the pull of the moving base is K r U + C r U' minus the inertia of the
+    whole body, rho U'' per volume, on the free unknowns: an identity, whatever the motion.
+    (Mass-proportional damping brakes U' too.)"""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3, 5))
     system = moving_base(mesh, tags, damping)
     weight = assemble(
@@ -128,7 +131,8 @@ def test_moving_base_is_the_body_force_of_the_relative_frame(damping):
 
 
 def relative_frame(mesh, tags, excitation=()) -> ContactProblem:
-    """Clamped base; without excitation the inertia -rho U'' acts as a body force on every element."""
+    """Clamped base; without excitation the inertia -rho U'' acts as a body force on every
+    element."""
     inertia = (
         () if excitation else BodyForce((-CONCRETE.rho, 0.0), history=lambda t: shaken_base(t)[2])
     )
@@ -139,8 +143,8 @@ def relative_frame(mesh, tags, excitation=()) -> ContactProblem:
 
 @pytest.mark.slow
 def test_moving_base_and_relative_frame_converge_to_one_motion():
-    """Base displaced (absolute frame) or inertia -rho U'' per volume (relative frame): they differ by the time error of
-    the sampled motion alone, which is of second order."""
+    """Base displaced (absolute frame) or inertia -rho U'' per volume (relative frame): they differ
+    by the time error of the sampled motion alone, which is of second order."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3, 5))
     absolute, relative = linear(moving_base(mesh, tags, material=SOFT)), relative_frame(mesh, tags)
     differences = []
@@ -156,8 +160,9 @@ def test_moving_base_and_relative_frame_converge_to_one_motion():
 
 @pytest.mark.two_ranks
 def test_inertia_load_of_an_excitation_is_the_body_force_of_the_relative_frame():
-    """The inertia load of an excitation counts the mass that elements share with the base: -rho U'' per volume, to
-    round-off. Without that mass, as in the reference of V4.1, h/6 of the height is missing: an effect of h²."""
+    """The inertia load of an excitation counts the mass that elements share with the base: -rho U''
+    per volume, to round-off. Without that mass, as in the reference of V4.1, h/6 of the height is
+    missing: an effect of h²."""
     shake = Harmonic(3.6, 60.0 / (2.0 * np.pi), phase=np.pi / 2.0)  # U'' of shaken_base
     assert shake.acceleration(0.011) == pytest.approx(shaken_base(0.011)[2], rel=1e-12)
     effects = []
@@ -201,7 +206,8 @@ def test_points_outside_the_body():
 
 
 def test_empty_boundary_is_refused():
-    """A group without facets on any rank would hold and load nothing; without it the floating body is recognised."""
+    """A group without facets on any rank would hold and load nothing; without it the floating body
+    is recognised."""
     mesh, _ = block(COMM, lengths=(2.0, 2.0), divisions=(4, 4))
     nothing = Facets("nothing", np.zeros(0, dtype=np.int32), mesh)
     with pytest.raises(InputError, match="the boundary group 'nothing' of clamped has no facets"):

@@ -1,4 +1,5 @@
-"""From facets to contact conditions: nodes, weights, normals, gaps, turned frames, and every refusal."""
+"""From facets to contact conditions: nodes, weights, normals, gaps, turned frames, and every
+refusal."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ def body(name: str = "quadrilaterals", **data: Any) -> tuple[Any, Any]:
 
 
 def ring(n: int, *, simplices: bool = False) -> tuple[Any, Any]:
-    """A quarter ring of radii 1 and 2 about the origin; "left" is the inner arc, "right" the outer."""
+    """A quarter ring of radii 1 and 2 about the origin; "left" is the inner arc, "right" the
+    outer."""
 
     def bend(x: Array) -> Array:
         return np.column_stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])])
@@ -49,14 +51,15 @@ def ring(n: int, *, simplices: bool = False) -> tuple[Any, Any]:
     )
 
 
-# Nodes, weights, normals ----------------------------------------------------------------------------------------------
+# Nodes, weights, normals
+# ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
 @bodies
 def test_weights_and_normals_of_a_flat_side(name):
-    """Weights sum to the area, all normals are the side's, every node of the side is there once and in the order of the
-    mesh's numbers, equal on all ranks."""
+    """Weights sum to the area, all normals are the side's, every node of the side is there once and
+    in the order of the mesh's numbers, equal on all ranks."""
     d, lengths, angle = (
         len(BODIES[name]["lengths"]),
         BODIES[name]["lengths"],
@@ -83,7 +86,8 @@ def test_weights_and_normals_of_a_flat_side(name):
 
 
 def test_weights_are_tributary_lengths():
-    """2D: half the adjacent lengths times the section's thickness; listed points keep the order of the list."""
+    """2D: half the adjacent lengths times the section's thickness; listed points keep the order of
+    the list."""
     system, tags = body(section=PlaneStress(0.2))
     surface = contact_surface(system, tags["right"])
     h = 1.5 / 4
@@ -98,8 +102,9 @@ def test_weights_are_tributary_lengths():
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("simplices", [False, True])
 def test_normals_of_a_curved_side_are_those_of_the_chords(simplices):
-    """∫ phi_i n over a polygon is half the sum of the two chord normals times their lengths: on an arc with equal
-    chords the radial direction exactly inside, half a chord's angle off at the ends; weights are mean chord lengths."""
+    """∫ phi_i n over a polygon is half the sum of the two chord normals times their lengths: on an
+    arc with equal chords the radial direction exactly inside, half a chord's angle off at the ends;
+    weights are mean chord lengths."""
     n = 7
     mesh, tags = ring(n, simplices=simplices)
     surface = contact_surface(assemble(mesh, CONCRETE), tags["right"])
@@ -117,8 +122,9 @@ def test_normals_of_a_curved_side_are_those_of_the_chords(simplices):
 
 
 def test_gaps_of_obstacles():
-    """Touching: none. Half-space: distance of the node from the plane, along the plane's normal whatever the boundary's
-    normal. AnalyticGap: the function, along the boundary's normal; a user's own obstacle needs the two methods only."""
+    """Touching: none. Half-space: distance of the node from the plane, along the plane's normal
+    whatever the boundary's normal. AnalyticGap: the function, along the boundary's normal; a user's
+    own obstacle needs the two methods only."""
     system, tags = body()
     assert not contact_surface(system, tags["bottom"]).gap0.any()
     slope = HalfSpace(point=(0.0, -0.1), normal=(3.0, 4.0))
@@ -150,13 +156,15 @@ def test_gaps_of_obstacles():
 
 @pytest.mark.two_ranks
 def test_gap_of_round_off_is_no_penetration():
-    """A plane that cuts the boundary by 1e-13 of the body's size counts as touching; 1e-6 is refused below."""
+    """A plane that cuts the boundary by 1e-13 of the body's size counts as touching; 1e-6 is
+    refused below."""
     system, tags = body()
     near = HalfSpace(point=(0.0, 1e-13), normal=(0.0, 1.0))
     assert not contact_surface(system, tags["bottom"], obstacle=near).gap0.any()
 
 
-# Frames ---------------------------------------------------------------------------------------------------------------
+# Frames
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def some_field(x: Array) -> Array:
@@ -167,7 +175,8 @@ def some_field(x: Array) -> Array:
 @bodies
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_normal_unknown_is_the_normal_displacement(name, side):
-    """B_n û = u·n for any u = T û; T is orthogonal; along axes that point to the obstacle there is no T at all."""
+    """B_n û = u·n for any u = T û; T is orthogonal; along axes that point to the obstacle there is
+    no T at all."""
     system, tags = body(name)
     surface = contact_surface(system, tags[side])
     problem = ContactProblem(system, surface)
@@ -188,7 +197,8 @@ def test_normal_unknown_is_the_normal_displacement(name, side):
 
 @pytest.mark.parametrize("name", ["triangles", "tetrahedra"])
 def test_turned_system_is_the_same_system(name):
-    """Energies, loads, initial values and inertia loads do not depend on the frames: TᵀMT, TᵀKT, Tᵀf, Tᵀr."""
+    """Energies, loads, initial values and inertia loads do not depend on the frames: TᵀMT, TᵀKT,
+    Tᵀf, Tᵀr."""
     down = BodyForce(tuple(np.eye(len(BODIES[name]["lengths"]))[-1]))
     system, tags = body(
         name, loads=down, initial_velocity=some_field, initial_displacement=some_field
@@ -214,9 +224,11 @@ def test_turned_system_is_the_same_system(name):
 
 @pytest.mark.parametrize("angle", [0.3, 1.0, 2.5, -0.7])
 def test_rollers_beside_an_oblique_contact_in_space(angle):
-    """Nodes held in y that touch a plane turned about the y axis: T keeps y to itself and stays orthogonal.
+    """Nodes held in y that touch a plane turned about the y axis: T keeps y to itself and stays
+    orthogonal.
 
-    The block presses on the plane by a force along -n; with rollers on two sides it moves straight onto it.
+    The block presses on the plane by a force along -n; with rollers on two sides it moves straight
+    onto it.
     """
     mesh, tags = block(COMM, lengths=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
     towards = np.array([-sin(angle), 0.0, -cos(angle)]) * np.sign(cos(angle))
@@ -237,7 +249,8 @@ def test_rollers_beside_an_oblique_contact_in_space(angle):
     assert max_over_ranks(COMM, surface.basis @ surface.basis.transpose_apply(r) - r) < 1e-14
 
 
-# Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
+# Refusals, each with its sentence, on all ranks
+# -----------------------------------------------------------------------
 
 
 def test_no_contact_nodes():
@@ -254,7 +267,8 @@ def test_no_contact_nodes():
 
 
 def test_clamped_contact_nodes():
-    """Where the side meets the clamped base its node is left out; clamped all over, or listed, it is refused."""
+    """Where the side meets the clamped base its node is left out; clamped all over, or listed, it
+    is refused."""
     system, tags = body(clamped=None)
     whole = contact_surface(system, tags["right"]).total
     system, tags = body()
@@ -274,7 +288,8 @@ def test_clamped_contact_nodes():
 
 @pytest.mark.two_ranks
 def test_contact_direction_partly_prescribed():
-    """Held along the contact direction is refused (on all ranks, whoever owns the node); held across it is fine."""
+    """Held along the contact direction is refused (on all ranks, whoever owns the node); held
+    across it is fine."""
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
     across = assemble(mesh, CONCRETE, prescribed=Prescribed(tags["left"], components=(0,)))
     assert contact_surface(across, tags["bottom"]).total == 6
@@ -364,7 +379,8 @@ def test_system_of_another_kind():
 
 @pytest.mark.two_ranks
 def test_a_listed_point_between_nodes_is_told(caplog: pytest.LogCaptureFixture) -> None:
-    """It stands for the nearest node, and rank 0 says how far that is; a point on a node is not mentioned."""
+    """It stands for the nearest node, and rank 0 says how far that is; a point on a node is not
+    mentioned."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(8, 4))
     system = assemble(mesh, CONCRETE, clamped=tags["bottom"])
     surface = contact_surface(system, tags["right"], points=[(2.0, 0.5), (2.0, 0.98)])

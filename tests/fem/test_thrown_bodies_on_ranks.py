@@ -14,8 +14,9 @@ import vi_contact as vc
 
 
 def test_the_same_sets_on_any_number_of_ranks():
-    """Two blocks with curved faces that do not match, from the first touch: all ranks together and each alone have the
-    same points open, sticking and slipping in every step, and the same reactions to 1e-9."""
+    """Two blocks with curved faces that do not match, from the first touch: all ranks together and
+    each alone have the same points open, sticking and slipping in every step, and the same
+    reactions to 1e-9."""
     sets, forces = [], []
     for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         problem = thrown_blocks(comm, friction=0.4, bent=0.2)

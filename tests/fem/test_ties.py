@@ -1,4 +1,5 @@
-"""Tied sides: nodes at the same height move together, on any number of ranks, and are one column of soil then."""
+"""Tied sides: nodes at the same height move together, on any number of ranks, and are one column of
+soil then."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from vi_contact.soil.soil_column import SoilColumn
 
 @pytest.mark.parametrize("simplices", [False, True])
 def test_tied_layers_are_a_column(comm, simplices):
-    """Two layers, Rayleigh damping, both directions at once: the column of soil_column, to round-off."""
+    """Two layers, Rayleigh damping, both directions at once: the column of soil_column, to
+    round-off."""
     mesh, tags = strip(comm, 3.0, 8.0, (2, 8), simplices=simplices)
     soft = fem.Cells("soft", np.flatnonzero(middles(mesh)[:, 1] > 4.0).astype(np.int32), mesh)
     stiff = fem.Cells("stiff", np.flatnonzero(middles(mesh)[:, 1] < 4.0).astype(np.int32), mesh)
@@ -58,7 +60,8 @@ ROUND = [("left", "right"), ("back", "front")]  # pairs of vertical sides of a b
     "simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))]
 )
 def test_tied_box_is_a_column(comm, simplices, solver):
-    """All three components at once, two layers, damping: four vertical edges are one, and all is the column."""
+    """All three components at once, two layers, damping: four vertical edges are one, and all is
+    the column."""
     mesh, tags = block(comm, lengths=(2.0, 6.0, 3.0), divisions=(2, 6, 3), simplices=simplices)
     soft, stiff = (
         fem.Cells("cells", np.flatnonzero(m).astype(np.int32), mesh)
@@ -94,7 +97,8 @@ def test_tied_box_is_a_column(comm, simplices, solver):
 
 
 def test_edges_of_a_box_move_as_one(comm):
-    """An uneven push: opposite sides move alike, their four edges as one; which side is given first does not matter."""
+    """An uneven push: opposite sides move alike, their four edges as one; which side is given first
+    does not matter."""
     mesh, tags = block(comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3), simplices=True)
     push = fem.Traction(
         tags["top"], lambda x, t: 1e4 * np.column_stack([x[:, 0], x[:, 2] - 1.0, x[:, 0] * x[:, 2]])
@@ -119,7 +123,8 @@ def test_edges_of_a_box_move_as_one(comm):
 
 @pytest.mark.two_ranks
 def test_forces_on_one_side_act_on_the_pair(comm):
-    """A traction on the second side, which has no unknowns of its own, moves both; one component tied, one not."""
+    """A traction on the second side, which has no unknowns of its own, moves both; one component
+    tied, one not."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 3))
     system = fem.assemble(
         mesh,
@@ -153,8 +158,8 @@ def test_forces_on_one_side_act_on_the_pair(comm):
 
 
 def test_contact_between_tied_sides(comm):
-    """A periodic layer pressed on a plane carries its weight, on some points and, uniformly, on all; nodes that are
-    tied in part, or to one elsewhere, are refused."""
+    """A periodic layer pressed on a plane carries its weight, on some points and, uniformly, on
+    all; nodes that are tied in part, or to one elsewhere, are refused."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
     ties = fem.Tied(tags["left"], tags["right"])
     held = fem.Prescribed(tags["top"], components=(0,))
@@ -185,8 +190,8 @@ def test_contact_between_tied_sides(comm):
 def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
     """The left half of an interface is tied, the right half, or all of it, is a contact.
 
-    Nodes that are tied to the other
-    side have no condition. Pressed by 1 MPa the pressure is 1 MPa; pulled the right half opens like a crack."""
+    Nodes that are tied to the other side have no condition. Pressed by 1 MPa the pressure is 1 MPa;
+    pulled the right half opens like a crack."""
 
     def right_graded(x):
         return np.column_stack(
@@ -249,8 +254,9 @@ def displacements_at(system, u, point):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("solver", [vc.Condensed(), vc.Iterative(tolerance=1e-12)])
 def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
-    """A box pressed on all of a tied layer, meshes that do not match: confined compression, exact at the nodes of the
-    layer also where they are tied; with the box tied too, a uniform pressure on conditions that are there once."""
+    """A box pressed on all of a tied layer, meshes that do not match: confined compression, exact
+    at the nodes of the layer also where they are tied; with the box tied too, a uniform pressure on
+    conditions that are there once."""
     lower, upper = (BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(n, 2, n)) for n in (2, 3))
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
     ties = {
@@ -281,7 +287,8 @@ def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
 
 @pytest.mark.two_ranks
 def test_mass_beside_a_tie_is_handed_over_alike(comm):
-    """A periodic block falls on a plane: left and right contact points press alike, tied ones too; mass is kept."""
+    """A periodic block falls on a plane: left and right contact points press alike, tied ones too;
+    mass is kept."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
     system = fem.assemble(
         mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), initial_velocity=(0.0, -0.5)
@@ -303,7 +310,8 @@ def test_mass_beside_a_tie_is_handed_over_alike(comm):
 
 @pytest.mark.two_ranks
 def test_what_does_not_fit_is_refused(comm):
-    """Sides meshed differently, held on one side only, not opposite, components that do not exist."""
+    """Sides meshed differently, held on one side only, not opposite, components that do not
+    exist."""
 
     def bent(x):
         return x + np.outer(0.02 * x[:, 0] * np.sin(np.pi * x[:, 1]), [0.0, 1.0])
@@ -327,7 +335,8 @@ def test_what_does_not_fit_is_refused(comm):
 
 
 def test_sides_of_a_box_that_do_not_fit_are_refused(comm):
-    """Sides with as many nodes elsewhere; an edge held although its partners are free; one side with itself."""
+    """Sides with as many nodes elsewhere; an edge held although its partners are free; one side
+    with itself."""
 
     def bent(x):
         return x + np.outer(0.02 * x[:, 0] * np.sin(np.pi * x[:, 1]), [0.0, 0.0, 1.0])

@@ -1,4 +1,5 @@
-"""Nodes of a contact boundary that are prescribed in every component: their gaps, and motions that are refused."""
+"""Nodes of a contact boundary that are prescribed in every component: their gaps, and motions that
+are refused."""
 
 from __future__ import annotations
 
@@ -112,7 +113,8 @@ def test_a_node_that_is_prescribed_along_its_contact_direction_only_is_refused()
 
 @pytest.mark.parametrize("mortar", [False, True])
 def test_two_prescribed_bodies_are_refused_where_they_meet(mortar):
-    """The left sides of both bodies are prescribed: they may move together, and not into each other."""
+    """The left sides of both bodies are prescribed: they may move together, and not into each
+    other."""
     one = BlockMesh(lengths=(1.0, 1.0), divisions=(3, 3))
     mesh, tags = fem.build_mesh(TwoBlocks(upper=one, lower=one), COMM)
 

@@ -1,4 +1,5 @@
-"""Waves on meshes: speed of bulk waves (V8.4) and of Rayleigh waves (V8.3). Tied sides make one period of them."""
+"""Waves on meshes: speed of bulk waves (V8.4) and of Rayleigh waves (V8.3). Tied sides make one
+period of them."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ UNIT = vc.LinearElastic(E=1.0, nu=0.0, rho=1.0)
     "cells, consistent, lumped", [(10, 1.01652, 0.98363), (20, 1.004117, 0.995893)]
 )
 def test_speed_of_waves_on_linear_elements(comm, cells, consistent, lumped):
-    """V8.4: c_h/c of a harmonic wave, which is an eigenvector of a periodic mesh: the root of uᵀKu / uᵀMu."""
+    """V8.4: c_h/c of a harmonic wave, which is an eigenvector of a periodic mesh: the root of uᵀKu
+    / uᵀMu."""
     mesh, tags = strip(comm, 1.0, 1.0 / cells, (cells, 1))
     system = fem.assemble(mesh, UNIT, tied=fem.Tied(tags["left"], tags["right"]))
     wave = nodal(system, lambda x: np.column_stack([np.cos(2 * np.pi * x[:, 0]), 0.0 * x[:, 0]]))
@@ -30,7 +32,8 @@ def test_speed_of_waves_on_linear_elements(comm, cells, consistent, lumped):
 
 
 def test_speed_of_rayleigh_waves(comm):
-    """V8.3: one wavelength of 20 cells, three deep, dashpots below: phase speed at the surface within 1 %."""
+    """V8.3: one wavelength of 20 cells, three deep, dashpots below: phase speed at the surface
+    within 1 %."""
     soil = vc.LinearElastic(E=2.5, nu=0.25, rho=1.0)
     mesh, tags = strip(comm, 1.0, 3.0, (20, 60))
     k, speed = 2.0 * np.pi, rayleigh_speed(soil)

@@ -1,4 +1,5 @@
-"""Columns with times, components and headings: what is read, what is refused, and that every remedy leads on."""
+"""Columns with times, components and headings: what is read, what is refused, and that every remedy
+leads on."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ def refusal(path: Path, **options: Any) -> str:
     return sentence
 
 
-# --- times beside several components ---------------------------------------------------------------------------------
+# --- times beside several components
+# ---------------------------------------------------------------------------------
 
 THREE = table(V, 2.0 * V, head="# time [s], north [g], east [g]\n")
 
@@ -125,7 +127,8 @@ def test_three_components_without_a_time_are_asked_for(tmp_path: Path) -> None:
     )
 
 
-# --- headings --------------------------------------------------------------------------------------------------------
+# --- headings
+# --------------------------------------------------------------------------------------------------------
 
 HEADED = {
     "two": (table(V, head="Time [s],Acceleration [g]\n", separator=","), {}, G),
@@ -157,7 +160,8 @@ HEADED = {
         G,
     ),
     "key and value": (
-        "Event Date & Time             : 2000-01-01 00:00:00\nTime Increment (s)            : 0.01\n"
+        "Event Date & Time             : 2000-01-01 00:00:00\nTime Increment (s)            : "
+        "0.01\n"
         "Number of Data                : 10\nPGA (m/s/s)                   : 3.0000000E-02\n"
         "Accelaration time series in m/s/s\n" + " ".join(f"{v:.7E}" for v in V) + "\n",
         {},
@@ -324,8 +328,10 @@ def test_a_header_of_at2_is_believed_before_an_option(kind: str, tmp_path: Path)
 
 def test_at2_with_a_mark_and_npts_says_both_once_or_twice_alike(tmp_path: Path) -> None:
     text = (
-        "Made motion, north south\n10 points at equal spacing of 0.02 sec\nPoints are listed in the format of "
-        "8F10.5, i.e., 8 points across in\na row with 5 decimal places\nThe units are (g)\n*** Begin data ***\n"
+        "Made motion, north south\n10 points at equal spacing of 0.02 sec\nPoints are listed in "
+        "the format of "
+        "8F10.5, i.e., 8 points across in\na row with 5 decimal places\nThe units are (g)\n*** "
+        "Begin data ***\n"
         "NPTS=    10, DT= .02000 SEC\n"
         + "".join(f"{v:10.5f}" + "\n" * (k == 7) for k, v in enumerate(V))
         + "\n*** End Data ***\n"
@@ -345,7 +351,8 @@ def test_at2_with_a_mark_and_npts_says_both_once_or_twice_alike(tmp_path: Path) 
         assert words in refusal(write(tmp_path, text.replace(old, new)))
 
 
-# --- times that are rounded ------------------------------------------------------------------------------------------
+# --- times that are rounded
+# ------------------------------------------------------------------------------------------
 
 
 def single(count: int, start: float = -113.17, step: float = 0.01) -> np.ndarray:
@@ -384,7 +391,8 @@ def test_interpolation_keeps_the_last_sample(tmp_path: Path) -> None:
     assert record.acceleration.size == 6 and record.acceleration[-1] == 0.5
 
 
-# --- rows ------------------------------------------------------------------------------------------------------------
+# --- rows
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("row", range(10))
@@ -404,7 +412,8 @@ def test_a_row_of_a_series_that_lost_a_value_is_refused(row: int, tmp_path: Path
 
 
 def test_what_is_written_is_believed_when_it_is_read_again(tmp_path: Path) -> None:
-    """Notes and titles speak of the file that a record came from: its units and its step are not those of this one."""
+    """Notes and titles speak of the file that a record came from: its units and its step are not
+    those of this one."""
     record = Record(
         acceleration=V,
         dt=0.005,
@@ -425,7 +434,8 @@ def test_what_is_written_is_believed_when_it_is_read_again(tmp_path: Path) -> No
     assert "states its units as gal" in refusal(tmp_path / "a.txt", units="g")
 
 
-# --- every remedy that a sentence offers -----------------------------------------------------------------------------
+# --- every remedy that a sentence offers
+# -----------------------------------------------------------------------------
 
 PLAIN = "".join(f"{v:.5f}\n" for v in V)
 COMPONENTS = "".join(f"{v:.5f} {2.0 * v:.5f} {0.3 - v:.5f}\n" for v in V)
@@ -438,7 +448,8 @@ def rows_one_a_line(text: str) -> str:
 REMEDIES: dict[
     str, tuple[str, dict[str, Any], str, Callable[[str], str] | None, dict[str, Any], Any]
 ] = {
-    # what is refused, with which options; the remedy's words; the file and the options after it; the right samples
+    # what is refused, with which options; the remedy's words; the file and the options after it;
+    # the right samples
     "units": (PLAIN, {"dt": 0.01}, "pass units=", None, {"units": "g", "dt": 0.01}, G * V),
     "dt": (PLAIN, {"units": "g"}, "pass dt= in seconds", None, {"units": "g", "dt": 0.01}, G * V),
     "channel": (THREE, {}, "pass channel=", None, {"channel": 2}, G * 2.0 * V),
@@ -556,7 +567,8 @@ def test_the_remedy_that_is_offered_gives_the_right_samples(name: str, tmp_path:
 def test_a_record_of_five_samples_is_told_without_a_mean_period(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its frequencies are 40 Hz apart, so that none lies between 0.25 and 20 Hz; all else is told."""
+    """Its frequencies are 40 Hz apart, so that none lies between 0.25 and 20 Hz; all else is
+    told."""
     heading = "Time Increment (s) : 0.005\nNumber of Data : 5\nAcceleration time series in m/s/s\n"
     text = f"{heading}0.0\n0.1\n-0.3\n0.2\n0.0\n"
     path = write(tmp_path, text)

@@ -1,4 +1,5 @@
-"""Record files that could be read in two ways, or that no earthquake wrote, and sizes that no memory holds."""
+"""Record files that could be read in two ways, or that no earthquake wrote, and sizes that no
+memory holds."""
 
 from __future__ import annotations
 
@@ -143,7 +144,8 @@ def test_periods_far_below_the_step_are_refused() -> None:
         '{"timeSeries": ' + "[" * 100000,
         '{"timeSeries": [{"data": [' + "1" * 5000 + "]}]}",
         '{"timeSeries": [{"data": [1, 1e999], "dT": 0.01}]}',
-        '{"timeSeries": [{"name": "\\ud800", "data": [1, 2], "dT": [], "factor": {}}], "pattern": 3}',
+        '{"timeSeries": [{"name": "\\ud800", "data": [1, 2], "dT": [], "factor": {}}], "pattern": '
+        "3}",
         '{"timeSeries": 1}',
         "Corrected accelerogram\n"
         + "9" * 30

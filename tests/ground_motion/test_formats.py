@@ -1,4 +1,5 @@
-"""Files of every other format written here, and one sentence for every way they can be wrong; writing."""
+"""Files of every other format written here, and one sentence for every way they can be wrong;
+writing."""
 
 import hashlib
 
@@ -37,7 +38,8 @@ def refused(path, *words, units=None, **options):
     return message
 
 
-# --- CSMIP volume 2 -------------------------------------------------------------------------------------------------
+# --- CSMIP volume 2
+# -------------------------------------------------------------------------------------------------
 
 
 def test_csmip_one_channel(tmp_path):
@@ -76,7 +78,8 @@ def test_csmip_in_tenths_of_g_and_without_a_format(tmp_path):
 
 
 def test_csmip_of_1983_and_its_first_volume(tmp_path):
-    """Capitals, units in brackets, no format; and samples at a rate, touching, in g, not yet corrected."""
+    """Capitals, units in brackets, no format; and samples at a rate, touching, in g, not yet
+    corrected."""
     record = read_record(write(tmp_path, csmip(unit="(units: cm/sec/sec)").upper()))
     assert (
         np.allclose(record.acceleration, 0.01 * VALUES, rtol=1e-14, atol=0.0)
@@ -91,7 +94,8 @@ def test_csmip_of_1983_and_its_first_volume(tmp_path):
 
 
 def test_csmip_units_of_the_peak_where_the_samples_have_it(tmp_path):
-    """Older files state units with the peak only; a peak of other samples says nothing about these."""
+    """Older files state units with the peak only; a peak of other samples says nothing about
+    these."""
     bare = csmip(unit="(8f10.3)")
     path = write(
         tmp_path, bare.replace("=    27.114    cm/sec/sec  at", "=  -250.750  CMS/SEC/SEC AT")
@@ -114,7 +118,8 @@ def test_csmip_several_channels_are_chosen_by_number(tmp_path):
     refused(path, "there is no channel 4", "2: UP", channel=4)
 
 
-# --- COSMOS volume 2 ------------------------------------------------------------------------------------------------
+# --- COSMOS volume 2
+# ------------------------------------------------------------------------------------------------
 
 
 E_CELLS = [f"{value:15.6E}" for value in VALUES]
@@ -200,7 +205,8 @@ def test_bad_cosmos_and_csmip_are_refused_in_one_sentence(text, words, tmp_path)
     refused(write(tmp_path, text), *words)
 
 
-# --- K-NET ----------------------------------------------------------------------------------------------------------
+# --- K-NET
+# ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("direction", ["E-W", "N-S", "U-D", "6"])
@@ -235,7 +241,8 @@ def test_bad_knet_is_refused_in_one_sentence(text, words, tmp_path):
     refused(write(tmp_path, text), *words, units="gal")
 
 
-# --- ESM and AFAD ---------------------------------------------------------------------------------------------------
+# --- ESM and AFAD
+# ---------------------------------------------------------------------------------------------------
 
 
 def test_esm_record_and_its_licence(tmp_path):
@@ -320,7 +327,8 @@ def test_bad_afad_is_refused_in_one_sentence(text, words, options, tmp_path):
     refused(write(tmp_path, text), *words, **options)
 
 
-# --- OpenSees path series -------------------------------------------------------------------------------------------
+# --- OpenSees path series
+# -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -348,7 +356,8 @@ def test_channel_is_refused_where_there_are_none(tmp_path):
     refused(write(tmp_path, esm()), "channel=1", "leave channel out", channel=1)
 
 
-# --- writing --------------------------------------------------------------------------------------------------------
+# --- writing
+# --------------------------------------------------------------------------------------------------------
 
 RECORD = Record(
     acceleration=np.sin(np.arange(37.0)) * 10.0 ** np.linspace(-6.0, 2.0, 37),

@@ -1,8 +1,9 @@
-"""Random records of every format are read back, and mutated ones give the right numbers or the right refusal.
+"""Random records of every format are read back, and mutated ones give the right numbers or the
+right refusal.
 
-The record is made from a grid of cells (``record_layouts``). A mutation changes the grid, the header or the end of the
-text, so that the right answer is known: the samples of the new grid where the file cannot tell, and else a refusal
-with a word of its fault."""
+The record is made from a grid of cells (``record_layouts``). A mutation changes the grid, the
+header or the end of the text, so that the right answer is known: the samples of the new grid where
+the file cannot tell, and else a refusal with a word of its fault."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ def outcome(path: Path, layout: Layout, text: str) -> np.ndarray | str:
 
 
 def expect(found: np.ndarray | str, right: np.ndarray | None, words: str | None, what: str) -> None:
-    """Right numbers where `right` is given, a refusal with one of the words where `words` is; either where both are."""
+    """Right numbers where `right` is given, a refusal with one of the words where `words` is;
+    either where both are."""
     if isinstance(found, str):
         assert words is not None, f"{what}: refused: {found}"
         assert re.search(words, found), f"{what}: {found}"
@@ -86,7 +88,8 @@ def test_random_records_are_read_back(name: str, tmp_path: Path) -> None:
 def mutations(
     layout: Layout, grid: Grid, random: Random
 ) -> list[tuple[str, Grid, int, np.ndarray | None, str | None]]:
-    """What was done, the new grid, the count in the header, the right samples, and words of the right refusal."""
+    """What was done, the new grid, the count in the header, the right samples, and words of the
+    right refusal."""
     found: list[tuple[str, Grid, int, np.ndarray | None, str | None]] = []
 
     def add(what: str, new: Grid, right: bool, words: str | None, count: int = SAMPLES) -> None:
@@ -171,8 +174,8 @@ def test_mutated_records_are_right_or_refused_for_their_fault(name: str, tmp_pat
 
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_a_record_that_is_cut_anywhere_is_right_or_refused(name: str, tmp_path: Path) -> None:
-    """The right answer is all samples where only the end mark is lost, and where nothing tells their number those that
-    are whole; a number that is cut is refused."""
+    """The right answer is all samples where only the end mark is lost, and where nothing tells
+    their number those that are whole; a number that is cut is refused."""
     layout, random = LAYOUTS[name], Random(name)
     grid = layout.grid(values_of(layout, random))
     head, text = layout.head(SAMPLES), layout.text(grid, SAMPLES)

@@ -1,4 +1,5 @@
-"""Files of GeoNet, BHRC, RENADIC, USC, UNAM and CWA: components, what the header says twice, and formats not read."""
+"""Files of GeoNet, BHRC, RENADIC, USC, UNAM and CWA: components, what the header says twice, and
+formats not read."""
 
 from __future__ import annotations
 
@@ -64,7 +65,8 @@ def whole(name: str, values: Any = V) -> str:
     return layout.text(layout.grid(list(values)), len(values))
 
 
-# --- GeoNet ----------------------------------------------------------------------------------------------------------
+# --- GeoNet
+# ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("first", ["Corrected accelerogram", "Uncorrected accelerogram"])
@@ -129,7 +131,8 @@ def test_a_peak_that_the_samples_do_not_have_is_doubted(tmp_path: Path) -> None:
     )
 
 
-# --- Volume I: BHRC, RENADIC, USC, CSMIP -----------------------------------------------------------------------------
+# --- Volume I: BHRC, RENADIC, USC, CSMIP
+# -----------------------------------------------------------------------------
 
 
 def test_renadic_components_follow_one_another(tmp_path: Path) -> None:
@@ -159,7 +162,8 @@ def test_bhrc_and_times_above_a_hundred_that_touch(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("carriage", ["", " "])
 def test_usc_pairs_at_uneven_times(carriage: str, tmp_path: Path) -> None:
-    """The acceleration is a straight line, which interpolation reproduces; some printers began lines with a blank."""
+    """The acceleration is a straight line, which interpolation reproduces; some printers began
+    lines with a blank."""
     steps = np.tile([0.004, 0.005, 0.004, 0.004, 0.006], 8)
     times = np.concatenate([[0.0], np.cumsum(steps)])
     head = volume1_head(
@@ -198,7 +202,8 @@ def test_volume_1_is_checked(old: str, new: str, words: str, tmp_path: Path) -> 
     assert words in refusal(write(tmp_path, text.replace(old, new)), units="g/10")
 
 
-# --- UNAM and CWA ----------------------------------------------------------------------------------------------------
+# --- UNAM and CWA
+# ----------------------------------------------------------------------------------------------------
 
 
 def test_unam_channels_by_direction(tmp_path: Path) -> None:
@@ -273,7 +278,8 @@ def test_cwa_is_checked(old: str, new: str, words: str, tmp_path: Path) -> None:
     assert words in refusal(write(tmp_path, text.replace(old, new, 1)), channel=1)
 
 
-# --- formats that are not read ---------------------------------------------------------------------------------------
+# --- formats that are not read
+# ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""Processing: closed forms, inverses, steps that change nothing when repeated, and a note for each."""
+"""Processing: closed forms, inverses, steps that change nothing when repeated, and a note for
+each."""
 
 import math
 
@@ -66,7 +67,8 @@ def test_mean_of_the_quiet_before_the_shaking():
 
 
 def test_cosine_taper_in_closed_form():
-    """A constant 1 of 10 s, tapered over 20 %: (1 - cos(pi t/2)) / 2 for 2 s, 1, and its mirror image."""
+    """A constant 1 of 10 s, tapered over 20 %: (1 - cos(pi t/2)) / 2 for 2 s, 1, and its mirror
+    image."""
     record = tapered(Record(acceleration=np.ones(101), dt=0.1), fraction=0.2)
     times = record.times
     exact = np.where(times < 2.0, 0.5 * (1.0 - np.cos(0.5 * np.pi * times)), 1.0)
@@ -82,7 +84,8 @@ def test_cosine_taper_in_closed_form():
 @pytest.mark.parametrize("low, high", [(1.0, None), (None, 4.0), (1.0, 4.0)])
 @pytest.mark.parametrize("frequency", [0.5, 1.0, 2.0, 4.0, 8.0])
 def test_filter_gain_is_that_of_butterworth(order, low, high, frequency):
-    """Zero phase: |H|² = 1 / (1 + (low/f)^2n) · 1 / (1 + (f/high)^2n), f standing for tan(pi f dt)."""
+    """Zero phase: |H|² = 1 / (1 + (low/f)^2n) · 1 / (1 + (f/high)^2n), f standing for tan(pi f
+    dt)."""
     record = sine(frequency)
     warped = {f: math.tan(math.pi * f * record.dt) for f in (low, high, frequency) if f is not None}
     gain = 1.0
@@ -136,7 +139,8 @@ def test_baseline_ends_at_rest_and_repeats_without_effect(degree, displacement):
 
 
 def test_baseline_takes_out_what_was_put_in():
-    """A drift that is itself a polynomial of the degree is removed to round-off; a pure one leaves zero."""
+    """A drift that is itself a polynomial of the degree is removed to round-off; a pure one leaves
+    zero."""
     record = baseline_corrected(shaking())
     x = record.times / record.duration
     drift = 0.3 - 1.1 * x + 0.7 * x**2
@@ -151,7 +155,8 @@ def test_baseline_takes_out_what_was_put_in():
 
 
 def test_baseline_is_the_least_squares_fit():
-    """No other parabola that ends at rest leaves a smaller velocity: the rest is orthogonal to the free direction."""
+    """No other parabola that ends at rest leaves a smaller velocity: the rest is orthogonal to the
+    free direction."""
     record = shaking()
     result = baseline_corrected(record)
     x = record.times / record.duration

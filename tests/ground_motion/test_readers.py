@@ -1,4 +1,5 @@
-"""Record files of every known variant, written here, and one sentence for every way a file can be wrong."""
+"""Record files of every known variant, written here, and one sentence for every way a file can be
+wrong."""
 
 import hashlib
 
@@ -337,7 +338,8 @@ def test_rounding_of_the_times_is_tolerated_up_to_a_millionth(tmp_path):
 
 
 def test_uneven_times_are_refused_unless_resampled(tmp_path):
-    """The wanted record is a straight line, which linear interpolation and a finer grid reproduce exactly."""
+    """The wanted record is a straight line, which linear interpolation and a finer grid reproduce
+    exactly."""
     times = [0.0, 0.02, 0.04, 0.05, 0.08, 0.10, 0.12]
     path = write(tmp_path, columns(times, [10.0 * t for t in times], "# uneven\n"))
     with pytest.raises(
@@ -351,7 +353,8 @@ def test_uneven_times_are_refused_unless_resampled(tmp_path):
 
 
 def test_uneven_times_read_at_a_long_step_do_not_alias(tmp_path):
-    """A 40 Hz packet sampled about every 0.005 s, wanted every 0.02 s, whose Nyquist frequency is 25 Hz."""
+    """A 40 Hz packet sampled about every 0.005 s, wanted every 0.02 s, whose Nyquist frequency is
+    25 Hz."""
     times = 0.005 * np.arange(4001) + np.where(np.arange(4001) % 7 == 3, 1e-4, 0.0)
     values = np.sin(2 * np.pi * 40.0 * times) * np.exp(-(((times - 10.0) / 2.0) ** 2))
     record = read_record(write(tmp_path, columns(times.tolist(), values)), "m/s2", resample_dt=0.02)

@@ -1,4 +1,5 @@
-"""Records: the value, scaling, resampling, integration, intensity measures; the table of the development records."""
+"""Records: the value, scaling, resampling, integration, intensity measures; the table of the
+development records."""
 
 import hashlib
 import math
@@ -29,7 +30,8 @@ pytestmark = pytest.mark.serial
 
 """Development records; they are not part of the project, so the tests on them are skipped where they are absent."""
 
-# file, samples, dt, PGA [m/s²] and its time, PGV, PGD, Arias, D5-95, final displacement; with half a last digit each
+# file, samples, dt, PGA [m/s²] and its time, PGV, PGD, Arias, D5-95, final displacement; with half
+# a last digit each
 TABLE = [
     (
         EL_CENTRO,
@@ -108,7 +110,8 @@ def test_development_records(
 
 
 def test_development_record_agrees_with_the_peak_in_its_own_header():
-    """Reals 29 and 30 of 0111a.smc: 104.4078 cm/s² at 10.17 s, its samples have five digits (104.41)."""
+    """Reals 29 and 30 of 0111a.smc: 104.4078 cm/s² at 10.17 s, its samples have five digits
+    (104.41)."""
     record = read_record(shared(LOMA + "a.smc"))
     assert abs(pga(record) - 1.044078) < 5e-5 and pga(record) == 0.01 * 104.41
     assert record.notes[0] == "component: azimuth 360 degrees clockwise from north"
@@ -263,7 +266,8 @@ def wave_packet(frequency, dt):
 
 @pytest.mark.parametrize("old, new", [(0.02, 0.005), (0.005, 0.02), (0.01, 0.0075)])
 def test_resampling_keeps_what_both_steps_resolve(old, new):
-    """3 Hz lies far below all Nyquist frequencies: the resampled packet is the packet sampled directly."""
+    """3 Hz lies far below all Nyquist frequencies: the resampled packet is the packet sampled
+    directly."""
     record, exact = resampled(wave_packet(3.0, old), new), wave_packet(3.0, new)
     n = record.acceleration.size
     assert n == int(20.0 / new * (1.0 + 1e-12)) + 1 and record.dt == new

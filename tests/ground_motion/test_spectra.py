@@ -1,4 +1,5 @@
-"""Response and Fourier spectra and intensity measures against closed forms, other programs' numbers and limits."""
+"""Response and Fourier spectra and intensity measures against closed forms, other programs' numbers
+and limits."""
 
 import math
 
@@ -52,7 +53,8 @@ def shaking(n=2001, dt=0.01, seed=2):
 @pytest.mark.parametrize("zeta", [0.0, 0.05, 0.7])
 @pytest.mark.parametrize("omega", [1e-4, 0.05, 3.0, 14.9, 15.1, 300.0])
 def test_one_step_is_the_matrix_exponential(zeta, omega):
-    """u, v, a and its slope as one linear system: exp of its matrix is the exact step, to round-off."""
+    """u, v, a and its slope as one linear system: exp of its matrix is the exact step, to
+    round-off."""
     h = 0.02
     system = np.zeros((4, 4))
     system[0, 1] = system[2, 3] = 1.0
@@ -67,7 +69,8 @@ def test_one_step_is_the_matrix_exponential(zeta, omega):
 
 @pytest.mark.parametrize("dt", [0.5, 0.1, 0.01])
 def test_rectangular_pulse_has_its_shock_spectrum(dt):
-    """Undamped: SD = 2 a/omega² for t0 >= T/2, else 2 a/omega² sin(pi t0/T), reached after the pulse has ended."""
+    """Undamped: SD = 2 a/omega² for t0 >= T/2, else 2 a/omega² sin(pi t0/T), reached after the
+    pulse has ended."""
     record = Record(acceleration=np.full(round(1.0 / dt) + 1, -1.5), dt=dt)
     periods = np.array([0.1, 0.5, 1.0, 1.9, 2.5, 4.0, 20.0])
     omega = 2.0 * np.pi / periods
@@ -91,7 +94,8 @@ def test_step_overshoots_as_in_the_textbook(zeta):
 
 @pytest.mark.parametrize("steps", [1, 2, 7, 50])
 def test_ramp_then_silence(steps):
-    """a = t for 1 s: afterwards u swings with hypot(x - sin x, 1 - cos x) / omega³, x = omega, whatever the step."""
+    """a = t for 1 s: afterwards u swings with hypot(x - sin x, 1 - cos x) / omega³, x = omega,
+    whatever the step."""
     record = Record(acceleration=np.arange(steps + 1.0) / steps, dt=1.0 / steps)
     omega = 2.0 * np.pi / np.array([0.3, 1.0, 2.3, 9.0])
     exact = np.hypot(omega - np.sin(omega), 1.0 - np.cos(omega)) / omega**3
@@ -101,8 +105,8 @@ def test_ramp_then_silence(steps):
 @pytest.mark.parametrize("per_period", [10, 20, 50])
 @pytest.mark.parametrize("zeta", [0.0, 0.05])
 def test_harmonic_at_resonance(per_period, zeta):
-    """Ten cycles of sin(omega t): n pi, or (1 - exp(-2 pi n zeta)) / (2 zeta), times the part of the sine that straight
-    lines between its samples keep, sinc²(pi h/T)."""
+    """Ten cycles of sin(omega t): n pi, or (1 - exp(-2 pi n zeta)) / (2 zeta), times the part of
+    the sine that straight lines between its samples keep, sinc²(pi h/T)."""
     record = Record(
         acceleration=np.sin(2.0 * np.pi * np.arange(10 * per_period + 1) / per_period),
         dt=1.0 / per_period,
@@ -117,7 +121,8 @@ def test_harmonic_at_resonance(per_period, zeta):
 
 
 def test_limits_of_the_period():
-    """T to 0: the oscillator rides on the ground, PSA = SA = PGA; T to infinity: it stays behind, SD = PGD."""
+    """T to 0: the oscillator rides on the ground, PSA = SA = PGA; T to infinity: it stays behind,
+    SD = PGD."""
     record = shaking()
     short = response_spectrum(record, np.array([1e-3]))
     corner = (
@@ -160,7 +165,8 @@ def test_spectra_are_linear_and_blind_to_the_sign():
 
 
 def test_el_centro_as_in_two_books():
-    """PSA [g] at 5 % by another program; Chopra's peak displacements [in] at 2 %, 0 % and 5 % (Peknold's record)."""
+    """PSA [g] at 5 % by another program; Chopra's peak displacements [in] at 2 %, 0 % and 5 %
+    (Peknold's record)."""
     record = read_record(shared(EL_CENTRO))
     values = response_spectrum(record, np.array([0.1, 0.2, 0.5, 1.0, 3.0]))
     assert np.allclose(
@@ -190,7 +196,8 @@ def test_eqsig_finds_the_same():
 
 
 def test_fourier_of_a_gaussian_pulse():
-    """a = exp(-pi (t-t0)²/tau²): |A| = tau exp(-pi f² tau²), to round-off for a well sampled pulse."""
+    """a = exp(-pi (t-t0)²/tau²): |A| = tau exp(-pi f² tau²), to round-off for a well sampled
+    pulse."""
     times = 0.02 * np.arange(1024)
     tau = 0.5
     pulse = Record(acceleration=np.exp(-np.pi * ((times - 10.0) / tau) ** 2), dt=0.02)
@@ -222,7 +229,8 @@ def test_cumulative_absolute_velocity_counts_both_signs():
 
 
 def test_durations_and_rms_of_a_constant_acceleration():
-    """a = -2 for 10 s: Husid's curve is a straight line, so 5-75 % lasts 7 s; root mean square 2."""
+    """a = -2 for 10 s: Husid's curve is a straight line, so 5-75 % lasts 7 s; root mean square
+    2."""
     record = Record(acceleration=np.full(101, -2.0), dt=0.1)
     assert significant_duration(record, 0.05, 0.75) == pytest.approx(7.0, rel=1e-12)
     assert d5_95(record) == significant_duration(record, 0.05, 0.95) and rms(

@@ -1,4 +1,5 @@
-"""Eurocode 8 spectra by table and formula; Kanai-Tajimi motions: variance, spectrum, stationarity, repeatability."""
+"""Eurocode 8 spectra by table and formula; Kanai-Tajimi motions: variance, spectrum, stationarity,
+repeatability."""
 
 import math
 
@@ -40,7 +41,8 @@ TABLES = {  # EN 1998-1:2004, tables 3.2 and 3.3
 @pytest.mark.parametrize("ground", "ABCDE")
 @pytest.mark.parametrize("damping", [0.02, 0.05, 0.1])
 def test_ec8_branches_of_every_ground(kind, ground, damping):
-    """S a_g at 0, the plateau 2.5 eta between T_B and T_C, then falling with T and beyond T_D with T²."""
+    """S a_g at 0, the plateau 2.5 eta between T_B and T_C, then falling with T and beyond T_D with
+    T²."""
     s, tb, tc, td = TABLES[kind][ground]
     spectrum = EC8Spectrum.on_ground(ground, ag=3.0, kind=kind, damping=damping)
     eta = math.sqrt(10.0 / (5.0 + 100.0 * damping))
@@ -96,7 +98,8 @@ def test_kanai_tajimi_density_at_marked_frequencies():
 
 
 def test_kanai_tajimi_variance():
-    """pi S0 omega_g (1 + 4 zeta²) / (2 zeta): the integral, and the mean square of a long motion."""
+    """pi S0 omega_g (1 + 4 zeta²) / (2 zeta): the integral, and the mean square of a long
+    motion."""
     spectrum = KanaiTajimi(0.02, omega_f=0.0)
     exact = math.pi * 0.02 * 15.6 * (1.0 + 4.0 * 0.36) / 1.2
     omega = np.linspace(0.0, 4e4, 4_000_001)
@@ -123,7 +126,8 @@ def variance(spectrum, dt, size):
 
 
 def test_motions_are_stationary():
-    """400 seeds: at every instant the mean is 0 and the variance the same, within four standard errors of each."""
+    """400 seeds: at every instant the mean is 0 and the variance the same, within four standard
+    errors of each."""
     exact = variance(KanaiTajimi(0.02), 0.02, 2048 * 2)
     assert variance(KanaiTajimi(0.02), 0.02, 2048) == pytest.approx(exact, rel=2e-3)
     ensemble = np.mean(MOTIONS**2, axis=0) / exact
@@ -134,7 +138,8 @@ def test_motions_are_stationary():
 
 
 def test_motions_have_the_spectrum():
-    """The mean periodogram of the seeds follows S; averaged over bands of 20 frequencies, within 8 %."""
+    """The mean periodogram of the seeds follows S; averaged over bands of 20 frequencies, within 8
+    %."""
     n = MOTIONS.shape[1]
     window = np.sin(np.pi * np.arange(n) / n) ** 2  # keeps the low frequencies out of the high ones
     lines = np.mean(np.abs(np.fft.rfft(MOTIONS * window, axis=1)) ** 2, axis=0)

@@ -35,7 +35,8 @@ ROW = re.compile(
 
 @dataclass(frozen=True)
 class Room:
-    """A row of the table: its floor, and foreign package -> whether only functions may import it."""
+    """A row of the table: its floor, and foreign package -> whether only functions may import
+    it."""
 
     floor: int
     foreign: Mapping[str, bool]
@@ -57,7 +58,8 @@ ROOMS = rooms()
 
 @dataclass(frozen=True)
 class Import:
-    """``target`` in module ``source``: a module of the package, or a foreign package; ``late``: inside a function."""
+    """``target`` in module ``source``: a module of the package, or a foreign package; ``late``:
+    inside a function."""
 
     source: str
     target: str
@@ -238,13 +240,15 @@ def _python(script: str) -> str:
 
 
 def test_core_runs_without_finite_elements():
-    """``import vi_contact``, schemes, condensed solver and impact laws import none of the heavy packages."""
+    """``import vi_contact``, schemes, condensed solver and impact laws import none of the heavy
+    packages."""
     support = Path(__file__).parents[1] / "support"
     assert _python(METHODS + SMALL_RUN.replace("SUPPORT", repr(str(support)))) == "[]"
 
 
 def test_table_of_contents_is_complete_and_true():
-    """Every public name can be imported (``vi_contact.core.lazy``), and nothing else pretends to be there."""
+    """Every public name can be imported (``vi_contact.core.lazy``), and nothing else pretends to be
+    there."""
     assert len(vi_contact.__all__) == len(set(vi_contact.__all__)) > 40
     assert set(dir(vi_contact)) == set(vi_contact.__all__)
     for public in vi_contact.__all__:

@@ -1,8 +1,9 @@
-"""Every command that a page prints has run, and runs here, in a short form, or in the test that the table names.
+"""Every command that a page prints has run, and runs here, in a short form, or in the test that the
+table names.
 
-docs/run_commands.py gives the commands as they stand and keeps a list of those that succeeded. Here the commands of
-``vi-contact`` are given again, page by page and in this process: runs end after two steps, starters have large cells,
-and what draws or evaluates a run has one small run for all pages.
+docs/run_commands.py gives the commands as they stand and keeps a list of those that succeeded. Here
+the commands of ``vi-contact`` are given again, page by page and in this process: runs end after two
+steps, starters have large cells, and what draws or evaluates a run has one small run for all pages.
 """
 
 from __future__ import annotations
@@ -87,7 +88,8 @@ nu = 0.3
 
 
 def accepted(command: str) -> str:
-    """Why a command of ours cannot be given, or nothing: its parser reads it, and scripts know its options."""
+    """Why a command of ours cannot be given, or nothing: its parser reads it, and scripts know its
+    options."""
     words = shlex.split(command, comments=True)
     while words and (re.match(r"[A-Z_]+=", words[0]) or words[0] in ("mpirun", "srun")):
         start = [k for k, word in enumerate(words) if word in ("vi-contact", "python3")]
@@ -147,7 +149,8 @@ def here(command: str) -> bool:
 
 
 def by_page() -> dict[str, list[str]]:
-    """Page -> commands that are given in its folder: each once, but on every page whose own files it may need."""
+    """Page -> commands that are given in its folder: each once, but on every page whose own files
+    it may need."""
     found: dict[str, list[str]] = {}
     seen: set[str] = set()
     for page in program.pages():
@@ -163,13 +166,15 @@ def by_page() -> dict[str, list[str]]:
     return found
 
 
-# What the list and the tables say ------------------------------------------------------------------------------------
+# What the list and the tables say
+# ------------------------------------------------------------------------------------
 
 
 @serial
 def test_every_command_is_known_and_accepted() -> None:
-    """It has run by docs/run_commands.py with the files of today, or something else runs it; after a change: python3
-    docs/run_commands.py --only PAGE, which renews its rows of docs/commands_run.txt."""
+    """It has run by docs/run_commands.py with the files of today, or something else runs it; after
+    a change: python3 docs/run_commands.py --only PAGE, which renews its rows of
+    docs/commands_run.txt."""
     ran, wrong, seen = program.recorded(), [], 0
     for page in program.pages():
         for command in program.commands(page):
@@ -187,7 +192,8 @@ def test_every_command_is_known_and_accepted() -> None:
 
 @serial
 def test_what_is_only_named_is_there() -> None:
-    """A word of a page such as ``vi-contact run --check`` is a command with this option, or several."""
+    """A word of a page such as ``vi-contact run --check`` is a command with this option, or
+    several."""
     every = {one for page in program.pages() for one in program.commands(page)}
     named = {one for one in every if program.elsewhere(one) == program.NAME}
     assert len(named) > 10
@@ -219,7 +225,8 @@ def test_what_runs_elsewhere_is_on_a_page_and_there() -> None:
 
 @serial
 def test_the_tests_of_commands_give_them() -> None:
-    """Each command has one place where the suite runs it; a test that is named does what its command does."""
+    """Each command has one place where the suite runs it; a test that is named does what its
+    command does."""
     checked = 0
     for command in {one for page in program.pages() for one in program.commands(page)}:
         why, test = program.elsewhere(command), program.shorter(command)
@@ -250,7 +257,8 @@ def needle(command: str) -> str:
 
 
 def source(test: str) -> str:
-    """The function of a test with its decorators, and the functions and constants of its file that it needs."""
+    """The function of a test with its decorators, and the functions and constants of its file that
+    it needs."""
     file, _, name = test.partition("::")
     text = (ROOT / "tests" / file).read_text(encoding="utf-8")
     parts = {}
@@ -275,7 +283,8 @@ def source(test: str) -> str:
 def test_rows_of_commands_that_fail_are_dropped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Kept are rows of commands that pages have and that succeeded when they were last run, with today's key."""
+    """Kept are rows of commands that pages have and that succeeded when they were last run, with
+    today's key."""
     monkeypatch.setattr(program, "NOTE", tmp_path / "list.txt")
     kept, failed = "vi-contact cases", "vi-contact new pier"
     (tmp_path / "list.txt").write_text(
@@ -290,7 +299,8 @@ def test_rows_of_commands_that_fail_are_dropped(
 
 @serial
 def test_a_key_is_that_of_the_files_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another case file, or another command before, is another key; a command without files keeps its own."""
+    """Another case file, or another command before, is another key; a command without files keeps
+    its own."""
     command, other = "vi-contact run layer.toml --out results/layer", "vi-contact cases"
     before, alone = program.key(command), program.key(other)
     monkeypatch.setattr(program, "contents", lambda page: {"layer.toml": "dt = 1.0"})
@@ -326,8 +336,8 @@ def test_commands_that_do_not_exist_are_found() -> None:
 
 @serial
 def test_commands_of_the_gallery_are_those_of_its_list() -> None:
-    """What a page prints in sh blocks is what docs/gallery/make.py runs, or the same on two ranks or other words that
-    its parser knows."""
+    """What a page prints in sh blocks is what docs/gallery/make.py runs, or the same on two ranks
+    or other words that its parser knows."""
     made = loaded(DOCS / "gallery" / "make.py").entries()
     for page in sorted((DOCS / "gallery").glob("*.md")):
         ours = {
@@ -356,14 +366,16 @@ def test_commands_of_the_gallery_are_those_of_its_list() -> None:
 
 @serial
 def test_the_container_runs_scripts() -> None:
-    """Of the recipe in docs/guide/clusters.md only the commands can be checked without a container program."""
+    """Of the recipe in docs/guide/clusters.md only the commands can be checked without a container
+    program."""
     (recipe,) = blocks("docs/guide/clusters.md", "dockerfile")
     (line,) = re.findall(r"^RUN (.*)$", recipe, re.MULTILINE)
     scripts = [one.strip() for one in line.split("&&")]
     assert [accepted(one) for one in scripts] == [""] * 3 and scripts[0] == "bash demos/run.sh wall"
 
 
-# What is given here --------------------------------------------------------------------------------------------------
+# What is given here
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

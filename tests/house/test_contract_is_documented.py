@@ -1,4 +1,5 @@
-"""The contract is the best-documented page: every method of its protocols says what it gets and gives."""
+"""The contract is the best-documented page: every method of its protocols says what it gets and
+gives."""
 
 from __future__ import annotations
 

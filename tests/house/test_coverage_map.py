@@ -1,4 +1,5 @@
-"""Every module has its test file, ``tests/<room>/test_<module>.py``, or stands here under one that covers it."""
+"""Every module has its test file, ``tests/<room>/test_<module>.py``, or stands here under one that
+covers it."""
 
 from __future__ import annotations
 
@@ -15,7 +16,9 @@ pytestmark = pytest.mark.serial
 PACKAGE = Path(vi_contact.__file__).parent
 TESTS = Path(__file__).parents[1]
 
-COVERS = {  # test file -> modules without a test file of their own; tests reach some of them through their users
+# test file -> modules without a test file of their own; tests reach some of them through their
+# users
+COVERS = {
     "bem/test_boundary_operators.py": "bem.loops",
     "bem/test_compressed_blocks.py": "bem.compressed bem.frequency_circle bem.tails",
     "bem/test_contact.py": "bem.contact_run bem.uzawa_space_time",
@@ -118,7 +121,8 @@ BY = {module: test for test, modules in COVERS.items() for module in modules.spl
 
 @cache
 def modules() -> dict[str, ast.Module]:
-    """Modules as "solvers.normal.lcp", without packages, which hand names on, and ``__main__``, which calls cli."""
+    """Modules as "solvers.normal.lcp", without packages, which hand names on, and ``__main__``,
+    which calls cli."""
     paths = {
         p.relative_to(PACKAGE).with_suffix("").as_posix(): p for p in sorted(PACKAGE.rglob("*.py"))
     }

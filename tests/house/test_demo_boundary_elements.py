@@ -20,8 +20,9 @@ pytestmark = pytest.mark.serial
 def test_the_boundary_elements_demo(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """V7.1 to V7.3 on 4 to 24 elements: energies within 2 % (rms) of coarse finite elements, impulses within 8 % (ball)
-    and 1 %; Uzawa's iteration and the march agree; every step certified."""
+    """V7.1 to V7.3 on 4 to 24 elements: energies within 2 % (rms) of coarse finite elements,
+    impulses within 8 % (ball) and 1 %; Uzawa's iteration and the march agree; every step
+    certified."""
     module, drawn = demo("boundary_elements"), list[Any]()
     monkeypatch.setattr(
         module,
@@ -57,7 +58,8 @@ def test_the_boundary_elements_demo(
 def test_the_shear_of_histories_is_drawn_on_the_body(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, normal: tuple[float, float]
 ) -> None:
-    """Histories hold what the body does to its support along +x; drawn is the opposite, and the axis says so."""
+    """Histories hold what the body does to its support along +x; drawn is the opposite, and the
+    axis says so."""
     shown: list[Any] = []
     monkeypatch.setattr(deformed, "save", lambda figure, path: shown.append(figure))
     history = {"t": [1.0], "pressure": [[1.0, 2.0]], "traction_t": [[[3.0], [-3.0]]]}

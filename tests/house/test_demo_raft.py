@@ -1,4 +1,5 @@
-"""The demo of a building on a raft, and its case file: gravity, three components, uplift, sliding; every file."""
+"""The demo of a building on a raft, and its case file: gravity, three components, uplift, sliding;
+every file."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ FIGURES = ("motions", "moments", "energy", "certificate")
 @pytest.mark.slow
 @pytest.mark.serial
 def test_the_raft_demo(shared_tmp, capsys):
-    """It stands closed, lifts off and slides, certified, with a closed ledger; friction bounds the base shear."""
+    """It stands closed, lifts off and slides, certified, with a closed ledger; friction bounds the
+    base shear."""
     module = demo("raft")
     numbers = module.main(quick=True, out=shared_tmp, progress=False)
     assert 0.0 < numbers["worst certificate"] <= 1e-9 and numbers["energy defect"] <= 1e-10
@@ -67,7 +69,8 @@ def files_of_paraview(folder: Path, frames: int) -> None:
 
 @pytest.mark.serial
 def test_the_case_of_the_raft(comm, shared_tmp, monkeypatch):
-    """Twenty steps of the case file, gravity, release and compliant base, are the demo's under the case's motions."""
+    """Twenty steps of the case file, gravity, release and compliant base, are the demo's under the
+    case's motions."""
     file = shared_tmp / "raft.msh"
     on_root(comm, lambda: write(RaftMesh(size=2.4, soil_size=1.6, far=8.0), file))
     case = read_case(ROOT / "demos" / "cases" / "raft.toml", ["run.steps=20", f"mesh.path={file}"])

@@ -1,4 +1,5 @@
-"""The demo of beams, frames and plates in contact: stops, the ground and throws beside closed forms, on both routes."""
+"""The demo of beams, frames and plates in contact: stops, the ground and throws beside closed
+forms, on both routes."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from demos.problems.structures import plate_on_a_stop, residual
 
 @pytest.mark.serial
 def test_closed_forms() -> None:
-    """Tables of the plate (Timoshenko, Woinowsky-Krieger: 0.00406, 0.01160); what holds where disk and beam touch."""
+    """Tables of the plate (Timoshenko, Woinowsky-Krieger: 0.00406, 0.01160); what holds where disk
+    and beam touch."""
     assert square_plate() == pytest.approx((0.0040624, 0.0116008), abs=5e-8)
     disk, h = disk_on_ground(0.3 / 64.0), 1e-3
     assert isinstance(disk, DiskOnGround) and 0.2 < disk.b < 0.21
@@ -44,7 +46,8 @@ def test_closed_forms() -> None:
 
 
 def test_a_plate_on_any_number_of_ranks(comm: Any) -> None:
-    """Edges between ranks are integrated once: the stop's force is that of one rank, 1.6 % above the exact one."""
+    """Edges between ranks are integrated once: the stop's force is that of one rank, 1.6 % above
+    the exact one."""
     problem, exact = plate_on_a_stop(comm, disk=False, cells=8, share=0.0)
     state = vc.static_equilibrium(problem)
     assert residual(problem, state) <= 1e-9
@@ -56,7 +59,8 @@ def test_a_plate_on_any_number_of_ranks(comm: Any) -> None:
 def test_the_demo_of_structures(
     comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Forces, lift-off, contact radius and times of touch beside closed forms; certificates, routes and ledgers."""
+    """Forces, lift-off, contact radius and times of touch beside closed forms; certificates, routes
+    and ledgers."""
     numbers = demo("structures").main(quick=True, out=shared_tmp)
     comm.Barrier()  # rank 0 draws
     assert numbers["frame: force"] == pytest.approx(numbers["frame: exact"], rel=1e-9)

@@ -11,7 +11,8 @@ from demo_runs import demo
 @pytest.mark.serial
 @pytest.mark.slow
 def test_the_tower_on_soil_demo(comm, shared_tmp, capsys):
-    """Amplified by the soil, lifted off, certified; the base moves neither like the outcrop nor like half of it."""
+    """Amplified by the soil, lifted off, certified; the base moves neither like the outcrop nor
+    like half of it."""
     numbers = demo("tower_on_soil").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     assert numbers["worst"] <= 1e-9

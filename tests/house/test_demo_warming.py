@@ -10,8 +10,8 @@ from demo_runs import demo
 
 
 def test_warming(comm: Any, shared_tmp: Path) -> None:
-    """Statics to round-off by both routes; waves in a bar of 50 cells within 0.4 %, their impulse within 1.5 %: bounds
-    stand a factor 3 away."""
+    """Statics to round-off by both routes; waves in a bar of 50 cells within 0.4 %, their impulse
+    within 1.5 %: bounds stand a factor 3 away."""
     numbers = demo("warming").main(quick=True, out=shared_tmp)
     comm.Barrier()  # rank 0 draws
     assert len(numbers) == 17 and (shared_tmp / "warming.png").stat().st_size > 20_000

@@ -1,4 +1,5 @@
-"""The demos and the command line: key numbers, every file they promise, and one sentence for bad input."""
+"""The demos and the command line: key numbers, every file they promise, and one sentence for bad
+input."""
 
 from __future__ import annotations
 
@@ -73,7 +74,8 @@ def check_folder(
 
 @pytest.mark.slow
 def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
-    """V4.1 in its first 40 steps: frequency, dt, the top's displacement at steps 10, 20, 40; both routes agree."""
+    """V4.1 in its first 40 steps: frequency, dt, the top's displacement at steps 10, 20, 40; both
+    routes agree."""
     numbers = demo("wall").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     assert numbers["frequency"] == pytest.approx(13.9983, abs=5e-5)
@@ -111,7 +113,8 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
 def test_the_command_line_of_the_wall_demo(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """README's command: the run, both routes to every step, its report; numbers of the case that ships."""
+    """README's command: the run, both routes to every step, its report; numbers of the case that
+    ships."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["wall.py", "--case", "b", "--out", "demo", "--steps", "9"])
     with pytest.raises(SystemExit) as ended:
@@ -157,7 +160,8 @@ def recorded(folder: Path) -> Path:
 def test_the_wall_on_a_record(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k dt."""
+    """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k
+    dt."""
     path = recorded(tmp_path)
     monkeypatch.chdir(tmp_path)
     status = main(
@@ -213,7 +217,8 @@ BAD = {
 def test_bad_input_is_one_sentence(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 1, one line on standard error that names the thing and the remedy; nothing computed or written."""
+    """Exit status 1, one line on standard error that names the thing and the remedy; nothing
+    computed or written."""
     arguments, words = BAD[name]
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "binary.at2").write_bytes(b"\0\1\2")
@@ -235,7 +240,8 @@ def test_bad_input_is_one_sentence(
 def test_the_bouncing_bar_demo(
     comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """V1.3, one bounce: every scheme certified, its ledger closed; energy stays, but for Newmark on consistent mass."""
+    """V1.3, one bounce: every scheme certified, its ledger closed; energy stays, but for Newmark on
+    consistent mass."""
     numbers = demo("bouncing_bar").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     named = {name.split(":")[0] for name in numbers}
@@ -262,7 +268,8 @@ def test_the_bouncing_bar_demo(
 def test_the_hertz_impact_demo(
     comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """V3.3 with 4 cells in the contact radius: within 5 % of the theory, certified, rebound with full speed."""
+    """V3.3 with 4 cells in the contact radius: within 5 % of the theory, certified, rebound with
+    full speed."""
     numbers = demo("hertz_impact").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     of = {name.split(": ")[1]: value for name, value in numbers.items()}

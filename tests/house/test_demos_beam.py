@@ -17,7 +17,8 @@ pytestmark = pytest.mark.serial
 
 @pytest.mark.slow
 def test_the_timoshenko_beam_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """V6.1's invariants for every reading, two routes to the exact law, order 1 in eps, figures 8.1 to 8.9."""
+    """V6.1's invariants for every reading, two routes to the exact law, order 1 in eps, figures 8.1
+    to 8.9."""
     numbers = demo("timoshenko_beam").main(quick=True, out=tmp_path, progress=False)
     for case in (
         f"a2 {viscosity} {name}" for viscosity in ("0.001", "2") for name in ("none", "A", "B", "C")

@@ -35,7 +35,8 @@ def test_the_membrane_over_a_ball(comm: Any, shared_tmp: Path) -> None:
 
 
 def test_torsion(comm: Any, shared_tmp: Path) -> None:
-    """The disk: torque, stress function, plastic zone. The square: elastic, limit, and another method at one twist."""
+    """The disk: torque, stress function, plastic zone. The square: elastic, limit, and another
+    method at one twist."""
     elastic, largest = square_elastic()
     assert (elastic, largest) == pytest.approx((2.24923, 1.35063), abs=5e-6)
     assert disk_torque(1.0) == pytest.approx(0.5 * np.pi) and disk_torque(1e9) == pytest.approx(
@@ -62,8 +63,8 @@ def test_torsion(comm: Any, shared_tmp: Path) -> None:
 
 @pytest.mark.serial
 def test_the_bar_that_cracks(comm: Any, shared_tmp: Path) -> None:
-    """Homogeneous: the closed form, unloading too. Broken: elastic energy is gone, the crack costs Gc (1 + h / (2 l))
-    and damage before it does not heal."""
+    """Homogeneous: the closed form, unloading too. Broken: elastic energy is gone, the crack costs
+    Gc (1 + h / (2 l)) and damage before it does not heal."""
     strain, stress = critical(0.05)
     assert strain**2 * 0.05 == pytest.approx(1.0 / 3.0) and stress == pytest.approx(
         9.0 / 16.0 * strain

@@ -1,4 +1,5 @@
-"""The demo of the buried channel: key numbers of V4.2 in its first 40 steps, and every file it promises."""
+"""The demo of the buried channel: key numbers of V4.2 in its first 40 steps, and every file it
+promises."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ FIGURES = (
 @pytest.mark.slow
 @pytest.mark.serial
 def test_the_channel_demo(comm: Any, shared_tmp: Path) -> None:
-    """V4.2: openings alternate, the corners rock, unilateral exceeds bilateral; both routes agree; all files."""
+    """V4.2: openings alternate, the corners rock, unilateral exceeds bilateral; both routes agree;
+    all files."""
     module = demo("channel")
     numbers = module.main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws

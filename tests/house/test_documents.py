@@ -1,4 +1,5 @@
-"""The documents: examples run and print what they say, commands exist, links resolve, names and ids are complete."""
+"""The documents: examples run and print what they say, commands exist, links resolve, names and ids
+are complete."""
 
 from __future__ import annotations
 
@@ -60,7 +61,8 @@ def test_first_example_prints_what_readme_says(first: tuple[Path, str]) -> None:
 
 
 def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
-    """reference/files.md: rows of 400 steps and the initial state, the same minimum as README prints, a picture."""
+    """reference/files.md: rows of 400 steps and the initial state, the same minimum as README
+    prints, a picture."""
     page = ROOT / "docs" / "reference" / "files.md"
     table, arrays, picture = run("\nprint('---')\n".join(blocks(page, "python")), first[0]).split(
         "---\n"
@@ -73,7 +75,8 @@ def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
 
 
 def together(codes: list[str], folder: Path) -> list[str]:
-    """What each of them prints, one after the other in one process: they start with names of their own."""
+    """What each of them prints, one after the other in one process: they start with names of their
+    own."""
     names = [f"page_{number}.py" for number in range(len(codes))]
     for name, code in zip(names, codes, strict=True):
         (folder / name).write_text(code, encoding="utf-8")
@@ -100,8 +103,8 @@ def test_other_examples_run_on_its_problem(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_programs_print_what_their_pages_say(tmp_path: Path) -> None:
-    """Soil in space, bounds, questions, and all snippets of bring_your_own as one program; before DOLFINx 0.7 with the
-    names that spaces have there."""
+    """Soil in space, bounds, questions, and all snippets of bring_your_own as one program; before
+    DOLFINx 0.7 with the names that spaces have there."""
     from vi_contact.fem import compat
 
     soil, bounds, own = (
@@ -223,7 +226,8 @@ def test_the_page_of_names_is_what_the_docstrings_say() -> None:
     "hidden", [("dolfinx",), ("h5py", "petsc4py", "dolfinx", "mpi4py", "matplotlib", "tqdm")]
 )
 def test_import_needs_numpy_and_scipy_only(hidden: tuple[str, ...]) -> None:
-    """With packages hidden, ``import vi_contact`` and the names that need no finite elements are there."""
+    """With packages hidden, ``import vi_contact`` and the names that need no finite elements are
+    there."""
     names = "vc.Condensed, vc.Trapezoidal, vc.march"
     code = f"import sys; sys.modules.update(dict.fromkeys({hidden!r})); import vi_contact as vc; {names}"
     done = subprocess.run(
@@ -248,7 +252,8 @@ ROOMS = [
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_names_are_public(document: Path) -> None:
-    """Every ``vc.name`` and ``room.name`` that a document writes; the files that it names are there."""
+    """Every ``vc.name`` and ``room.name`` that a document writes; the files that it names are
+    there."""
     if document.name in ("CHANGELOG.md", "extend.md"):  # old names; its reader's: test_extend
         return
     text = re.sub(
@@ -312,7 +317,8 @@ def test_every_cited_id_is_explained(document: str) -> None:
 
 
 def test_supported_versions_are_the_same_everywhere() -> None:
-    """README's table, that of install.md and that of releases.md, which gives the first numbers only."""
+    """README's table, that of install.md and that of releases.md, which gives the first numbers
+    only."""
     pages = [
         ROOT / "README.md",
         ROOT / "docs" / "start" / "install.md",

@@ -1,4 +1,5 @@
-"""docs/guide/extend.md, followed to the letter: its files, its commands, its numbers, the one line of the registry."""
+"""docs/guide/extend.md, followed to the letter: its files, its commands, its numbers, the one line
+of the registry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Whatever an argument is given instead of what it should be: one sentence, before any work is done."""
+"""Whatever an argument is given instead of what it should be: one sentence, before any work is
+done."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ LONGEST = 400  # characters of a sentence
 
 
 def told(name: str, call: Callable[[], object]) -> str:
-    """What is wrong with the answer to a misuse; empty when it is an InputError of one line that names a thing: one of
-    the words in the name of the misuse."""
+    """What is wrong with the answer to a misuse; empty when it is an InputError of one line that
+    names a thing: one of the words in the name of the misuse."""
     try:
         call()
     except InputError as error:
@@ -57,7 +58,8 @@ def test_every_misuse_is_an_input_error_of_one_sentence() -> None:
 
 
 def test_what_they_were_made_of_is_right() -> None:
-    """A misuse is refused for its one wrong argument: with the right one the same call goes through."""
+    """A misuse is refused for its one wrong argument: with the right one the same call goes
+    through."""
     from misuses_core import RIGHT as core
     from misuses_wings import RIGHT as wings
 

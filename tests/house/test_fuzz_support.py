@@ -1,4 +1,5 @@
-"""The seeds of the fuzz tests: the same in every run, others by fuzz.sh; inputs that fail are kept and tried again."""
+"""The seeds of the fuzz tests: the same in every run, others by fuzz.sh; inputs that fail are kept
+and tried again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The gallery: every demo has a picture, a sentence, a command, and a page that tells what it prints."""
+"""The gallery: every demo has a picture, a sentence, a command, and a page that tells what it
+prints."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ def test_the_gallery_is_what_its_list_says(make: Any) -> None:
 
 
 def test_every_entry_is_whole(make: Any) -> None:
-    """A sentence, stored pictures, commands that its page writes, and pictures on the page that the demo writes."""
+    """A sentence, stored pictures, commands that its page writes, and pictures on the page that the
+    demo writes."""
     for name, entry in make.entries().items():
         text = (GALLERY / entry["page"].partition("#")[0]).read_text(encoding="utf-8")
         assert re.fullmatch(r"[A-Z].*\.", entry["sentence"]) and len(entry["sentence"]) < 130, name
@@ -63,7 +65,8 @@ def test_every_entry_is_whole(make: Any) -> None:
 
 
 def test_every_figure_has_something_that_makes_it(make: Any) -> None:
-    """The gallery, a page, the theory pages or a notebook; or the table says why it is stored. Pages show it.
+    """The gallery, a page, the theory pages or a notebook; or the table says why it is stored.
+    Pages show it.
 
     After a new picture: enter it in docs/gallery/made_by.toml, or in docs/gallery/demos.toml.
     """
@@ -94,7 +97,8 @@ def test_every_figure_has_something_that_makes_it(make: Any) -> None:
 
 
 def test_lines_agree_but_for_rounding(make: Any) -> None:
-    """Words count, numbers to two per mille; of residuals the order does, but none above the bound is one below."""
+    """Words count, numbers to two per mille; of residuals the order does, but none above the bound
+    is one below."""
     assert make.agree("force 1.0005 N,  worst 2.6e-14", "force 1.0001 N, worst 1.2e-15")
     assert make.agree("worst certificate 8.75e-13", "worst certificate 4e-12") and make.agree(
         "gap 0", "gap -3e-17"
@@ -132,7 +136,8 @@ def test_the_cache_sees_changes(make: Any, monkeypatch: pytest.MonkeyPatch, tmp_
 def test_entries_run_beside_each_other_and_complaints_end_the_build(
     make: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A run that fails, a line that is not printed and a picture that no page shows: each is told and is status 1."""
+    """A run that fails, a line that is not printed and a picture that no page shows: each is told
+    and is status 1."""
     usual = {"page": "one.md", "title": "", "sentence": ""}
     draw = '"$vi_python" -c \'from PIL import Image; Image.new("RGB", (9, 9)).save("a.png")\''
     commands = {

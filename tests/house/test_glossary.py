@@ -1,4 +1,5 @@
-"""The glossary: every word that a case file, a summary or the package shows has an entry, in three languages."""
+"""The glossary: every word that a case file, a summary or the package shows has an entry, in three
+languages."""
 
 from __future__ import annotations
 

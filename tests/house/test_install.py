@@ -92,7 +92,8 @@ def test_the_cases_that_ship_are_installed() -> None:
 
 @pytest.mark.serial
 def test_stubs_name_what_is_public() -> None:
-    """A checker of types finds in the stubs what Python does; ``*`` hands on a room, ``__all__`` has been kept up."""
+    """A checker of types finds in the stubs what Python does; ``*`` hands on a room, ``__all__``
+    has been kept up."""
     stubs = sorted((ROOT / "vi_contact").rglob("__init__.pyi"))
     assert len(stubs) > 15
     for path in stubs:
@@ -126,7 +127,8 @@ def ran(script: str, **environment: str) -> str:
 
 @pytest.mark.serial
 def test_finite_elements_without_dolfinx_say_how_to_get_it() -> None:
-    """All else is imported; a module of the room says the same as the room, and so does the command line."""
+    """All else is imported; a module of the room says the same as the room, and so does the command
+    line."""
     told = ran("""
 import sys
 sys.modules["dolfinx"] = None
@@ -146,7 +148,8 @@ for name in ("vi_contact.fem", "vi_contact.fem.compat"):
 
 @pytest.mark.serial
 def test_runs_without_h5py_need_no_folder(tmp_path: Path) -> None:
-    """In a virtual environment of its own pip leaves h5py out on Python 3.11: a run keeps its rows in memory then."""
+    """In a virtual environment of its own pip leaves h5py out on Python 3.11: a run keeps its rows
+    in memory then."""
     told = ran(f"""
 import sys
 sys.path.insert(0, {str(ROOT / "tests" / "support")!r})
@@ -169,7 +172,8 @@ except vc.InputError as error:
 
 @pytest.mark.serial
 def test_nothing_is_done_to_conda(tmp_path: Path) -> None:
-    """Importing takes nothing from CONDA_PREFIX and leaves nothing there; installing runs no code of this project."""
+    """Importing takes nothing from CONDA_PREFIX and leaves nothing there; installing runs no code
+    of this project."""
     for name in (
         "bin/python",
         "lib/python3.11/site-packages/numpy/__init__.py",
@@ -197,8 +201,8 @@ print(os.environ["CONDA_PREFIX"], sum(os.environ["CONDA_PREFIX"] in one for one 
 @pytest.mark.slow
 @pytest.mark.serial
 def test_pip_installs_the_command(tmp_path: Path) -> None:
-    """The commands of docs/start/install.md, without a package index: the virtual environment beside the system's
-    packages, and in it the command, which runs the case that ships."""
+    """The commands of docs/start/install.md, without a package index: the virtual environment
+    beside the system's packages, and in it the command, which runs the case that ships."""
     needed = (
         (ROOT / "pyproject.toml")
         .read_text(encoding="utf-8")
@@ -210,7 +214,8 @@ def test_pip_installs_the_command(tmp_path: Path) -> None:
         find_spec("packaging") and find_spec("packaging.licenses")
     ):
         pytest.skip(
-            f"setuptools {setuptools.__version__} is older than {needed}, or packaging older than it needs"
+            f"setuptools {setuptools.__version__} is older than {needed}, or packaging older than "
+            "it needs"
         )
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)

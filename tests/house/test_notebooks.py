@@ -1,4 +1,5 @@
-"""The notebooks: text without outputs, programs that check the numbers of their pages, and the same in Jupyter."""
+"""The notebooks: text without outputs, programs that check the numbers of their pages, and the same
+in Jupyter."""
 
 from __future__ import annotations
 
@@ -61,7 +62,8 @@ def test_there_are_notebooks() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_is_text_without_outputs(name: str) -> None:
-    """Cells are Python; nothing is kept of a run; the first lines say for whom; the last cell checks numbers."""
+    """Cells are Python; nothing is kept of a run; the first lines say for whom; the last cell
+    checks numbers."""
     text = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
     assert text.startswith(HEADER)
     fences = re.findall(r"^```(.*)$", text, re.MULTILINE)
@@ -115,7 +117,8 @@ def test_the_quick_ones_run_as_programs(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_runs_in_jupyter(name: str, tmp_path: Path) -> None:
-    """As the site's build runs it: from its folder, without anything installed; each has pictures or a film."""
+    """As the site's build runs it: from its folder, without anything installed; each has pictures
+    or a film."""
     pytest.importorskip("dolfinx")
     installed = SITE / "installed"
     if (

@@ -1,4 +1,5 @@
-"""The language of the pages: for whom each is, no sentence without an end, none too long, whole entries of names."""
+"""The language of the pages: for whom each is, no sentence without an end, none too long, whole
+entries of names."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ ENDS = re.compile(r"(?<=[.!?])[\"*)\]]*\s+(?=[\"*(\[]*[A-ZÀ-Þ\d`])")
 
 
 def blocks(text: str) -> Iterator[str]:
-    """Paragraphs, items of lists, headings and rows of tables, each on one line, without code and equations."""
+    """Paragraphs, items of lists, headings and rows of tables, each on one line, without code and
+    equations."""
     text = re.sub(r"\A---\n.*?\n---\n", "", text, flags=re.DOTALL)
     text = re.sub(
         r"^ *```.*?^ *```$|\$\$.*?\$\$|<!--.*?-->", "\n", text, flags=re.MULTILINE | re.DOTALL
@@ -47,7 +49,8 @@ def prose(page: Path) -> list[str]:
 
 
 def long_sentences(block: str) -> list[str]:
-    """Those of a paragraph that have too many words; a colon or a semicolon does not end a sentence."""
+    """Those of a paragraph that have too many words; a colon or a semicolon does not end a
+    sentence."""
     return (
         [] if block[:1] in "|#" else [one for one in ENDS.split(block) if len(one.split()) > WORDS]
     )
@@ -74,7 +77,8 @@ def entries() -> list[tuple[str, str]]:
 
 
 def broken(told: str) -> bool:
-    """Whether a text of the page of names ends in the middle, is missing, or leads to a place that the page has not."""
+    """Whether a text of the page of names ends in the middle, is missing, or leads to a place that
+    the page has not."""
     words = re.sub(r" ?It has (?:`\.\w+`(?:, )?)+\.$", "", told)
     lost = re.search(r"\bsee there|head of this|module's (?:head|equations)|[.:] [,;.]", words)
     return not words.endswith((".", ".)")) or bool(lost)

@@ -1,4 +1,5 @@
-"""Every regular expression of the package takes a time that grows as the text does, whatever the text is."""
+"""Every regular expression of the package takes a time that grows as the text does, whatever the
+text is."""
 
 from __future__ import annotations
 
@@ -82,7 +83,8 @@ SLOWER = 64.0  # of LONG over SHORT: 16 where time grows as the text, 256 where 
 
 
 def patterns() -> Iterator[tuple[str, re.Pattern[str] | re.Pattern[bytes]]]:
-    """Compiled ones in the modules, alone and in tuples, and constant texts given to functions of ``re``."""
+    """Compiled ones in the modules, alone and in tuples, and constant texts given to functions of
+    ``re``."""
     for path, source in SOURCES.items():
         if not re.search(r"\bre\.\w+\(", source):
             continue
@@ -121,7 +123,8 @@ def seconds(pattern: re.Pattern[str] | re.Pattern[bytes], text: str) -> float:
 
 
 def grows(pattern: re.Pattern[str] | re.Pattern[bytes], text: str, tries: int = 3) -> float:
-    """How much longer a text of sixteen times the length takes, each at its quickest of tries that alternate."""
+    """How much longer a text of sixteen times the length takes, each at its quickest of tries that
+    alternate."""
     short, long = ((text * size)[:size] + "!" for size in (SHORT, LONG))
     times = [(seconds(pattern, short), seconds(pattern, long)) for _ in range(tries)]
     quick, slow = map(min, zip(*times, strict=True))

@@ -25,7 +25,8 @@ pytest.importorskip("matplotlib")
 
 
 def cycles(n: int = 401, m: int = 6) -> dict[str, Any]:
-    """A block on a spring k = 2e6 N/m and a slider of 1000 N, moved to and fro by 1.5 mm; points open in turn."""
+    """A block on a spring k = 2e6 N/m and a slider of 1000 N, moved to and fro by 1.5 mm; points
+    open in turn."""
     t = np.linspace(0.0, 2.0, n)
     drive = 1.5e-3 * np.sin(2.0 * np.pi * t)
     slip, force = np.zeros(n), np.zeros(n)
@@ -52,7 +53,8 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 def test_loop_of_a_slider(figures: list[Any], tmp_path: Path) -> None:
-    """±1 kN, ±1 mm; the slip is drawn with the sign that makes the area 4 kN mm a cycle (V2.7 iii's law)."""
+    """±1 kN, ±1 mm; the slip is drawn with the sign that makes the area 4 kN mm a cycle (V2.7 iii's
+    law)."""
     path = plot_hysteresis(cycles(), tmp_path / "loop.png")
     assert path.stat().st_size > 3_000
     (axis,) = figures[0].axes

@@ -1,4 +1,5 @@
-"""Every room says how to use it, in words and in an example that runs, and lists its public names."""
+"""Every room says how to use it, in words and in an example that runs, and lists its public
+names."""
 
 import doctest
 from importlib import import_module

@@ -1,8 +1,10 @@
-"""The documentation site is built without a warning, its links lead somewhere, nothing in it comes from another host.
+"""The documentation site is built without a warning, its links lead somewhere, nothing in it comes
+from another host.
 
-In headless Chromium, on screens and on telephones: equations are set, pictures are there, the search finds, nothing is
-wider than the window or cut, old addresses lead on and no script complains. The pages are built without running
-notebooks, which ``bash docs/build.sh`` does, and as root without a network.
+In headless Chromium, on screens and on telephones: equations are set, pictures are there, the
+search finds, nothing is wider than the window or cut, old addresses lead on and no script
+complains. The pages are built without running notebooks, which ``bash docs/build.sh`` does, and as
+root without a network.
 """
 
 from __future__ import annotations
@@ -143,7 +145,8 @@ class Page(HTMLParser):
 
 
 def without_network() -> list[str]:
-    """The words that start a command without any network, where this user may: what is installed must suffice."""
+    """The words that start a command without any network, where this user may: what is installed
+    must suffice."""
     words = ["unshare", "--net"]
     may = (
         os.geteuid() == 0
@@ -155,7 +158,8 @@ def without_network() -> list[str]:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built without a network and without the outputs of notebooks; a warning stops its build."""
+    """The site, built without a network and without the outputs of notebooks; a warning stops its
+    build."""
     folder = tmp_path_factory.mktemp("site") / "site"
     done = subprocess.run(
         [*without_network(), "bash", str(ROOT / "docs" / "build.sh"), "--quick", str(folder)],
@@ -183,7 +187,8 @@ def test_every_document_is_a_page_and_old_addresses_live(
 
 
 def test_every_page_says_which_version_it_describes(site: Path, pages: dict[Path, Page]) -> None:
-    """In the title of the window, above the menu, and at the foot of the page, where telephones show it too."""
+    """In the title of the window, above the menu, and at the foot of the page, where telephones
+    show it too."""
     for path in pages:
         if str(path.relative_to(site).with_suffix("")) not in MOVED:
             text = path.read_text(encoding="utf-8")
@@ -232,8 +237,8 @@ def test_names_in_texts_lead_to_their_pages(site: Path) -> None:
     assert "../reference/names/fem.html#vi_contact.fem.contact_surface" in page
 
 
-# Opens every page of a list in a frame, makes the frame as wide as the page's widths say one after the other, and tells
-# the server what it finds there. A page that leads on is followed.
+# Opens every page of a list in a frame, makes the frame as wide as the page's widths say one after
+# the other, and tells the server what it finds there. A page that leads on is followed.
 PROBE = """<!doctype html><link rel="icon" href="data:,"><script>
 const list = LIST, wait = (ms) => new Promise((done) => setTimeout(done, ms));
 async function until(holds) {  // for half a minute, of which an idle machine needs a fraction of a second
@@ -356,8 +361,8 @@ class Handler(SimpleHTTPRequestHandler):
 
 @dataclass(frozen=True)
 class Opened:
-    """What the browser found on the pages, at the old addresses and on the spoiled page; which files the server did not
-    have; and what the console said."""
+    """What the browser found on the pages, at the old addresses and on the spoiled page; which
+    files the server did not have; and what the console said."""
 
     pages: list[dict[str, Any]]
     old: list[dict[str, Any]]
@@ -368,7 +373,8 @@ class Opened:
 
 @pytest.fixture(scope="module")
 def opened(site: Path, pages: dict[Path, Page], tmp_path_factory: pytest.TempPathFactory) -> Opened:
-    """Every page, in windows of several widths; one in many; every old address. No other host can be reached."""
+    """Every page, in windows of several widths; one in many; every old address. No other host can
+    be reached."""
     command = browser()
     names = sorted(str(path.relative_to(site)) for path in pages)
     urls = [f"/{name}" for name in names if name.removesuffix(".html") not in MOVED]
@@ -424,7 +430,8 @@ def section(page: Page) -> str:
 
 
 def test_the_browser_sees_what_is_wrong(opened: Opened) -> None:
-    """Each fault of the page that has them all: what the tests below find to be absent would be seen."""
+    """Each fault of the page that has them all: what the tests below find to be absent would be
+    seen."""
     spoiled = opened.spoiled
     hosts = {re.sub(r"https://(\w+)\.invalid/.*", r"\1", one) for one in spoiled["outside"]}
     assert hosts == {"font", "style", "script", "fetch"}

@@ -1,7 +1,8 @@
-"""Every fenced block of the pages has something that runs it, and what no other test runs is run here, shortened.
+"""Every fenced block of the pages has something that runs it, and what no other test runs is run
+here, shortened.
 
-VI_CONTACT_WHOLE=1 runs it as the pages say, without shortening; docs/run_commands.py does that before a release.
-tests/house/test_commands.py runs the commands of the pages.
+VI_CONTACT_WHOLE=1 runs it as the pages say, without shortening; docs/run_commands.py does that
+before a release. tests/house/test_commands.py runs the commands of the pages.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ RUN = {  # page, its blocks -> what runs them, or compares them with a run
     "docs/guide/solvers.md": {"python 3": "here"},
     "docs/guide/stages.md": {"toml 1": "studies/test_case_stages.py::HOUSE"},
     "docs/guide/studies.md": {
-        "toml 2, c++ 1": "studies/test_case_meshes.py::test_the_dam_of_the_guide_stands_on_its_joint",
+        "toml 2, c++ "
+        "1": "studies/test_case_meshes.py::test_the_dam_of_the_guide_stands_on_its_joint",
         "python 2, sh 3": "studies/test_ida.py::example",
     },
     "docs/reference/api.md": {"pycon 10": "house/test_rooms.py::test_a_room_says_how_to_use_it"},
@@ -88,14 +90,15 @@ RUN = {  # page, its blocks -> what runs them, or compares them with a run
     "docs/theory/bem.md": {"python 4": "here"},
     "docs/theory/boundary_layer.md": {"python 2": "here"},
     "docs/theory/certificate.md": {
-        "python 1, text 1": "house/test_theory_pages.py::test_the_spoiled_answer_prints_what_its_page_says"
+        "python 1, text "
+        "1": "house/test_theory_pages.py::test_the_spoiled_answer_prints_what_its_page_says"
     },
 }
 
 
 def test_every_block_has_what_runs_it() -> None:
-    """By page and language, with their number; pages of the gallery have sh and text, notebooks cells, and directives
-    are the site's own."""
+    """By page and language, with their number; pages of the gallery have sh and text, notebooks
+    cells, and directives are the site's own."""
     for page in PAGES:
         name = page.relative_to(ROOT).as_posix()
         found = Counter(
@@ -117,7 +120,8 @@ def test_every_block_has_what_runs_it() -> None:
 
 
 def test_code_stands_in_fenced_blocks() -> None:
-    """What is only indented is a command, a formula, a mistake that is told, or the calls that are tested below."""
+    """What is only indented is a command, a formula, a mistake that is told, or the calls that are
+    tested below."""
     for page in PAGES:
         rest = FENCE.sub("", page.read_text(encoding="utf-8"))
         lines = [line.strip() for line in rest.splitlines() if line.startswith("    ")]
@@ -150,12 +154,14 @@ def test_what_runs_a_block_is_there_and_reads_the_page(page: str) -> None:
             assert runner == "commands"  # docs/run_commands.py and tests/house/test_commands.py
 
 
-# Python --------------------------------------------------------------------------------------------------------------
+# Python
+# --------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Snippet:
-    """Blocks of a page that continue one another, after what their reader has, with long runs shortened."""
+    """Blocks of a page that continue one another, after what their reader has, with long runs
+    shortened."""
 
     page: str
     numbers: tuple[int, ...]
@@ -293,7 +299,8 @@ assert response.iterations > 1 and found.changes[-1] <= 0.01 and column is not N
             ("range(100)", "range(2)"),
             ('"t_end": 1.0', '"t_end": 0.02'),
         ),
-        "assert len(forces) == len(runs) and number in (0, 1, 2) and report.certificate.worst < 1e-9",
+        "assert len(forces) == len(runs) and number in (0, 1, 2) and report.certificate.worst < "
+        "1e-9",
     ),
     Snippet(
         "docs/guide/rocking_block.md",
@@ -359,11 +366,13 @@ def test_a_snippet_runs(snippet: Snippet, tmp_path: Path, monkeypatch: pytest.Mo
     exec(compile(snippet.after, "after", "exec"), names)
 
 
-# Case files, and lines that stand without a fence --------------------------------------------------------------------
+# Case files, and lines that stand without a fence
+# --------------------------------------------------------------------
 
 
 def test_tables_of_the_guides_stand_in_case_files(tmp_path: Path) -> None:
-    """Tables alone are read as a part of another page's case; a mistake in one of them would be told."""
+    """Tables alone are read as a part of another page's case; a mistake in one of them would be
+    told."""
     pytest.importorskip("dolfinx")
     guides = ("stages", "soil", "clusters")
     (house,), (damped,), (fields,) = (blocks(f"docs/guide/{name}.md", "toml") for name in guides)
@@ -428,14 +437,16 @@ def test_lines_on_initial_strains_are_calls() -> None:
     for line in lines:
         names["load"] = eval(line, names)
         exec(
-            "assert abs(fem.assemble(mesh, material, clamped=tags['base'], loads=load).load(0.5)).max() > 0.0",
+            "assert abs(fem.assemble(mesh, material, clamped=tags['base'], "
+            "loads=load).load(0.5)).max() > 0.0",
             names,
         )
 
 
 @pytest.mark.parametrize("name", ["`Trapezoidal`", "`HHT`"])
 def test_the_schemes_of_the_first_wall(name: str) -> None:
-    """Two rows, with the step of the article; benchmarks/wall_schemes.py prints all, docs/run_commands.py compares."""
+    """Two rows, with the step of the article; benchmarks/wall_schemes.py prints all,
+    docs/run_commands.py compares."""
     pytest.importorskip("dolfinx")
     table = loaded(ROOT / "benchmarks" / "wall_schemes.py")
     page = (DOCS / "start" / "first_wall.md").read_text(encoding="utf-8")

@@ -26,7 +26,8 @@ def blocks(page: str, language: str) -> list[str]:
 
 
 def same(told: str, printed: str) -> bool:
-    """Numbers agree to a hundredth, as another Gmsh may mesh a little differently; round-off is round-off in both."""
+    """Numbers agree to a hundredth, as another Gmsh may mesh a little differently; round-off is
+    round-off in both."""
     try:
         expected, found = (float(word.rstrip(",;")) for word in (told, printed))
     except ValueError:
@@ -58,7 +59,8 @@ def peaks(folder: Path) -> dict[str, tuple[float, float, float]]:
 def test_your_wall(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """The two files of the page are checked and run by its commands; the higher wall is the same files, changed."""
+    """The two files of the page are checked and run by its commands; the higher wall is the same
+    files, changed."""
     (geo,), (case,) = (blocks("ten_minutes_wall.md", language) for language in ("c\\+\\+", "toml"))
     check, summary = blocks("ten_minutes_wall.md", "text")
     page = (START / "ten_minutes_wall.md").read_text(encoding="utf-8")
@@ -107,7 +109,8 @@ def test_your_wall(
 
 
 def test_your_form(tmp_path: Path) -> None:
-    """The program prints what its page says on all versions of DOLFINx, draws its picture and is that short."""
+    """The program prints what its page says on all versions of DOLFINx, draws its picture and is
+    that short."""
     (code,), (printed,) = (
         blocks("ten_minutes_form.md", "python"),
         blocks("ten_minutes_form.md", "text"),

@@ -1,4 +1,5 @@
-"""The theory pages state the numbers of their figures, and the solutions of their exercises those of the program.
+"""The theory pages state the numbers of their figures, and the solutions of their exercises those
+of the program.
 
 python3 docs/theory/figures.py compares all figures.
 """
@@ -75,7 +76,8 @@ def test_the_spoiled_answer_prints_what_its_page_says() -> None:
     assert done.stdout == text
 
 
-# Solutions of the exercises: what each of these returns stands on the page ------------------------------------------
+# Solutions of the exercises: what each of these returns stands on the page
+# ------------------------------------------
 def solved_inequality(figures: ModuleType) -> list[str]:
     """Two masses of which the second never touches, and penalties in the place of the wall."""
     K = np.array([[200.0, -100.0], [-100.0, 200.0]])
@@ -123,12 +125,14 @@ def solved_step(figures: ModuleType) -> list[str]:
         f"$r_1 = 80 - 36 + 1 = {r[0]:.0f}$ N",
         f"$v_1 = 2 \\cdot 0.02/0.05 - 1 = {v[0]:.1f}$ m/s",
         f"$22.5 \\cdot 0.02 = {22.5 * 0.02:.2f}$ J",
-        f"of 0.52 J at the start {kinetic:.2f} J are left as kinetic and {strain:.2f} J as strain energy",
+        f"of 0.52 J at the start {kinetic:.2f} J are left as kinetic and {strain:.2f} J as strain "
+        "energy",
     ]
 
 
 def arrival(share: float, scheme: Any, dt: float = 1.0, steps: int = 3) -> tuple[Any, Any]:
-    """The velocities and reactions of a mass 1 with the velocity 1 that meets a wall after a share of the time 1."""
+    """The velocities and reactions of a mass 1 with the velocity 1 that meets a wall after a share
+    of the time 1."""
     system = vc.system_from_arrays([1.0], None, [[0.0]], coordinates=[[0.0]], v0=[1.0])
     surface = vc.contact_points(system, [0], [1.0], gap0=share)
     problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
@@ -157,7 +161,8 @@ def solved_blow_up(figures: ModuleType) -> list[str]:
 
 
 def test_bouncing_bar_on_coarse_meshes(figures: ModuleType) -> None:
-    """The table of energies and forces, to a hundredth; those of Newmark's scheme are chaotic and have bounds."""
+    """The table of energies and forces, to a hundredth; those of Newmark's scheme are chaotic and
+    have bounds."""
     schemes = {
         "trapezoidal, no mass at the foot": (vc.Trapezoidal(), None),
         "Houbolt, no mass at the foot": (vc.Houbolt(), None),
@@ -185,7 +190,8 @@ def test_bouncing_bar_on_coarse_meshes(figures: ModuleType) -> None:
 
 
 def solved_certificate(figures: ModuleType) -> list[str]:
-    """What each residual says to a spoiled answer, and what a penalty does to the matrix of the thrown bar."""
+    """What each residual says to a spoiled answer, and what a penalty does to the matrix of the
+    thrown bar."""
     system = vc.system_from_arrays([1.0], None, [[100.0]], coordinates=[[0.0]], load=[8.0])
     problem = vc.ContactProblem(system, vc.contact_points(system, [0], [1.0], gap0=0.05))
     *_, (_, report) = vc.march(problem, scheme=vc.Midpoint(), dt=0.05, steps=3)
@@ -211,7 +217,8 @@ def solved_certificate(figures: ModuleType) -> list[str]:
     assert round(k_p / foot / 1e6) == 5
     return [
         *rows,
-        f"$r_n = \\rho c v = {float(case.force(1.0)):.0f}$ N and the largest displacement {largest:.2f} m",
+        f"$r_n = \\rho c v = {float(case.force(1.0)):.0f}$ N and the largest displacement "
+        f"{largest:.2f} m",
         f"$k_p = 300/(6.67 \\cdot 10^{{-9}}) = {k_p / 1e10:.1f} \\cdot 10^{{10}}$ N/m",
         f"without a penalty {foot:.0f} N/m, becomes five million times as large",
         f"grows from {before:.0f} to ${np.linalg.cond(A) / 1e5:.1f} \\cdot 10^5$",
@@ -291,8 +298,10 @@ def solved_friction(figures: ModuleType) -> list[str]:
     return [
         ", ".join(f"$({a:.0f}, {b:.0f})$" for a, b in answers[:2])
         + " and $({:.0f}, {:.0f})$".format(*answers[2]),
-        f"$r_t = ({sheared[0]:.1f}, {sheared[1]:.1f})$ N, and the first point has slipped by {there[1]:.1f} mm",
-        f"$r_t = ({left[0]:.1f}, {left[1]:.1f})$ N, and the top stays displaced by {after[0]:.1f} mm",
+        f"$r_t = ({sheared[0]:.1f}, {sheared[1]:.1f})$ N, and the first point has slipped by "
+        f"{there[1]:.1f} mm",
+        f"$r_t = ({left[0]:.1f}, {left[1]:.1f})$ N, and the top stays displaced by {after[0]:.1f} "
+        "mm",
     ]
 
 
@@ -316,7 +325,8 @@ def test_solutions_state_what_the_program_finds(
 
 
 def test_each_exercise_has_its_solution(figures: ModuleType) -> None:
-    """Pages and solutions link to each other and count the same exercises, of every page that has a figure."""
+    """Pages and solutions link to each other and count the same exercises, of every page that has a
+    figure."""
     text = (THEORY / "solutions.md").read_text(encoding="utf-8")
     parts = re.split(r"^## .*\n\n\[Exercises\]\((\w+)\.md#exercise\)\n", text, flags=re.MULTILINE)[
         1:

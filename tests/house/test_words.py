@@ -1,4 +1,5 @@
-"""Words that a stranger understands: docstrings begin with a verb, and nothing is cited by a private name."""
+"""Words that a stranger understands: docstrings begin with a verb, and nothing is cited by a
+private name."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ pytestmark = pytest.mark.serial
 PACKAGE = Path(vi_contact.__file__).parent
 ROOMS = sorted({path.parent.relative_to(PACKAGE).parts[0] for path in PACKAGE.glob("*/**/*.py")})
 CIPHERS = re.compile(
-    r"\bV\d+\.\d+\b|\bP([3-9]|[12]\d)\b|\bB\d{1,2}\b|(?i:\bseed[ _-]?00\d|\bdesign ideas? \d|\bsolver notes\b"
+    r"\bV\d+\.\d+\b|\bP([3-9]|[12]\d)\b|\bB\d{1,2}\b|(?i:\bseed[ _-]?00\d|\bdesign ideas? "
+    r"\d|\bsolver notes\b"
     r"|\bverification (document\b|\d)|\b(design|seismic|verification|found|solver_notes)\.md\b)"
 )
 VERBS = """
@@ -64,7 +66,8 @@ def public(node: ast.Module | ast.ClassDef) -> Iterator[Definition]:
 
 
 def without_verb(name: str, text: str) -> list[Told]:
-    """Docstrings that do not begin with a verb (of public names), or begin with half a sentence (of any)."""
+    """Docstrings that do not begin with a verb (of public names), or begin with half a sentence (of
+    any)."""
     tree, wrong = ast.parse(text), []
     for node in public(tree):
         told = ast.get_docstring(node)

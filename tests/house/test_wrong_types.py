@@ -1,5 +1,5 @@
-"""Every public function and class, with a value of a wrong type for each of its arguments in turn: a sentence, or an
-answer; never another exception."""
+"""Every public function and class, with a value of a wrong type for each of its arguments in turn:
+a sentence, or an answer; never another exception."""
 
 from __future__ import annotations
 
@@ -151,7 +151,8 @@ def calls(
 
 
 def defect(found: Callable[..., Any], first: list[Any], given: dict[str, Any]) -> str:
-    """What is wrong with the answer: another exception than InputError, or one of several lines; else empty."""
+    """What is wrong with the answer: another exception than InputError, or one of several lines;
+    else empty."""
     try:
         found(*first, **given)
     except InputError as error:
@@ -268,7 +269,8 @@ def test_types_as_annotations_have_them() -> None:
 
 
 def test_what_is_checked_keeps_its_face() -> None:
-    """Name, text and signature, which pages of names and case files read; arguments that are wrong by name stay."""
+    """Name, text and signature, which pages of names and case files read; arguments that are wrong
+    by name stay."""
 
     @checked
     def one(x: float, *, name: str = "a") -> float:

@@ -44,7 +44,8 @@ def test_bad_coefficient_is_refused(law, value):
 
 
 def test_a_field_has_one_value_per_point():
-    """Given as any sequence, kept as a tuple: laws stay comparable. Wrong counts are told when used."""
+    """Given as any sequence, kept as a tuple: laws stay comparable. Wrong counts are told when
+    used."""
     law = Coulomb(np.array([0.0, 0.5, 0.5, 1.0]))
     assert law == Coulomb([0.0, 0.5, 0.5, 1.0]) and law.mu == (0.0, 0.5, 0.5, 1.0)
     assert np.array_equal(law.limit(R_N, WEIGHTS, 1.0), [0.0, 1.0, 0.0, 5.0])
@@ -78,7 +79,8 @@ def test_laws_without_rates_stay_themselves():
 
 
 def test_coefficients_of_slip_rates():
-    """mu_s at rest, mu_k far beyond v_c, their mean at v_c ln 2; a jump; any function, any number of values."""
+    """mu_s at rest, mu_k far beyond v_c, their mean at v_c ln 2; a jump; any function, any number
+    of values."""
     v = np.array([0.0, 0.1 * math.log(2.0), 10.0])
     decay = ExponentialDecay(mu_s=0.6, mu_k=0.4, v_c=0.1)
     np.testing.assert_allclose(decay(v), [0.6, 0.5, 0.4], rtol=1e-15)

@@ -28,7 +28,8 @@ IMPACT = Impact(
 
 
 def test_targets():
-    """Inelastic: every closed point stops. Newton: those that have just closed leave with e times their approach."""
+    """Inelastic: every closed point stops. Newton: those that have just closed leave with e times
+    their approach."""
     nan = np.nan
     np.testing.assert_array_equal(Inelastic().target(IMPACT), [0.0, 0.0, 0.0, nan])
     np.testing.assert_array_equal(Newton(0.5).target(IMPACT), [-1.0, nan, 0.0, nan])
@@ -47,7 +48,8 @@ def velocities(n: int = 6) -> np.ndarray:
 
 @pytest.mark.parametrize("target", [[0.0, 0.0], [0.0, np.nan], [0.7, -0.2]])
 def test_readings_give_the_target_velocities(target):
-    """B v⁺ = target, untouched where it is NaN: unknowns by the reset, contact impulses by the projection."""
+    """B v⁺ = target, untouched where it is NaN: unknowns by the reset, contact impulses by the
+    projection."""
     target, v = np.array(target), velocities()
     system, surface = chain_system(6, consistent=True), chain_surface(6, left_gap=0.0)
     chosen = ~np.isnan(target)
@@ -98,7 +100,8 @@ def test_V96_mass_projection_never_gains_when_it_reverses(e):
 
 
 def test_V96_component_reset_of_a_consistent_mass_has_either_sign():
-    """V9.6: the energy change of the literal reset is -(e_iᵀMv v_i - ½M_ii v_i²), here once a loss and once a gain."""
+    """V9.6: the energy change of the literal reset is -(e_iᵀMv v_i - ½M_ii v_i²), here once a loss
+    and once a gain."""
     system, surface = chain_system(6, consistent=True), chain_surface(6)
     losses = []
     for neighbour in (1.0, -3.0):
@@ -139,7 +142,8 @@ def test_single_mass_rebounds_with_e_times_its_speed(scheme, gap, e):
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: type(s).__name__)
 def test_inelastic_mass_stays_where_it_was_stopped(scheme):
-    """Pressed on by a constant force it rests, and the wall carries that force: 7 N in every step afterwards."""
+    """Pressed on by a constant force it rests, and the wall carries that force: 7 N in every step
+    afterwards."""
     problem = chain_problem(
         1, gap=0.05, stiffness=1e-9, mass=3.0, v0=[1.0], constant=7.0, impact=Inelastic()
     )
@@ -152,7 +156,8 @@ def test_inelastic_mass_stays_where_it_was_stopped(scheme):
 
 @pytest.mark.parametrize("reading", [ComponentReset, ImpulseUpdate])
 def test_inelastic_impacts_of_the_thrown_bar_take_less_than_one_percent(reading):
-    """V1.1 on 100 elements: the nodal law has no macroscopic effect (E loss <= 1 % of 500 J, rebound 10 m/s ± 2 %)."""
+    """V1.1 on 100 elements: the nodal law has no macroscopic effect (E loss <= 1 % of 500 J,
+    rebound 10 m/s ± 2 %)."""
     problem = thrown(impact=Inelastic(reading()))
     last = list(run(problem, ZienkiewiczWoodTaylor(), dt=1.0 / 300.0, steps=450))[-1]
     assert 0.99 < energy(problem, last.new) / 500.0 < 1.0
@@ -200,7 +205,8 @@ def test_what_a_law_is_told():
 
 
 def test_a_law_is_asked_about_solid_contacts_only():
-    """Springs are massless: their points do not collide. Without any closed point the law is not asked at all."""
+    """Springs are massless: their points do not collide. Without any closed point the law is not
+    asked at all."""
 
     class Never(Sticky):
         def target(self, impact):

@@ -31,7 +31,8 @@ from vi_contact.solvers.condensed import Condensed
 @pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FINER)
 def test_mass_centre_and_inertia_are_kept(name: str, friction: Any) -> None:
-    """Total mass, centre of mass and every moment of inertia to round-off, in 1D, 2D, 3D, straight and turned."""
+    """Total mass, centre of mass and every moment of inertia to round-off, in 1D, 2D, 3D, straight
+    and turned."""
     more = {} if friction is None else {"friction": friction}
     before, after = (
         inertia(problem(name, **more)),
@@ -45,8 +46,9 @@ def test_mass_centre_and_inertia_are_kept(name: str, friction: Any) -> None:
 @pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["bar", "quadrilaterals", "triangles", "tetrahedra"])
 def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> None:
-    """Rows and columns of the normal unknowns (with friction of the tangential ones too) are zero; the rest of M* is
-    positive definite, so that every velocity that carries momentum costs energy."""
+    """Rows and columns of the normal unknowns (with friction of the tangential ones too) are zero;
+    the rest of M* is positive definite, so that every velocity that carries momentum costs
+    energy."""
     more = {} if friction is None else {"friction": friction}
     given = problem(name, mass=Redistributed(), **more)
     system = given.equations
@@ -73,7 +75,8 @@ def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> Non
 @pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_the_axes_do_not_matter(simplices: bool, friction: Any) -> None:
-    """A body and its velocities turned by 0.4 rad have the same kinetic energy, for velocities that deform it too."""
+    """A body and its velocities turned by 0.4 rad have the same kinetic energy, for velocities that
+    deform it too."""
     more, found = {} if friction is None else {"friction": friction}, []
     for angle in (0.0, 0.4):
         mesh, tags = block(
@@ -99,7 +102,8 @@ def test_the_axes_do_not_matter(simplices: bool, friction: Any) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", [name for name in FINER if name != "bar"])
 def test_rigid_motions_are_not_damped(name: str) -> None:
-    """Stiffness-proportional damping on redistributed mass leaves every rigid motion alone, as on consistent mass."""
+    """Stiffness-proportional damping on redistributed mass leaves every rigid motion alone, as on
+    consistent mass."""
     mesh, tags = block(MPI.COMM_WORLD, **FINER[name])
     system = assemble(mesh, CONCRETE, damping=Rayleigh(alpha=0.0, beta=1e-3))
     given = ContactProblem(
@@ -124,7 +128,8 @@ def test_the_matrix_is_the_same_on_all_ranks() -> None:
 
 
 def test_two_sides_that_meet_in_a_corner() -> None:
-    """A triangle whose nodes all touch has no neighbour behind: its mass goes on through the next contact node."""
+    """A triangle whose nodes all touch has no neighbour behind: its mass goes on through the next
+    contact node."""
     mesh, tags = block(
         MPI.COMM_WORLD, lengths=(2.0, 1.5), divisions=(5, 4), simplices=True, angle=0.4
     )
@@ -149,7 +154,8 @@ def test_the_default_leaves_the_mass_alone() -> None:
 
 @pytest.mark.two_ranks
 def test_translation_of_the_whole_body_feels_the_whole_mass() -> None:
-    """The inertia load -M* r a_g has the resultant of -M r a_g: shaken and free, every body moves with the ground."""
+    """The inertia load -M* r a_g has the resultant of -M r a_g: shaken and free, every body moves
+    with the ground."""
     given = problem("tetrahedra", mass=Redistributed(), impact=None)
     turn = turned([1.0, 0.0], 0.4)
     direction = np.array([*turn, 0.0])
@@ -161,7 +167,8 @@ def test_translation_of_the_whole_body_feels_the_whole_mass() -> None:
 
 @pytest.mark.two_ranks
 def test_refusals() -> None:
-    """One sentence each: lumping out of range, a mass with nowhere to go, a mesh too coarse, an impact law."""
+    """One sentence each: lumping out of range, a mass with nowhere to go, a mesh too coarse, an
+    impact law."""
     with pytest.raises(InputError, match="lumping is 1.5: give a share"):
         Redistributed(1.5)
     with pytest.raises(InputError, match="cannot be moved.*ConsistentMass"):

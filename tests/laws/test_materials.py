@@ -38,9 +38,11 @@ def test_pressure_waves_are_those_of_a_bar_without_lateral_strain():
 
 
 def test_concrete_on_steel_from_its_wave_speeds():
-    """verification.md section 7: c_p = 3253, c_s = 1992 m/s, rho = 2400 give nu = 0.2000, E = 22.857 GPa.
+    """verification.md section 7: c_p = 3253, c_s = 1992 m/s, rho = 2400 give nu = 0.2000, E =
+    22.857 GPa.
 
-    The exact E = rho c_s² (3 c_p² - 4 c_s²) / (c_p² - c_s²) is 22.8565 GPa: one unit of the last digit is allowed.
+    The exact E = rho c_s² (3 c_p² - 4 c_s²) / (c_p² - c_s²) is 22.8565 GPa: one unit of the last
+    digit is allowed.
     """
     concrete = LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0)
     assert abs(concrete.nu - 0.2000) < 5e-5 and abs(concrete.E - 22.857e9) < 1e6
@@ -138,7 +140,8 @@ def test_rayleigh_has_the_two_ratios_asked_for(f1, f2, xi1, xi2):
 
 
 def test_rayleigh_at_the_ends_of_the_possible_range():
-    """Ratios proportional to f need alpha = 0, to 1/f beta = 0; round-off must not make them negative."""
+    """Ratios proportional to f need alpha = 0, to 1/f beta = 0; round-off must not make them
+    negative."""
     for f1, f2 in [(0.3, 7.7), (1.1, 3.3), (2.3, 2.9)]:
         stiffness = Rayleigh.from_frequencies(f1, f2, xi1=0.01 * f1, xi2=0.01 * f2)
         mass = Rayleigh.from_frequencies(f1, f2, xi1=0.01 / f1, xi2=0.01 / f2)

@@ -1,4 +1,5 @@
-"""Orthotropic and viscous materials against closed forms: compliance along and across the axes, sections, limits."""
+"""Orthotropic and viscous materials against closed forms: compliance along and across the axes,
+sections, limits."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ ISOTROPIC = {
 
 
 def test_strains_under_one_stress_are_the_definition() -> None:
-    """sigma_11 alone: eps_11 = s/E1, eps_22 = -nu12 s/E1, eps_33 = -nu13 s/E1; sigma_22 alone: eps_33 = -nu23 s/E2."""
+    """sigma_11 alone: eps_11 = s/E1, eps_22 = -nu12 s/E1, eps_33 = -nu13 s/E1; sigma_22 alone:
+    eps_33 = -nu23 s/E2."""
     C = Orthotropic(**SPRUCE).matrix(Solid(), 3)
     along, across = (np.linalg.solve(C, unit) for unit in np.eye(6)[:2])
     E1, E2 = SPRUCE["E1"], SPRUCE["E2"]
@@ -52,8 +54,9 @@ def test_strains_under_one_stress_are_the_definition() -> None:
 
 
 def test_a_lamina_at_an_angle_has_the_moduli_of_textbooks() -> None:
-    """Plane stress: 1/E_x = c⁴/E1 + s⁴/E2 + c² s² (1/G12 - 2 nu12/E1) (Jones, Mechanics of Composite Materials, 2.97),
-    shear coupling eps_xy/eps_x of the same formula's family, and nothing across."""
+    """Plane stress: 1/E_x = c⁴/E1 + s⁴/E2 + c² s² (1/G12 - 2 nu12/E1) (Jones, Mechanics of
+    Composite Materials, 2.97), shear coupling eps_xy/eps_x of the same formula's family, and
+    nothing across."""
     angle = 0.6
     c, s = cos(angle), sin(angle)
     C = Orthotropic(**SPRUCE, axes=angle).matrix(PlaneStress(), 2)

@@ -1,4 +1,5 @@
-"""The ball of tetrahedra: groups where they belong, nodes on the sphere, graded cells, the same mesh every time."""
+"""The ball of tetrahedra: groups where they belong, nodes on the sphere, graded cells, the same
+mesh every time."""
 
 from math import pi
 
@@ -29,8 +30,8 @@ def area(mesh: MeshArrays, name: str) -> float:
 @pytest.mark.parametrize("eighth", [False, True])
 @pytest.mark.parametrize("coarsest", [0.25, 0.1])
 def test_ball_has_its_size_and_sides(eighth, coarsest):
-    """Volume short by 0.35 (coarsest/R)² or a little less; flat sides exact planes, their areas short by about as much;
-    every node of the surface at the distance R from the centre."""
+    """Volume short by 0.35 (coarsest/R)² or a little less; flat sides exact planes, their areas
+    short by about as much; every node of the surface at the distance R from the centre."""
     mesh = arrays_from_script(BallMesh(**SMALL, coarsest=coarsest * RADIUS, eighth=eighth))
     share, lack = (8.0, 0.4 * coarsest**2) if eighth else (4.0, 0.4 * coarsest**2)
     assert mesh.cell == "tetrahedron" and mesh.cell_groups["ball"].all()
@@ -49,7 +50,8 @@ def test_ball_has_its_size_and_sides(eighth, coarsest):
 
 
 def test_foot_is_the_fine_part_of_the_surface():
-    """Facets with centres nearer than `foot`; edges of about 1.2 `size` there, growing with the distance."""
+    """Facets with centres nearer than `foot`; edges of about 1.2 `size` there, growing with the
+    distance."""
     mesh = arrays_from_script(BallMesh(**SMALL, growth=0.2))
     foot, surface = mesh.facet_groups["foot"], mesh.facet_groups["surface"]
     centres = np.linalg.norm(mesh.points[foot].mean(axis=1), axis=1)

@@ -1,4 +1,5 @@
-"""Gmsh scripts meshed on request: what is allowed gives the mesh of Gmsh, all else is refused before Gmsh sees it."""
+"""Gmsh scripts meshed on request: what is allowed gives the mesh of Gmsh, all else is refused
+before Gmsh sees it."""
 
 from __future__ import annotations
 
@@ -98,7 +99,8 @@ Physical Volume("body") = {out[1]}; Physical Surface("base") = {1};
 
 @pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
 def test_all_cells_are_divided(tmp_path: Path, cell: str) -> None:
-    """C1.2: 2^d times as many cells, 2^(d-1) facets, twice over; the measure of body and base to 1e-12."""
+    """C1.2: 2^d times as many cells, 2^(d-1) facets, twice over; the measure of body and base to
+    1e-12."""
     boxes = cell in ("quadrilateral", "hexahedron")
     text = SQUARE.replace("EXTRA", "Recombine Surface {1};" if boxes else "")
     if d := 3 if cell in ("tetrahedron", "hexahedron") else 0:
@@ -194,7 +196,8 @@ HABITS = {  # statements that nearly every script has and that change no mesh
 
 @pytest.mark.parametrize("what", HABITS)
 def test_harmless_habits_are_left_out(tmp_path: Path, what: str) -> None:
-    """What Gmsh gets is what it gets of the script without them, each word in its line; no file is written."""
+    """What Gmsh gets is what it gets of the script without them, each word in its line; no file is
+    written."""
     plain = allowed(written(tmp_path, "H = 1;\n\n" + PLAIN))
     script = allowed(written(tmp_path, f"H = 1;\n{HABITS[what]}\n" + PLAIN))
     empty = "If ( own_H > 0 ) EndIf" if what == "a condition" else ""
@@ -231,7 +234,8 @@ Physical Surface("dam", 101) = {1}; Physical Line("base", 201) = {1};
 def test_a_surface_that_cannot_be_transfinite_is_meshed_freely(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """As Gmsh's own command does, with a warning that names the surface. Area of the trapezium: (6 + 1)/2 10 m²."""
+    """As Gmsh's own command does, with a warning that names the surface. Area of the trapezium: (6
+    + 1)/2 10 m²."""
     text = PLAIN.replace("{L, 1, 0, 1}", "{1, 10, 0, 1}").replace("{0, 1, 0, 1}", "{0, 10, 0, 1}")
     text = text.replace("L = 2", "L = 6").replace(
         "Transfinite Surface {1}", 'Transfinite Surface "*"'
@@ -286,7 +290,8 @@ def test_parameters_of_a_window_are_left_out(tmp_path: Path) -> None:
 
 
 def test_numbers_are_given_to_what_a_script_does_not_set(tmp_path: Path) -> None:
-    """As -setnumber of Gmsh: for a name that is not set, and in the place of a DefineConstant. Lengths to 1e-12."""
+    """As -setnumber of Gmsh: for a name that is not set, and in the place of a DefineConstant.
+    Lengths to 1e-12."""
     free = written(tmp_path, PLAIN.removeprefix("L = 2;"), "free.geo")
     default = written(
         tmp_path, "DefineConstant[ L = {2, Min 0} ];" + free.read_text(), "default.geo"
@@ -308,7 +313,8 @@ def test_numbers_are_given_to_what_a_script_does_not_set(tmp_path: Path) -> None
     [
         (
             {"L": 5.0},
-            r"numbers gives 'L', but line 1 sets it in any case: write DefineConstant\[ L = … \] there",
+            r"numbers gives 'L', but line 1 sets it in any case: write DefineConstant\[ L = … \] "
+            r"there",
         ),
         ({"M": 5.0}, "numbers gives 'M', which the script does not use: leave it out"),
         ({"L": float("nan")}, "numbers of 'L' is nan; give a finite number"),
@@ -388,7 +394,8 @@ def curved_area(arrays: Any) -> float:
 
 
 def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
-    """A disk of radius 1 m: the area is wrong by O(h⁴), a 16th after a division; 8 leaves room for the first mesh."""
+    """A disk of radius 1 m: the area is wrong by O(h⁴), a 16th after a division; 8 leaves room for
+    the first mesh."""
     disk = """SetFactory("OpenCASCADE"); Disk(1) = {0, 0, 0, 1}; Mesh.MeshSizeMax = 0.8; Mesh.MeshSizeMin = 0.8;
     Mesh.ElementOrder = 2; Physical Surface("disk") = {1};"""
     path = written(tmp_path, disk)
@@ -401,7 +408,8 @@ def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
 
 
 def test_what_is_no_script_is_refused_at_once(tmp_path: Path) -> None:
-    """Comments that nothing closes, however many, and what is no file: a pipe would be waited for."""
+    """Comments that nothing closes, however many, and what is no file: a pipe would be waited
+    for."""
     path = written(tmp_path, "/* " * 100_000)
     start = time.process_time()
     with pytest.raises(InputError, match="line 1 has '/"):
@@ -454,9 +462,11 @@ def ended(process: Path) -> bool:
 LOOPS = {  # the points that they make
     "For i In {1:3} Point(i) = {i, 0, 0}; EndFor": 3,
     "For i In {1:3}\n Point(i) = {i, 0, 0}; EndFor Point(9) = {9, 0, 0};": 4,
-    "For i In {0:1} For j In {1:2} Point(10*i + j) = {i, j, 0}; EndFor EndFor Point(9) = {9, 0, 0};": 5,
+    "For i In {0:1} For j In {1:2} Point(10*i + j) = {i, j, 0}; EndFor EndFor Point(9) = {9, 0, "
+    "0};": 5,
     "n[] = {1, 3}; For i In {n[0]:n[1]} /* a\n b */ Point(i) = {i, 0, 0}; EndFor // x": 3,
-    "For (1:3) If (1 > 0) Point(newp) = {0, 0, 0}; EndIf EndFor If (0) Point(8) = {1, 0, 0}; EndIf": 3,
+    "For (1:3) If (1 > 0) Point(newp) = {0, 0, 0}; EndIf EndFor If (0) Point(8) = {1, 0, 0}; "
+    "EndIf": 3,
     "// lines of old\rFor i In {1:3}\r Point(i) = {i, 0, 0};\rEndFor\r": 3,
     "// and of others\r\nFor i In {1:3}\r\n Point(i) = {i, 0, 0};\r\nEndFor\r\n": 3,
     "\ufeffFor i In {1:3}\n Point(i) = {i, 0, 0};\nEndFor": 3,

@@ -1,4 +1,5 @@
-"""Mesh files are data: no script runs, whatever the file is called, and wrong ones are refused in one sentence."""
+"""Mesh files are data: no script runs, whatever the file is called, and wrong ones are refused in
+one sentence."""
 
 from pathlib import Path
 
@@ -79,7 +80,8 @@ def test_a_geo_file_is_refused_with_the_remedy(tmp_path: Path) -> None:
 def test_counts_are_bounded_by_the_file_and_sections_are_whole(
     meshes: dict[str, bytes], tmp_path: Path
 ) -> None:
-    """A count of 10^12 nodes takes no memory; a file cut anywhere before its last section ends is refused."""
+    """A count of 10^12 nodes takes no memory; a file cut anywhere before its last section ends is
+    refused."""
     path = tmp_path / "wrong.msh"
     for name, data in meshes.items():
         path.write_bytes(data[: data.index(b"$EndElements")])

@@ -1,4 +1,5 @@
-"""Gmsh scripts: exact nodes, named groups, the same mesh every time, and no traces in the user's Gmsh."""
+"""Gmsh scripts: exact nodes, named groups, the same mesh every time, and no traces in the user's
+Gmsh."""
 
 import math
 import os
@@ -39,7 +40,8 @@ def polygon_areas(points, cells):
     return 0.5 * (x * np.roll(y, -1, axis=0) - y * np.roll(x, -1, axis=0)).sum(axis=0)
 
 
-# The wall of seed 000, Fig. 2 (verification 4.2) ----------------------------------------------------------------------
+# The wall of seed 000, Fig. 2 (verification 4.2)
+# ----------------------------------------------------------------------
 
 
 def test_shaken_wall_has_its_nodes_at_exact_multiples_of_three_quarters():
@@ -109,11 +111,13 @@ def test_a_wall_that_cannot_be_is_refused_with_a_sentence(bad, words):
         WallMesh(**bad)
 
 
-# Blocks ---------------------------------------------------------------------------------------------------------------
+# Blocks
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def volume(arrays):
-    """Sum over cells of |det J| times the reference volume; exact for simplices and parallelepipeds."""
+    """Sum over cells of |det J| times the reference volume; exact for simplices and
+    parallelepipeds."""
     d = arrays.points.shape[1]
     simplex = arrays.cells.shape[1] == d + 1
     ends = [1, 2, 3][:d] if simplex else [1, 3, 4][:d]
@@ -151,7 +155,8 @@ def test_block_groups_are_the_whole_boundary(d, simplices):
 
 
 def test_block_is_placed_bent_and_truly_turned():
-    """A quarter ring 1 < r < 2 from a rectangle, then turned: radii stay, polar angles run from 30 to 120 degrees."""
+    """A quarter ring 1 < r < 2 from a rectangle, then turned: radii stay, polar angles run from 30
+    to 120 degrees."""
 
     def ring(x):
         return np.stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])], axis=1)
@@ -197,7 +202,8 @@ def test_a_map_that_folds_the_block_over_itself_is_refused():
         arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: x[:, :1]))
 
 
-# Files ----------------------------------------------------------------------------------------------------------------
+# Files
+# ----------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -302,7 +308,8 @@ def test_meshes_explain_bad_input_in_one_line(tmp_path):
         assert done.stderr.count("\n") == 1 and said in done.stderr
 
 
-# The user's Gmsh ------------------------------------------------------------------------------------------------------
+# The user's Gmsh
+# ------------------------------------------------------------------------------------------------------
 
 
 def test_a_session_is_silent_and_gives_gmsh_and_interrupts_back(capfd):

@@ -1,4 +1,5 @@
-"""Who gets which cell: equal shares in compact pieces, neighbours as ghosts, the same every time."""
+"""Who gets which cell: equal shares in compact pieces, neighbours as ghosts, the same every
+time."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""The building on a raft: two bodies of their own, volumes and faces as given, opposite sides of the soil alike."""
+"""The building on a raft: two bodies of their own, volumes and faces as given, opposite sides of
+the soil alike."""
 
 import numpy as np
 import pytest
@@ -28,7 +29,8 @@ def area(arrays, name):
 
 
 def test_two_bodies_fill_what_was_asked_for_without_a_common_node(arrays):
-    """Volumes by hand: raft, walls between the slabs, three slabs; areas of the faces; the building's on top."""
+    """Volumes by hand: raft, walls between the slabs, three slabs; areas of the faces; the
+    building's on top."""
     walls = (8.0 * 6.0 - 6.4 * 4.4) * 3 * (4.0 - 0.6)
     assert volumes(arrays, "building") == pytest.approx(
         12.0 * 9.0 * (1.5 + 3 * 0.6) + walls, rel=1e-12
@@ -67,7 +69,8 @@ def test_opposite_sides_of_the_soil_are_divided_alike(arrays, one, other, axis):
 
 
 def test_the_faces_that_meet_do_not_match(arrays):
-    """Different sizes on both sides: away from the corners hardly a node of the raft lies on one of the soil."""
+    """Different sizes on both sides: away from the corners hardly a node of the raft lies on one of
+    the soil."""
     raft, soil = (
         arrays.points[np.unique(arrays.facet_groups[name])] for name in ("raft_bottom", "soil_foot")
     )

@@ -53,7 +53,8 @@ def places(arrays, rows):
 @shapes
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_two_blocks_touch_without_a_common_node(d, simplices):
-    """Two bodies, interface nodes at the same places; named sides are where they say, gaps and offsets too."""
+    """Two bodies, interface nodes at the same places; named sides are where they say, gaps and
+    offsets too."""
     mesh = stacked(d, simplices)
     arrays = arrays_from_script(mesh)
     lower, upper = bodies(arrays)
@@ -84,8 +85,8 @@ def test_blocks_turn_together_and_have_to_be_alike():
 @shapes
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_welded_blocks_are_one_block_and_cut_open_two_again(d, simplices):
-    """Welded: nodes, cells and outer sides of the single block; cut open again along the weld: two bodies, whose new
-    sides are the old interface; the same through a file."""
+    """Welded: nodes, cells and outer sides of the single block; cut open again along the weld: two
+    bodies, whose new sides are the old interface; the same through a file."""
     mesh = stacked(d, simplices)
     one, two = mesh.interface
     apart = arrays_from_script(mesh)
@@ -117,7 +118,8 @@ def test_welded_blocks_are_one_block_and_cut_open_two_again(d, simplices):
 
 
 def test_scripts_and_files_give_the_same(tmp_path):
-    """CutOpen and Welded take scripts and files; what they write is read back with all groups, overlapping ones too."""
+    """CutOpen and Welded take scripts and files; what they write is read back with all groups,
+    overlapping ones too."""
     mesh = stacked(3, True, angle=0.2)
     write(mesh, tmp_path / "apart.msh")
     write(Welded(tmp_path / "apart.msh", "lower_top", "upper_bottom"), tmp_path / "joined.msh")
@@ -160,8 +162,8 @@ def strip_with(lines):
 
 
 def test_a_crack_stays_closed_at_its_tip():
-    """From the left side to the middle of the block: its mouth opens, its tip does not; one body with four more
-    facets outside."""
+    """From the left side to the middle of the block: its mouth opens, its tip does not; one body
+    with four more facets outside."""
     arrays = strip_with({"crack": [((0.0, 1.0), (1.0, 1.0)), ((1.0, 1.0), (2.0, 1.0))]})
     cut = cut_open(arrays, "crack", towards=(0.1, 1.0))
     assert len(bodies(cut)) == 1 and len(cut.points) == len(arrays.points) + 2
@@ -175,7 +177,8 @@ def test_a_crack_stays_closed_at_its_tip():
 
 
 def test_cuts_that_cross():
-    """A horizontal and a vertical cut, one after the other: four bodies, four nodes where they cross."""
+    """A horizontal and a vertical cut, one after the other: four bodies, four nodes where they
+    cross."""
     across = [((i + 0.0, 1.0), (i + 1.0, 1.0)) for i in range(3)]
     upright = [((2.0, i + 0.0), (2.0, i + 1.0)) for i in range(3)]
     arrays = strip_with({"across": across, "upright": upright})
@@ -225,7 +228,8 @@ def test_refusals():
 
 
 def test_bodies_of_gmsh_geometry():
-    """Two rectangles of Gmsh's OpenCASCADE, body by body, and one geometry fragmented along the joint and cut open."""
+    """Two rectangles of Gmsh's OpenCASCADE, body by body, and one geometry fragmented along the
+    joint and cut open."""
 
     class Dam:
         def __init__(self, fragmented):
@@ -259,7 +263,8 @@ def test_bodies_of_gmsh_geometry():
 @shapes
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_joint_between_two_cell_groups_needs_no_boundary_group(d, simplices):
-    """What lies between the groups is cut like a named boundary; side 1 is that of the first group."""
+    """What lies between the groups is cut like a named boundary; side 1 is that of the first
+    group."""
     mesh = stacked(d, simplices)
     one, two = mesh.interface
     joined = welded(arrays_from_script(mesh), two, one)
@@ -319,7 +324,8 @@ def test_what_cannot_be_cut_between_cell_groups():
 
 
 def test_welds_to_several_nodes_at_one_place_are_refused():
-    """A stone is welded to two stones, which have a node each at the joint; the stone's side first is no riddle."""
+    """A stone is welded to two stones, which have a node each at the joint; the stone's side first
+    is no riddle."""
     block = BlockMesh(lengths=(1.0, 1.0), divisions=(2, 2))
     stones = Blocks(
         {

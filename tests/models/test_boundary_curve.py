@@ -15,7 +15,8 @@ COMM = MPI.COMM_WORLD
 
 
 def test_sides_of_a_block():
-    """Sides keep their labels, normals point out, nodes know their number, all ranks have the same mesh."""
+    """Sides keep their labels, normals point out, nodes know their number, all ranks have the same
+    mesh."""
     mesh, tags = block(COMM, lengths=(2.0, 1.5), divisions=(5, 4), simplices=True)
     names = ("bottom", "right", "top", "left")
     curve, numbers = boundary_curve(*(tags[name] for name in names))

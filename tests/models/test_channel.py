@@ -1,4 +1,5 @@
-"""The buried channel: mesh, points, contact conditions, records, runs (numbers: validation/test_buried_channel.py)."""
+"""The buried channel: mesh, points, contact conditions, records, runs (numbers:
+validation/test_buried_channel.py)."""
 
 from __future__ import annotations
 
@@ -51,13 +52,15 @@ def polygon_area(points, cells):
     return np.abs(0.5 * (x * np.roll(y, -1, axis=0) - y * np.roll(x, -1, axis=0)).sum(axis=0))
 
 
-# Mesh -----------------------------------------------------------------------------------------------------------------
+# Mesh
+# -----------------------------------------------------------------------------------------------------------------
 
 
 @serial
 @meshes
 def test_two_bodies_divided_alike(name):
-    """Areas of both bodies; interface nodes at the same places, none in common; boundaries where their names say."""
+    """Areas of both bodies; interface nodes at the same places, none in common; boundaries where
+    their names say."""
     mesh = MESHES[name]
     arrays = arrays_from_script(mesh)
     points, groups = arrays.points, arrays.facet_groups
@@ -124,12 +127,14 @@ def test_no_such_mesh(wrong, sentence):
         ChannelMesh(**wrong)
 
 
-# Model ----------------------------------------------------------------------------------------------------------------
+# Model
+# ----------------------------------------------------------------------------------------------------------------
 
 
 @serial
 def test_nineteen_points():
-    """CHOSEN: 1 and 7 bottom corners, 13 and 19 tops of the right and the left wall, even distances."""
+    """CHOSEN: 1 and 7 bottom corners, 13 and 19 tops of the right and the left wall, even
+    distances."""
     points = np.array([CHANNEL.point(number) for number in range(1, 20)])
     assert [CHANNEL.point(n) for n in (1, 7, 13, 19)] == [
         (10.0, 5.0),
@@ -170,7 +175,8 @@ def test_twenty_three_conditions():
     ids=str,
 )
 def test_weight_rests_on_the_base(sides):
-    """Smooth walls: the base carries the channel's weight, the walls push against each other; certified."""
+    """Smooth walls: the base carries the channel's weight, the walls push against each other;
+    certified."""
     one = build(CHANNEL, COMM, sides=sides)
     start = vc.static_equilibrium(one.problem(), solver=vc.Condensed())
     r_n = one.surface.everywhere(start.r_n)
@@ -199,7 +205,8 @@ def test_who_weighs():
 
 
 def test_bodies_of_a_cell_group():
-    """Numbers of whole bodies, the same on every rank; a group that shares nodes with other cells is none."""
+    """Numbers of whole bodies, the same on every rank; a group that shares nodes with other cells
+    is none."""
     one = model()
     assert [fem.bodies_of(one.system, one.tags[name]) for name in BODIES] == [(0,), (1,)]
     whole = fem.Cells.where("all", one.mesh, lambda x: np.isfinite(x[0]))
@@ -213,7 +220,8 @@ def test_bodies_of_a_cell_group():
 
 
 def test_defaults_of_a_problem():
-    """V4.2: a_g = 2 sin(2 pi 2 t), dt = 1/80 s, the inelastic rule as an M-orthogonal impulse on consistent mass."""
+    """V4.2: a_g = 2 sin(2 pi 2 t), dt = 1/80 s, the inelastic rule as an M-orthogonal impulse on
+    consistent mass."""
     problem = model().problem()
     assert problem.excitation == vc.Harmonic(2.0, 2.0, direction=(1.0, 0.0)) and DT == 1.0 / 80.0
     assert (
@@ -231,7 +239,8 @@ def test_defaults_of_a_problem():
 
 @pytest.mark.serial
 def test_records_of_both_sides():
-    """Channel minus soil at a point is its opening along the normal; the openings of the sides are their largest."""
+    """Channel minus soil at a point is its opening along the normal; the openings of the sides are
+    their largest."""
     one = model()
     history = follow(one, one.problem(friction=FRICTION), 12).history
     size = max(np.abs(history[name]).max() for name in ("u_x_1", "u_x_19"))
@@ -259,7 +268,8 @@ def test_records_of_both_sides():
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
 def test_any_number_of_ranks(friction):
-    """The same run on all ranks together and on each alone, to 1e-10 of the largest displacement and pressure."""
+    """The same run on all ranks together and on each alone, to 1e-10 of the largest displacement
+    and pressure."""
     runs = []
     for alone in (False, True):
         one = model(alone=alone)
@@ -285,7 +295,8 @@ def test_other_meshes(name):
     assert solution.history["u_y_4"][0] == pytest.approx(settlement, rel=0.1)
 
 
-# Runs -----------------------------------------------------------------------------------------------------------------
+# Runs
+# -----------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.serial
@@ -320,7 +331,8 @@ def test_the_command(shared_tmp, capsys):
 
 @pytest.mark.serial
 def test_the_case_that_ships_is_the_channel_of_the_figures():
-    """Shape, materials, points, harmonic and time step are those of the model, its reference that of the catalogue."""
+    """Shape, materials, points, harmonic and time step are those of the model, its reference that
+    of the catalogue."""
     case = built_in()
     assert case.excitations() == (CHANNEL.harmonic(),)
     assert build_call(case.nodes["run"], {}) == {"dt": CHANNEL.time_step(), "steps": 400}
@@ -343,7 +355,8 @@ def built_in(*given, **short):
 
 
 def on_base(base, ends, shaking, *, dt, steps, weighing=BODIES, rock=None, hht=False):
-    """(problem, history) on this base, from rest under the weight of these bodies; released where ends hold none."""
+    """(problem, history) on this base, from rest under the weight of these bodies; released where
+    ends hold none."""
     bottom = bedrock(base, shaking, dt=dt, rock=rock)
     sides = FreeFieldSides(bottom or shaking) if ends is FreeFieldSides else ends()
     one, firm = staged(CHANNEL, COMM, sides=sides, weighing=weighing, base=bottom)
@@ -370,7 +383,8 @@ def on_base(base, ends, shaking, *, dt, steps, weighing=BODIES, rock=None, hht=F
     "ends, hht", [(TiedSides, True), (FreeFieldSides, False), (DashpotSides, False)]
 )
 def test_a_moved_bedrock(ends, hht):
-    """Base "prescribed": the same contact forces, with records in both directions, whatever the sides."""
+    """Base "prescribed": the same contact forces, with records in both directions, whatever the
+    sides."""
     record = Record(np.sin(20.0 * 0.01 * np.arange(31)), 0.01)
     shaking = tuple(vc.GroundMotion(record, direction=way) for way in ((1.0, 0.0), (0.0, 1.0)))
     found = []
@@ -388,7 +402,8 @@ def test_a_moved_bedrock(ends, hht):
 
 @serial
 def test_a_vertical_record_ties_the_ends_of_the_case(tmp_path):
-    """--motion H,V on the case that ships: rollers would hold what shakes upwards; one record leaves them alone."""
+    """--motion H,V on the case that ships: rollers would hold what shakes upwards; one record
+    leaves them alone."""
     record = tmp_path / "record.txt"
     record.write_text("".join(f"{0.01 * k:.2f} {np.sin(0.2 * k):.9e}\n" for k in range(31)))
     units = [f"excitation.{k}.record.units=m/s2" for k in (1, 2)]
@@ -418,8 +433,9 @@ def test_a_vertical_record_ties_the_ends_of_the_case(tmp_path):
 @serial
 @pytest.mark.parametrize("ends", [TiedSides, FreeFieldSides])
 def test_waves_from_below(ends):
-    """Base "compliant": at rest without waves, on what the released bedrock carried; with waves stiff rock brings
-    nearly the motion of a rigid base, whose acceleration is that of the outcrop."""
+    """Base "compliant": at rest without waves, on what the released bedrock carried; with waves
+    stiff rock brings nearly the motion of a rigid base, whose acceleration is that of the
+    outcrop."""
     _, history = on_base("compliant", ends, (CHANNEL.harmonic(0.0),), dt=DT, steps=20)
     size = np.abs(history["u_y_1"]).max()
     assert max(np.ptp(history[name]) for name in ("u_x_1", "u_y_1", "u_x_13")) < 1e-10 * size
@@ -447,7 +463,8 @@ def test_no_such_base():
 
 @pytest.mark.serial
 def test_at_rest_before_the_shaking():
-    """Python's way to the same: ends that hold no static load come after the gravity stage, and stay at rest."""
+    """Python's way to the same: ends that hold no static load come after the gravity stage, and
+    stay at rest."""
     model, firm = staged(
         Channel(ChannelMesh(size=1.0)), COMM, sides=DashpotSides(), weighing=("channel",), base=None
     )

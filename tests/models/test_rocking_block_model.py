@@ -1,4 +1,5 @@
-"""The rocking block as a model: what it refuses, its rigid limit, its states and histories; its demo and figures."""
+"""The rocking block as a model: what it refuses, its rigid limit, its states and histories; its
+demo and figures."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def test_soft_or_coarse_blocks_are_refused():
 
 @pytest.mark.serial
 def test_rigid_limit_is_housners_block_in_other_units():
-    """p_eff² = p² h/R and b/h instead of p² and alpha; amplitudes at equal phi and the loss are the same."""
+    """p_eff² = p² h/R and b/h instead of p² and alpha; amplitudes at equal phi and the loss are the
+    same."""
     block = rocking.RockingBlock()
     b, h, R = 0.2, 1.0, np.hypot(0.2, 1.0)
     assert block.p**2 == pytest.approx(0.75 * 9.81 / R * h / R, rel=1e-12)
@@ -70,8 +72,9 @@ def test_rest_is_an_equilibrium(model):
 
 @pytest.mark.serial
 def test_tilted_states(model):
-    """A tilt is a rigid turn about the left corner: angle, spin and kinetic energy ½ (4/3) m R² rate² (the held base
-    has no inertia sideways, which a turn about a base corner does not ask for)."""
+    """A tilt is a rigid turn about the left corner: angle, spin and kinetic energy ½ (4/3) m R²
+    rate² (the held base has no inertia sideways, which a turn about a base corner does not ask
+    for)."""
     state = model.tilted(0.07, rate=-0.3)
     assert model.angle(state) == pytest.approx(0.07, rel=1e-12) and model.spin(
         state
@@ -84,14 +87,16 @@ def test_tilted_states(model):
 @pytest.mark.serial
 @pytest.mark.parametrize("n", [5, 10])
 def test_onset_of_the_mesh(n):
-    """g b/h = 1.962 m/s² on every mesh: the inertia load counts the mass that elements share with the held base."""
+    """g b/h = 1.962 m/s² on every mesh: the inertia load counts the mass that elements share with
+    the held base."""
     model = rocking.build(rocking.RockingBlock(divisions=(2, n)), COMM)
     assert model.onset_acceleration == pytest.approx(1.962, rel=1e-10)
 
 
 @pytest.mark.serial
 def test_weight_has_the_arm_of_the_tilted_block(model):
-    """Work of the weight over a turn theta: m g (b theta - ½ h theta²), from the loads and the geometric stiffness."""
+    """Work of the weight over a turn theta: m g (b theta - ½ h theta²), from the loads and the
+    geometric stiffness."""
     system, theta = model.problem.equations, 0.15
     turn = model.tilted(theta).u - model.rest.u
     work = system.algebra.dot(turn, system.load(0.0) - system.K @ model.rest.u)

@@ -1,4 +1,5 @@
-"""The wall model: numbering of its points, its cases, its meshes (numbers: validation/test_shaken_wall.py)."""
+"""The wall model: numbering of its points, its cases, its meshes (numbers:
+validation/test_shaken_wall.py)."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ COARSE = Wall(divisions=(4, 6))
 
 
 def test_forty_points_around_the_boundary():
-    """V4.2, anticlockwise, 0.75 m apart: 12 top right corner, 20 top left, 32 bottom left, 40 bottom right."""
+    """V4.2, anticlockwise, 0.75 m apart: 12 top right corner, 20 top left, 32 bottom left, 40
+    bottom right."""
     wall = Wall()
     points = np.array([wall.point(number) for number in range(1, 41)])
     assert [wall.point(n) for n in (12, 20, 32, 40)] == [
@@ -82,7 +84,8 @@ def test_mass_section_and_damping():
 
 @pytest.mark.parametrize("case", CASES)
 def test_cases(case):
-    """Contact points in the order of their numbers, along +x, no gap; held in the bilateral case, none when free."""
+    """Contact points in the order of their numbers, along +x, no gap; held in the bilateral case,
+    none when free."""
     model = build(Wall(), COMM)
     surface = model.surface(case).whole()
     expected = [model.wall.point(number) for number in CASES[case]]
@@ -105,7 +108,8 @@ def test_whole_face_and_unknown_case():
 
 
 def test_defaults_of_a_problem():
-    """Harmonic at half the first frequency, a fortieth of its period as the time step, the seed's inelastic rule."""
+    """Harmonic at half the first frequency, a fortieth of its period as the time step, the seed's
+    inelastic rule."""
     model = build(COARSE, COMM)
     problem = model.problem("face")
     f1 = lowest_frequency(model.system)
@@ -122,7 +126,8 @@ def test_defaults_of_a_problem():
     [Wall(triangles=True), Wall(size=0.9), Wall(size=0.9, triangles=True), Wall(divisions=(5, 7))],
 )
 def test_other_meshes_are_the_same_wall(wall):
-    """First frequency within 3 % and the mean sag of the top under its weight within 0.5 %, on irregular meshes too."""
+    """First frequency within 3 % and the mean sag of the top under its weight within 0.5 %, on
+    irregular meshes too."""
     model = build(wall, COMM, weight=True)
     f1 = lowest_frequency(build(Wall(), COMM).system)
     assert lowest_frequency(model.system) == pytest.approx(f1, rel=0.03)
@@ -137,7 +142,8 @@ def test_other_meshes_are_the_same_wall(wall):
 
 @pytest.mark.serial
 def test_contact_points_need_nodes_near_them():
-    """Eleven contact points on six elements are refused: one by one too far away, or two on one node."""
+    """Eleven contact points on six elements are refused: one by one too far away, or two on one
+    node."""
     with pytest.raises(
         InputError, match=r"contact point \(6, 2.25\) is 0.75 m away from boundary group 'face'"
     ):
@@ -147,8 +153,9 @@ def test_contact_points_need_nodes_near_them():
 
 
 def test_the_ground_accelerates_the_whole_mass():
-    """All that stands above the middle of the lowest row of elements hangs on the free nodes. The convention of the
-    catalogue leaves out a sixth of that row more, 1.4 % of the force; it must be asked for by name."""
+    """All that stands above the middle of the lowest row of elements hangs on the free nodes. The
+    convention of the catalogue leaves out a sixth of that row more, 1.4 % of the force; it must be
+    asked for by name."""
     whole, catalogue = (
         build(Wall(), COMM, **word).system for word in ({}, {"base_inertia": "catalogue"})
     )
@@ -176,7 +183,8 @@ def built_in(*given: str, **short: Any) -> Case:
 
 
 def test_which_mass_a_run_shakes():
-    """All of it under a record; under the harmonic of the figures what their reference numbers have; or as asked."""
+    """All of it under a record; under the harmonic of the figures what their reference numbers
+    have; or as asked."""
     conventions = {
         True: (built_in(motion="f"), built_in(motion="f,g"), built_in("system.base_inertia=true")),
         False: (
@@ -252,7 +260,8 @@ def test_the_case_that_ships_is_the_wall_of_the_figures():
 
 
 def test_gravity_stage_with_contact_then_shaking():
-    """Poisson's ratio 0.2: the weight presses the wall against the ground; the run goes on from there, certified."""
+    """Poisson's ratio 0.2: the weight presses the wall against the ground; the run goes on from
+    there, certified."""
     wall = Wall(divisions=(4, 6), material=LinearElastic(E=2.0e10, nu=0.2, rho=2400.0))
     model = build(wall, COMM, weight=True)
     problem = model.problem("face")

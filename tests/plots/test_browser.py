@@ -1,4 +1,5 @@
-"""The report in headless Chromium: curves are drawn, tables are sorted, and neither texts nor foreign scripts run."""
+"""The report in headless Chromium: curves are drawn, tables are sorted, and neither texts nor
+foreign scripts run."""
 
 from __future__ import annotations
 
@@ -72,7 +73,8 @@ def test_curves_are_drawn_and_no_text_of_a_file_runs(page: Path) -> None:
 
 
 def test_tables_are_sorted(page: Path) -> None:
-    """By a number, falling and rising; by a name. Without the policy, so that the test may click."""
+    """By a number, falling and rising; by a name. Without the policy, so that the test may
+    click."""
     text = re.sub(r"<meta http-equiv[^>]*>", "", page.read_text(encoding="utf-8"))
     click = """<script>
 const table = [...document.querySelectorAll("table.sortable")].at(-1), found = [];

@@ -1,5 +1,5 @@
-"""Pictures of contact in space, drawn from the folder of a small run with friction between blocks whose meshes do not
-match: what they show is what was recorded."""
+"""Pictures of contact in space, drawn from the folder of a small run with friction between blocks
+whose meshes do not match: what they show is what was recorded."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ STEPS, DT = 30, 1e-3
 
 
 def rubbed(folder: Path, simplices: bool) -> RunFolder:
-    """A block of 3 x 3 x 3 cells on one of 4 x 2 x 4, which is wider by half of it; pressed and pushed aside."""
+    """A block of 3 x 3 x 3 cells on one of 4 x 2 x 4, which is wider by half of it; pressed and
+    pushed aside."""
     lower, upper = (
         BlockMesh(lengths=lengths, divisions=divisions, simplices=simplices)
         for lengths, divisions in (((2.0, 1.0, 2.0), (4, 2, 4)), ((1.0, 1.0, 1.0), (3, 3, 3)))
@@ -91,8 +92,9 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 @pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra"])
 def test_what_belongs_to_whom(runs: Any, kind: str) -> None:
-    """Bodies by what their cells share; the surface of both; the sides of the face are those of the upper block alone,
-    though the lower one has nodes at the same places; their shares are as large as the weights."""
+    """Bodies by what their cells share; the surface of both; the sides of the face are those of the
+    upper block alone, though the lower one has nodes at the same places; their shares are as large
+    as the weights."""
     run, frames = runs[kind], read_frames(runs[kind])
     per_cell, per_side = (1, 1) if kind == "hexahedra" else (6, 2)
     assert np.bincount(frames.bodies).tolist() == [32 * per_cell, 27 * per_cell]
@@ -159,8 +161,8 @@ def test_faces(runs: Any, figures: list[Any], tmp_path: Path) -> None:
 
 
 def test_curved_faces_and_corners(tmp_path: Path, figures: list[Any]) -> None:
-    """A bent base is one face, in projection, and a side of the same body another; the edge between them has conditions
-    on both. Nothing rubs: closed points are said to be closed."""
+    """A bent base is one face, in projection, and a side of the same body another; the edge between
+    them has conditions on both. Nothing rubs: closed points are said to be closed."""
 
     def bend(x: Any) -> Any:
         return np.column_stack([x[:, :2], x[:, 2] + 0.4 * (1.0 - x[:, 2]) * x[:, 1] ** 2])
@@ -226,7 +228,8 @@ def test_faces_without_fields(runs: Any, figures: list[Any], tmp_path: Path) -> 
 
 
 def test_deformed_bodies(runs: Any, figures: list[Any], tmp_path: Path) -> None:
-    """The outside of both bodies, displaced as the title tells, coloured by the stress of the cells behind it."""
+    """The outside of both bodies, displaced as the title tells, coloured by the stress of the cells
+    behind it."""
     run, frames = runs["hexahedra"], read_frames(runs["hexahedra"])
     plot_deformed(run, tmp_path / "bodies.png", times=[0.0, 0.0205], magnified=7.0, title="Blocks")
     assert figures[0]._suptitle.get_text() == "Blocks (displacements x 7)"
@@ -252,7 +255,8 @@ def test_deformed_bodies(runs: Any, figures: list[Any], tmp_path: Path) -> None:
 
 
 def test_points_that_pull() -> None:
-    """Held points may pull: then zero is in the middle of the colours, else at their end, where it alone is white."""
+    """Held points may pull: then zero is in the middle of the colours, else at their end, where it
+    alone is white."""
     pulling, pushing = (
         Painter.of_pressure(1.0e3 * np.array(values)) for values in ((-2.0, 1.0), (0.0, 1.0))
     )
@@ -267,7 +271,8 @@ def test_points_that_pull() -> None:
 
 
 def test_moments() -> None:
-    """When most happens: the largest uplift, or pressure where all was open at the start, or displacement."""
+    """When most happens: the largest uplift, or pressure where all was open at the start, or
+    displacement."""
     t = np.arange(4.0)
     uplift, pressure, u = np.array(
         [[0.0, 0.1, 0.5, 0.2], [np.nan, 3.0, 1.0, 2.0], [0.0, 1.0, 2.0, -3.0]]
@@ -311,7 +316,8 @@ def test_all_pictures_of_a_run(
 def test_films_and_what_is_no_film(
     runs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A film of bodies whose contact was not recorded; other files, columns and damaged folders in one sentence."""
+    """A film of bodies whose contact was not recorded; other files, columns and damaged folders in
+    one sentence."""
     run = runs["tetrahedra"]
     with plain_pictures():
         assert (
@@ -351,8 +357,8 @@ def test_a_film_of_ffmpeg(runs: Any, tmp_path: Path) -> None:
 
 
 def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """What a stand-in for pyvista gets: both bodies displaced with the stress of every side, the contact face with its
-    pressures; without pyvista one sentence."""
+    """What a stand-in for pyvista gets: both bodies displaced with the stress of every side, the
+    contact face with its pressures; without pyvista one sentence."""
     run, frames, calls = runs["tetrahedra"], read_frames(runs["tetrahedra"]), []
 
     class PolyData:
@@ -398,7 +404,8 @@ def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     "high", [(0.5, 6.0), (0.1, 6.0), (2.0, 6.0), (4.0, 6.0), (6.0, 0.5), (1.3, 1.0)]
 )
 def test_numbers_on_slender_panels_do_not_overlap(high: tuple[float, float]) -> None:
-    """In panels of the size of plot_deformed, with the body displaced to negative x; some numbers are left."""
+    """In panels of the size of plot_deformed, with the body displaced to negative x; some numbers
+    are left."""
     figure, axes = faces.sheet([True], 1, (4.2, 3.8))
     axis = axes[0, 0]
     faces.limit(axis, np.array([-0.6 * high[0], 0.0]), np.array(high), margin=0.03)

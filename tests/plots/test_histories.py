@@ -89,7 +89,8 @@ def lines(axis: Any) -> dict[str, np.ndarray]:
 
 
 def test_displacements_are_drawn_in_a_readable_unit(tmp_path, figures):
-    """6e-5 m at most: micrometres, the same scale in every panel; bound at zero for contact points only."""
+    """6e-5 m at most: micrometres, the same scale in every panel; bound at zero for contact points
+    only."""
     h = history()
     plotting.plot_points(h, ["4", "6", "12"], tmp_path / "p.png", title="Wall", unilateral=["4"])
     axes = figures[0].axes
@@ -136,7 +137,8 @@ def test_length_unit():
 
 
 def test_nothing_happened(tmp_path):
-    """All zeros, and a single step: drawn without a warning; the many zeros without the care for how they look."""
+    """All zeros, and a single step: drawn without a warning; the many zeros without the care for
+    how they look."""
     for n in (2, 401):
         h = {name: np.zeros_like(values) for name, values in history(n).items()} | {
             "t": np.linspace(0.0, 1.0, n)

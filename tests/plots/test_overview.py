@@ -34,7 +34,8 @@ def curves(axis: Any) -> dict[str, Any]:
 
 
 def test_probes_force_ledger_and_certificates(tmp_path: Path) -> None:
-    """The curves are the columns in the unit of their axis; a run that is read back gives the same figure."""
+    """The curves are the columns in the unit of their axis; a run that is read back gives the same
+    figure."""
     solution = run(vc.Energy(), vc.Contact(), vc.Probe({"end": (5.0,)}), out=tmp_path)
     for one in (solution, vc.read_run(tmp_path)):
         figure = one.plot() if one is solution else plot_overview(one)

@@ -1,4 +1,5 @@
-"""Pictures of the buried channel, drawn from a small run: what they show is what was recorded (V4.2)."""
+"""Pictures of the buried channel, drawn from a small run: what they show is what was recorded
+(V4.2)."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ SHAPE = ChannelMesh(width=12.0, depth=6.0, size=1.0)
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[ChannelModel, Any, Path]:
-    """(model, history, folder) of a coarse channel in its weight, shaken until its walls have opened."""
+    """(model, history, folder) of a coarse channel in its weight, shaken until its walls have
+    opened."""
     from mpi4py import MPI
 
     model = build(Channel(SHAPE), MPI.COMM_WORLD)
@@ -87,7 +89,8 @@ def check(path: Path, figure: Any) -> None:
 
 
 def test_the_outline_runs_down_along_and_up(run: Any) -> None:
-    """Left wall 0 to 3 m, base to 7 m, right wall to 10 m; conditions at a corner in the order of their sides."""
+    """Left wall 0 to 3 m, base to 7 m, right wall to 10 m; conditions at a corner in the order of
+    their sides."""
     model, _, _ = run
     found = outline(model)
     places = dict(
@@ -116,7 +119,8 @@ def test_the_outline_runs_down_along_and_up(run: Any) -> None:
 
 
 def test_openings_are_the_gaps_of_the_contact(run: Any, tmp_path: Path, figures: list[Any]) -> None:
-    """V4.2, Fig. 7: at every point and normal the gap that Contact() records; drawn in millimetres."""
+    """V4.2, Fig. 7: at every point and normal the gap that Contact() records; drawn in
+    millimetres."""
     model, history, _ = run
     gaps, compared = np.reshape(history["gap"], (STEPS + 1, -1)), 0
     for label, normal in [
@@ -156,7 +160,8 @@ def test_rocking_and_runs_beside_each_other(run: Any, tmp_path: Path, figures: l
 
 
 def test_maps_and_envelopes(run: Any, tmp_path: Path, figures: list[Any]) -> None:
-    """Where a map shows an opening it shows no pressure, and one of them everywhere; envelopes reach the extremes."""
+    """Where a map shows an opening it shows no pressure, and one of them everywhere; envelopes
+    reach the extremes."""
     model, history, _ = run
     runs = {"one": history, "two": history}
     with warnings.catch_warnings():
@@ -234,7 +239,8 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_pictures_of_a_plane_run_from_its_folder_alone(run: Any, tmp_path: Path) -> None:
-    """What a run of the command left is enough: deformed bodies, film; histories and the map of the contact."""
+    """What a run of the command left is enough: deformed bodies, film; histories and the map of the
+    contact."""
     read = read_run(run[2])
     with plain_pictures():  # how they are arranged is seen above
         drawn = draw_run(read, tmp_path, title="Channel")

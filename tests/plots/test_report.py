@@ -1,4 +1,5 @@
-"""Run folders read back, the pages of a report, its commands, and the example of docs/guide/outputs.md."""
+"""Run folders read back, the pages of a report, its commands, and the example of
+docs/guide/outputs.md."""
 
 from __future__ import annotations
 
@@ -123,7 +124,8 @@ def pages(
 def test_pages_of_a_channel(
     solved: tuple[Path, vc.Solution], monkeypatch: Any, tmp_path: Path
 ) -> None:
-    """Every axis is labelled and holds something, maps go by arc length, texts stay on the page; no warnings."""
+    """Every axis is labelled and holds something, maps go by arc length, texts stay on the page; no
+    warnings."""
     run = channel(read_run(solved[0]))
     sections = sections_of(run, {})
     axes, words = pages(run, tmp_path / "page.pdf", monkeypatch, sections)
@@ -165,7 +167,8 @@ def test_pages_of_a_channel(
 
 
 def test_what_was_not_recorded_has_no_section(solved: tuple[Path, vc.Solution]) -> None:
-    """A run that recorded one probe and was not shaken: its history, the certificates, the peaks; chosen columns."""
+    """A run that recorded one probe and was not shaken: its history, the certificates, the peaks;
+    chosen columns."""
     run = read_run(solved[0])
     names = ("t", "k", "iterations", "certificate", "escalated", "a_g_x", "u_x_end")
     bare = replace(
@@ -206,8 +209,9 @@ def table(sections: list[Section], title: str, place: int = 0) -> dict[str, dict
 
 
 def test_numbers_of_the_report(tmp_path: Path) -> None:
-    """Closed forms: peaks, height at the largest thrust, what is left of the slip, safety, a sine with the jump of
-    one step, the spectrum of a harmonic motion at short periods, the ledger over its largest energy (V11.2)."""
+    """Closed forms: peaks, height at the largest thrust, what is left of the slip, safety, a sine
+    with the jump of one step, the spectrum of a harmonic motion at short periods, the ledger over
+    its largest energy (V11.2)."""
     dt, n = 0.005, 2001
     t = dt * np.arange(n)
     thrust = 1e5 * (1.0 + np.sin(np.pi * t / t[-1]))  # largest in the middle
@@ -267,8 +271,8 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
 
 
 def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
-    """A velocity jump of 1 m/s in one step: raw peaks double with every half step, those below 25 Hz are 51 m/s²
-    (V11.2)."""
+    """A velocity jump of 1 m/s in one step: raw peaks double with every half step, those below 25
+    Hz are 51 m/s² (V11.2)."""
     found = []
     for dt in (4e-3, 2e-3, 1e-3):
         a = np.zeros(round(4.0 / dt) + 1)
@@ -289,7 +293,8 @@ def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
 
 
 def test_the_model_as_it_was_described(tmp_path: Path) -> None:
-    """Bodies, supports, contact, periods and sketch of model.json; odd and damaged ones are no tracebacks."""
+    """Bodies, supports, contact, periods and sketch of model.json; odd and damaged ones are no
+    tracebacks."""
     wave = np.sin(np.arange(40.0))
     model = {
         "title": "$",

@@ -1,4 +1,5 @@
-"""The report as one HTML file: nothing is loaded, every text is escaped, extremes stay, it is small."""
+"""The report as one HTML file: nothing is loaded, every text is escaped, extremes stay, it is
+small."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ def without_scripts(page: str) -> str:
 
 
 def hostile(folder: Path) -> Path:
-    """A run whose every text is an attack: title, names of columns, meanings, units, facts, groups, materials."""
+    """A run whose every text is an attack: title, names of columns, meanings, units, facts, groups,
+    materials."""
     wave = np.sin(0.1 * np.arange(400.0))
     columns = {
         f"u_x_{EVIL}": (f"m{BREAK}", BREAK, wave),
@@ -92,7 +94,8 @@ def test_every_text_is_escaped_and_nothing_is_loaded(page: Path) -> None:
 
 
 def test_thirty_seconds_are_small_and_extremes_stay(tmp_path: Path) -> None:
-    """30 s at 1 ms with 60 columns: below 10 MB, and every curve has the largest and smallest value of its column."""
+    """30 s at 1 ms with 60 columns: below 10 MB, and every curve has the largest and smallest value
+    of its column."""
     random, count = np.random.default_rng(1), 30_001
     columns = {
         f"u_{axis}_p{k}": ("m", "displacement", random.standard_normal(count))
@@ -136,7 +139,8 @@ def test_extremes() -> None:
 
 
 def test_checks_and_doubtful_peaks(page: Path) -> None:
-    """Rows of raw accelerations are marked; without --refine the page says that nobody looked at discretisation."""
+    """Rows of raw accelerations are marked; without --refine the page says that nobody looked at
+    discretisation."""
     text = without_scripts(page.read_text(encoding="utf-8"))
     rows = re.findall(r"<tr class=\"doubtful\">\s*<td>([^<]*)</td>", text)
     assert rows == ["a_x_top"]

@@ -1,4 +1,5 @@
-"""A function called after every step sees what march yields, in its order, and may end a run with nothing lost."""
+"""A function called after every step sees what march yields, in its order, and may end a run with
+nothing lost."""
 
 from __future__ import annotations
 
@@ -80,7 +81,8 @@ def test_arrays_are_read_only_and_no_scheme_minds(scheme: Any) -> None:
 
 
 def test_reports_are_read_only_and_the_problem_stays_as_it_was(comm: Any) -> None:
-    """The bound of a step is the gap of the problem itself: written into, later runs would have another one."""
+    """The bound of a step is the gap of the problem itself: written into, later runs would have
+    another one."""
     problem, met = shaken_wall(comm), []
     before = vc.simulate(problem, **RUN, steps=5)
 
@@ -102,7 +104,8 @@ def test_reports_are_read_only_and_the_problem_stays_as_it_was(comm: Any) -> Non
 
 
 def test_true_ends_the_run_and_a_restart_goes_on(comm: Any, shared_tmp: Path) -> None:
-    """Asked by one rank alone, in the middle of a halved step: the base step is ended, all is written."""
+    """Asked by one rank alone, in the middle of a halved step: the base step is ended, all is
+    written."""
     problem, dt = shaken_wall(comm), vc.HalvedAtImpact(WALL_DT, 2)
     whole = vc.simulate(problem, **(RUN | {"dt": dt}), steps=30)
     parts = np.flatnonzero(np.diff(whole.history["t"]) < 0.9 * WALL_DT)
@@ -128,7 +131,8 @@ def test_true_ends_the_run_and_a_restart_goes_on(comm: Any, shared_tmp: Path) ->
 
 
 def test_what_it_raises_ends_the_run_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
-    """On one rank only: rows, checkpoint and the reason are in the folder, on any number of ranks."""
+    """On one rank only: rows, checkpoint and the reason are in the folder, on any number of
+    ranks."""
     problem = shaken_wall(comm)
     seen = Seen(7, lambda: fail() if comm.rank == comm.size - 1 else None)
     words = r"the callback after step 7, t = 0\.0125 s: it ended in ValueError: too large \(test_callback\.py, line \d"
@@ -147,7 +151,8 @@ def test_what_it_raises_ends_the_run_on_all_ranks(comm: Any, shared_tmp: Path) -
 
 
 def test_of_many_runs_each_has_its_own(comm: Any) -> None:
-    """One fails, one stops, one goes on: in one group of rows on one rank, one by one on several."""
+    """One fails, one stops, one goes on: in one group of rows on one rank, one by one on
+    several."""
     base = shaken_wall(comm)
     problems = [
         replace(base, excitation=replace(base.excitation, amplitude=a)) for a in (3.0, 2.0, 1.0)

@@ -1,4 +1,5 @@
-"""Checkpoint and restart: the straight run to the last bit on one rank, to round-off on as many, to 1e-10 on others."""
+"""Checkpoint and restart: the straight run to the last bit on one rank, to round-off on as many, to
+1e-10 on others."""
 
 from __future__ import annotations
 
@@ -52,7 +53,8 @@ from vi_contact.solvers import Iterative
     ids=repr,
 )
 def test_restart_to_the_last_bit(tmp_path: Path, scheme: Any, impact: Any) -> None:
-    """A run continued from its checkpoint has the state and the histories of the straight run, byte for byte."""
+    """A run continued from its checkpoint has the state and the histories of the straight run, byte
+    for byte."""
     problem = chain(impact=impact)
     straight = run(tmp_path / "straight", problem=problem, scheme=scheme)
     run(tmp_path / "parts", 130, problem=problem, scheme=scheme)
@@ -76,7 +78,8 @@ def test_restart_from_before_the_last_row(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_restart_into_another_folder(tmp_path: Path) -> None:
-    """The old folder stays as it was, the new one holds the whole history; so does a solution without a folder."""
+    """The old folder stays as it was, the new one holds the whole history; so does a solution
+    without a folder."""
     run(tmp_path / "old", 120)
     before = {path: path.read_bytes() for path in (tmp_path / "old").iterdir()}
     run(tmp_path / "new", restart=tmp_path / "old")
@@ -89,7 +92,8 @@ def test_restart_into_another_folder(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_restart_of_a_finished_run(tmp_path: Path) -> None:
-    """Nothing is left to do: the same solution. t_end counts from the start of the whole run, to the step."""
+    """Nothing is left to do: the same solution. t_end counts from the start of the whole run, to
+    the step."""
     done = run(tmp_path, 400)
     again = run(tmp_path, None, t_end=400 * 5e-3, restart=True)
     assert again.state.k == 400 and difference(again.state, done.state) == 0.0
@@ -109,7 +113,8 @@ def test_start_with_a_step_number(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_what_cannot_be_continued_is_told(tmp_path: Path) -> None:
-    """Another dt, scheme or problem, other recorders, no checkpoint: one sentence, and nothing is touched."""
+    """Another dt, scheme or problem, other recorders, no checkpoint: one sentence, and nothing is
+    touched."""
     run(tmp_path, 60)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     wrong: list[tuple[str, dict[str, Any]]] = [
@@ -160,7 +165,8 @@ run(Path({out!r}), 10**6, checkpoint_every=10)
 
 @pytest.mark.serial
 def test_kill_9(tmp_path: Path) -> None:
-    """kill -9 in full flight: every row written is whole, the checkpoint is, and the run goes on to the last bit."""
+    """kill -9 in full flight: every row written is whole, the checkpoint is, and the run goes on to
+    the last bit."""
     tests, package = str(Path(__file__).parents[1] / "support"), str(Path(__file__).parents[2])
     code = KILLED.format(tests=tests, out=str(tmp_path / "killed"))
     child = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": package})
@@ -178,7 +184,8 @@ def test_kill_9(tmp_path: Path) -> None:
     assert equal_files(tmp_path / "killed", tmp_path / "straight")
 
 
-# Any number of ranks --------------------------------------------------------------------------------------------------
+# Any number of ranks
+# --------------------------------------------------------------------------------------------------
 
 
 def test_restart_on_the_same_ranks(comm: Any, shared_tmp: Path) -> None:
@@ -212,7 +219,8 @@ FRICTIONAL = {"impulses": (MoreauJean(), ConsistentMass()), "massless": (Trapezo
 def test_restart_with_friction_on_the_same_ranks(
     comm: Any, shared_tmp: Path, scheme: Any, mass: Any
 ) -> None:
-    """A box that lands, rubs and begins to lift; reactions and slips too go on as in the straight run."""
+    """A box that lands, rubs and begins to lift; reactions and slips too go on as in the straight
+    run."""
     pytest.importorskip("dolfinx")
     problem = rubbing_box(comm, mass)
     settings: dict[str, Any] = {"scheme": scheme, "dt": 2e-3, "record": [Energy(), Contact()]}
@@ -231,7 +239,8 @@ def test_restart_with_friction_on_the_same_ranks(
 def test_arrays_of_many_points_are_gathered_on_one_rank(
     comm: Any, shared_tmp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a default run nothing else is, checkpoint and restart included; every rank reads the same from the file."""
+    """Of a default run nothing else is, checkpoint and restart included; every rank reads the same
+    from the file."""
     pytest.importorskip("dolfinx")
     straight = run_wall(comm, None, 27)
 
@@ -261,7 +270,8 @@ def test_arrays_of_many_points_are_gathered_on_one_rank(
 
 
 def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path) -> None:
-    """The default scheme on its own mass matrix does not go on with the consistent one; the sentence names both."""
+    """The default scheme on its own mass matrix does not go on with the consistent one; the
+    sentence names both."""
     pytest.importorskip("dolfinx")
     box = rubbing_box(comm, None)
     settings: dict[str, Any] = {"scheme": Trapezoidal(), "dt": 1e-3, "out": shared_tmp}
@@ -275,7 +285,8 @@ def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path
 
 
 def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
-    """A checkpoint of one rank goes on on all of them, and one of all of them on one: the histories agree to 1e-10."""
+    """A checkpoint of one rank goes on on all of them, and one of all of them on one: the histories
+    agree to 1e-10."""
     pytest.importorskip("dolfinx")
     from mpi4py import MPI
 

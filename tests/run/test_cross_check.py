@@ -136,8 +136,9 @@ class WrongWhenClosing(Off):
 
 
 def test_attempts_that_were_thrown_away_do_not_count():
-    """HalvedAtImpact: every step that closes a point is halved, down to the last halving. Another solver that is wrong
-    in nothing but the attempts agrees, and as many steps are compared as were accepted."""
+    """HalvedAtImpact: every step that closes a point is halved, down to the last halving. Another
+    solver that is wrong in nothing but the attempts agrees, and as many steps are compared as were
+    accepted."""
     problem, base, plan = shaken(), 5e-3, HalvedAtImpact(5e-3, halvings=3)
     accepted = list(run(problem, HALF, dt=plan, steps=200))
     assert len(accepted) > 200 + 3 * 3
@@ -193,7 +194,8 @@ class HalfTheFriction(Off):
 
 
 def test_friction_is_compared():
-    """r_t counts where there is friction, at its own size, and is in the report; missing is wrong by as much as all."""
+    """r_t counts where there is friction, at its own size, and is in the report; missing is wrong
+    by as much as all."""
     solvers = [
         Condensed(),
         HalfTheFriction(1.0, 0.5),

@@ -1,4 +1,5 @@
-"""A run touches no file that is not its own: neither what links in its folder lead to, nor others beside its own."""
+"""A run touches no file that is not its own: neither what links in its folder lead to, nor others
+beside its own."""
 
 from __future__ import annotations
 
@@ -60,7 +61,8 @@ def with_fields(folder: Path, steps: int = 4, **more: Any) -> Any:
 def test_links_in_the_folder_are_not_followed(
     tmp_path: Path, notes: Path, name: str, hard: bool, earlier: bool
 ) -> None:
-    """A link at any name that a run writes: refused, or replaced by a file; a hard link likewise."""
+    """A link at any name that a run writes: refused, or replaced by a file; a hard link
+    likewise."""
     folder = tmp_path / "run"
     if earlier:
         run(folder, 5)
@@ -129,7 +131,8 @@ def test_a_link_to_a_folder_is_no_folder_of_fields(tmp_path: Path) -> None:
 
 
 def test_files_of_others_stay(tmp_path: Path) -> None:
-    """Beside the run, among its frames, and with names that only look like ours; through a second and a shorter run."""
+    """Beside the run, among its frames, and with names that only look like ours; through a second
+    and a shorter run."""
     folder = tmp_path / "run"
     (folder / FIELDS).mkdir(parents=True)
     theirs = [
@@ -178,7 +181,8 @@ def test_a_folder_with_files_of_others_is_refused(tmp_path: Path, name: str) -> 
 
 
 def test_a_run_that_was_killed_early_is_known(tmp_path: Path) -> None:
-    """Its mark is there before its other files; a history without a mark, of which files were copied, is known too."""
+    """Its mark is there before its other files; a history without a mark, of which files were
+    copied, is known too."""
     run(tmp_path, 5)
     (tmp_path / "format.json").unlink()
     assert len(run(tmp_path, 9, restart=True).history["t"]) == 10

@@ -1,4 +1,5 @@
-"""The run folder: formats other programs read, sentences when the disk refuses, whole files at any moment."""
+"""The run folder: formats other programs read, sentences when the disk refuses, whole files at any
+moment."""
 
 from __future__ import annotations
 
@@ -52,12 +53,14 @@ def run(out: Path | None, steps: int = 30, **more: Any) -> Solution:
     return simulate(problem, steps=steps, record=record, out=out, **(settings | more))
 
 
-# What other programs read --------------------------------------------------------------------------------------------
+# What other programs read
+# --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.serial
 def test_csv_to_the_last_bit(tmp_path: Path) -> None:
-    """history.csv: first column t, a line per step, read by numpy with names, equal to the history to the last bit."""
+    """history.csv: first column t, a line per step, read by numpy with names, equal to the history
+    to the last bit."""
     solution = run(tmp_path / "new" / "folder")
     path = tmp_path / "new" / "folder" / "history.csv"
     header = path.read_text().splitlines()[0].split(",")
@@ -73,7 +76,8 @@ def test_csv_to_the_last_bit(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_units_are_documented(tmp_path: Path) -> None:
-    """Every column has a unit and a meaning, in columns.json and as attributes in history.h5, which has arrays too."""
+    """Every column has a unit and a meaning, in columns.json and as attributes in history.h5, which
+    has arrays too."""
     solution = run(tmp_path)
     columns = json.loads((tmp_path / "columns.json").read_text())
     assert list(columns) == list(solution.columns) and all(
@@ -124,7 +128,8 @@ def test_strict_json() -> None:
     assert json.loads(text) == {"a": 0.1, "b": None, "c": {"d": None}, "e": [0, 1], "f": True}
 
 
-# The disk refuses ----------------------------------------------------------------------------------------------------
+# The disk refuses
+# ----------------------------------------------------------------------------------------------------
 
 
 def test_every_rank_gets_the_sentence(comm: Any) -> None:
@@ -173,7 +178,8 @@ def test_sentences() -> None:
 
 @pytest.mark.serial
 def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Told before any work: not a folder, or one that takes no file (mocked, as root may write anywhere)."""
+    """Told before any work: not a folder, or one that takes no file (mocked, as root may write
+    anywhere)."""
     (tmp_path / "file").write_text("")
     asked: list[int] = []
     monkeypatch.setattr(
@@ -199,7 +205,8 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def no_room_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The disk is full whenever a file of this name is written, by whichever module of the package."""
+    """The disk is full whenever a file of this name is written, by whichever module of the
+    package."""
 
     def full(file: Any, data: bytes) -> None:
         if Path(str(file.name)).name == name:
@@ -278,7 +285,8 @@ class Disk:
 def test_disk_fills_up_during_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int
 ) -> None:
-    """The run stops with a sentence; every line before is whole, and the restart equals the straight run."""
+    """The run stops with a sentence; every line before is whole, and the restart equals the
+    straight run."""
     disk = Disk(room)
     monkeypatch.setattr(history_module, "write_all", disk)
     with pytest.raises(ViContactError, match="the disk is full"):
@@ -329,7 +337,8 @@ def test_run_folder_leaves_no_trace(tmp_path: Path) -> None:
     assert list(run_folder(SerialComm(), tmp_path / "a" / "b").iterdir()) == []
 
 
-# Histories on disk ---------------------------------------------------------------------------------------------------
+# Histories on disk
+# ---------------------------------------------------------------------------------------------------
 
 
 COLUMNS = {
@@ -374,7 +383,8 @@ def read(folder: Path, k: int) -> list[Block]:
 @pytest.mark.serial
 @pytest.mark.parametrize("cut", [0, 5])
 def test_arrays_survive_in_the_journal(tmp_path: Path, cut: int) -> None:
-    """Rows that history.h5 does not have yet come from the journal, but for a record the crash cut short."""
+    """Rows that history.h5 does not have yet come from the journal, but for a record the crash cut
+    short."""
     files = written(tmp_path, 8, save_at=3)
     journal = tmp_path / "history.journal"
     journal.write_bytes(journal.read_bytes()[: journal.stat().st_size - cut])
@@ -422,7 +432,8 @@ def test_damaged_histories_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beyond a number of bytes the memory lets go of rows; histories, facts and restart are the same."""
+    """Beyond a number of bytes the memory lets go of rows; histories, facts and restart are the
+    same."""
     kept = run(tmp_path / "kept", 300)
     monkeypatch.setattr("vi_contact.run.files.table.KEPT", 10_000)
     long = run(tmp_path / "long", 280)
@@ -451,7 +462,8 @@ def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.serial
 def test_memory_does_not_grow_with_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a folder the bytes of the numbers, some hundred a step; with one nothing beyond what is kept at most."""
+    """Without a folder the bytes of the numbers, some hundred a step; with one nothing beyond what
+    is kept at most."""
     monkeypatch.setattr("vi_contact.run.files.table.KEPT", 0)
     made: Any = {"iterations": 2, "certificate": 1e-12, "escalated": 0} | {
         f"c{i}": 1.0 for i in range(35)
@@ -490,14 +502,16 @@ def test_hdf5_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.serial
 def test_folders_of_another_format(tmp_path: Path) -> None:
-    """Folder and checkpoint carry a number; an unknown one is refused, a folder without one is read."""
+    """Folder and checkpoint carry a number; an unknown one is refused, a folder without one is
+    read."""
     run(tmp_path, 10)
     about = tmp_path / "format.json"
     assert json.loads(about.read_text())["format"] == 1
     for text, words in (
         (
             '{"format": 2}',
-            r"has format 2 and this version of vi_contact reads 1: read it with the version that wrote",
+            r"has format 2 and this version of vi_contact reads 1: read it with the version that "
+            r"wrote",
         ),
         ('{"format": true}', "has format True"),
         ("[]", "'.*format.json' is damaged"),
@@ -515,7 +529,8 @@ def test_folders_of_another_format(tmp_path: Path) -> None:
 def test_rows_wait_for_each_other_but_not_for_long(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Rows are written in blocks: before every checkpoint, and when the next step might make one late."""
+    """Rows are written in blocks: before every checkpoint, and when the next step might make one
+    late."""
     monkeypatch.setattr("vi_contact.run.files.writer.LATEST", 1e9)
     path, found = tmp_path / "history.csv", {}
 

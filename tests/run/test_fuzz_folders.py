@@ -1,7 +1,9 @@
-"""Damaged checkpoints and run folders: refused in one sentence, or read with the numbers that are on file; never else.
+"""Damaged checkpoints and run folders: refused in one sentence, or read with the numbers that are
+on file; never else.
 
-Bits flipped, ends cut off, archives and HDF5 files rewritten with missing, renamed, reshaped and retyped arrays, texts
-with other numbers: by dice with a seed. A mutation that survives must give what the folder gave before it.
+Bits flipped, ends cut off, archives and HDF5 files rewritten with missing, renamed, reshaped and
+retyped arrays, texts with other numbers: by dice with a seed. A mutation that survives must give
+what the folder gave before it.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
         """Nothing is saved any more."""
 
     def kill(writer: Writer, *_: Any) -> None:
-        writer._log.close()  # what the end of the process would do: other tests listen to the same logger
+        # what the end of the process would do: other tests listen to the same logger
+        writer._log.close()
         raise Killed
 
     with pytest.MonkeyPatch.context() as patch:
@@ -62,7 +65,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-# Mutations ------------------------------------------------------------------------------------------------------------
+# Mutations
+# ------------------------------------------------------------------------------------------------------------
 
 
 def flipped(data: bytes, dice: Dice) -> bytes:
@@ -111,7 +115,8 @@ TYPES = ("f4", ">f8", "i8", "c16", "U8", "?", "O", "M8[s]", "S3")
 
 
 def rearranged(arrays: Arrays, dice: Dice) -> Arrays:
-    """Arrays that are missing, renamed, reshaped, of other types, with other numbers, or too many."""
+    """Arrays that are missing, renamed, reshaped, of other types, with other numbers, or too
+    many."""
     found, name = (
         dict(arrays),
         str(dice.choice([one for one in arrays if one not in ("about", "checksum")])),
@@ -177,12 +182,14 @@ def mutated(data: bytes, dice: Dice) -> tuple[bytes, bool]:
     return archive((rearranged if kind < 0.85 else described)(arrays, dice), dice), True
 
 
-# Checkpoints ----------------------------------------------------------------------------------------------------------
+# Checkpoints
+# ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.fuzz
 def test_checkpoints(sound: Path, tmp_path: Path) -> None:
-    """160 of them. Where a checksum was forged, numbers may be others, but are finite and of the right shape."""
+    """160 of them. Where a checksum was forged, numbers may be others, but are finite and of the
+    right shape."""
     good = (sound / "checkpoint.npz").read_bytes()
     wanted = read(sound)
     refused = 0
@@ -214,7 +221,8 @@ def read(folder: Path) -> State:
         return read_checkpoint(folder, PROBLEM, scheme=ZienkiewiczWoodTaylor(), dt=5e-3)[0].state
 
 
-# Run folders ----------------------------------------------------------------------------------------------------------
+# Run folders
+# ----------------------------------------------------------------------------------------------------------
 
 
 def other_numbers(path: Path, dice: Dice) -> None:
@@ -287,7 +295,8 @@ def damage(folder: Path, dice: Dice) -> str:
 
 @pytest.mark.fuzz
 def test_folders(sound: Path, tmp_path: Path) -> None:
-    """100 of them: a restart gives the straight run, or one sentence, and no file is changed; so does reading."""
+    """100 of them: a restart gives the straight run, or one sentence, and no file is changed; so
+    does reading."""
     wanted, whole = restarted(sound), read_run(sound).history["u_x_12"]
     with h5py.File(sound / "history.h5") as file:
         rows = len(file["k"])

@@ -1,4 +1,5 @@
-"""Mutated run folders: refused in one sentence, or read with the numbers of the run; so are pictures and films."""
+"""Mutated run folders: refused in one sentence, or read with the numbers of the run; so are
+pictures and films."""
 
 from __future__ import annotations
 
@@ -140,7 +141,8 @@ def mutated(folder: Path, random: Random, names: Sequence[str]) -> dict[str, Any
 
 
 def digit(text: str, random: Random) -> str:
-    """A table with one digit of a number turned into another: what no reader of the table alone can see."""
+    """A table with one digit of a number turned into another: what no reader of the table alone can
+    see."""
     head, rest = text.split("\n", 1)
     places = [k for k, letter in enumerate(rest) if letter.isdecimal()]
     place = random.choice(places)
@@ -170,7 +172,8 @@ FILES = ("history.csv", "columns.json", "summary.json", "history.h5")
 
 @pytest.mark.fuzz
 def test_what_is_read_are_the_numbers_of_the_run(run: Path, tmp_path: Path) -> None:
-    """Whatever was done to one file. A report on it may still be refused: on one row, or on a motion without end."""
+    """Whatever was done to one file. A report on it may still be refused: on one row, or on a
+    motion without end."""
     truth, counts = read_run(run).history, [0, 0]
 
     def check(change: dict[str, Any]) -> None:
@@ -206,7 +209,8 @@ def test_what_is_read_are_the_numbers_of_the_run(run: Path, tmp_path: Path) -> N
 def test_a_table_with_other_numbers_is_refused(
     run: Path, tmp_path: Path, kind: str, row: int
 ) -> None:
-    """It looks like a table in every way; the other copy of the numbers, or their count, tells. The remedy works."""
+    """It looks like a table in every way; the other copy of the numbers, or their count, tells. The
+    remedy works."""
     lines = (run / "history.csv").read_text().split("\n")
     if kind == "digit":
         fields = lines[row - 1].split(",")
@@ -248,8 +252,8 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_commands_end_with_a_file_or_a_sentence(
     drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """plot, film, report (PDF and HTML) and post of a folder with one file mutated: what they wanted to write is there,
-    or a sentence names the file."""
+    """plot, film, report (PDF and HTML) and post of a folder with one file mutated: what they
+    wanted to write is there, or a sentence names the file."""
     frames = [f"fields/{path.name}" for path in sorted((drawn / "fields").iterdir())]
     commands = [
         (["plot"], "deformed.png"),
@@ -300,7 +304,8 @@ def test_commands_end_with_a_file_or_a_sentence(
 
 @pytest.mark.fuzz
 def test_frames_have_the_numbers_of_the_run(drawn: Path, tmp_path: Path) -> None:
-    """Data sets that are missing, renamed, of another shape, kind or place: refused, or not needed."""
+    """Data sets that are missing, renamed, of another shape, kind or place: refused, or not
+    needed."""
     truth = read_frames(drawn)
     wanted = [truth.at(t)[1:] for t in truth.t.tolist()]
     frame = FRAMES.dice(0).choice(sorted(path.name for path in (drawn / "fields").glob("frame_*")))
@@ -398,7 +403,8 @@ def test_arrays_of_other_files_are_not_followed(run: Path, tmp_path: Path) -> No
             read_run(folder)
 
 
-# What the page says of accelerations ---------------------------------------------------------------------------------
+# What the page says of accelerations
+# ---------------------------------------------------------------------------------
 
 
 def test_the_spectrum_begins_at_20_ms(run: Path) -> None:

@@ -1,4 +1,5 @@
-"""A run that is killed at known places, in the middle of its work on files, several times: nothing is lost or wrong."""
+"""A run that is killed at known places, in the middle of its work on files, several times: nothing
+is lost or wrong."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ PLACES = (
 
 
 def counted(patch: pytest.MonkeyPatch, at: int) -> list[int]:
-    """The number of such calls so far; the process is killed before the call of this number, or in its middle."""
+    """The number of such calls so far; the process is killed before the call of this number, or in
+    its middle."""
     seen = [0]
 
     def made(action: Callable[..., Any], writes: bool) -> Callable[..., Any]:

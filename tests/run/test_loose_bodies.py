@@ -1,4 +1,5 @@
-"""Bodies that nothing holds and nothing touches: refused where meshes were not merged, warned of elsewhere."""
+"""Bodies that nothing holds and nothing touches: refused where meshes were not merged, warned of
+elsewhere."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ LOWER = BlockMesh(lengths=(1.0, 1.0), divisions=(4, 4))
 def stacked(
     *, gap: float = 0.0, contact: bool = False, clamp_both: bool = False
 ) -> vc.ContactProblem:
-    """Two blocks one on the other whose meshes share no node; the ground in front of the lower one's left side."""
+    """Two blocks one on the other whose meshes share no node; the ground in front of the lower
+    one's left side."""
     mesh, tags = fem.build_mesh(TwoBlocks(lower=LOWER, upper=LOWER, gap=gap), COMM)
     material = vc.LinearElastic(E=1e9, nu=0.2, rho=2000.0)
     clamped = [tags["lower_bottom"]] + [tags["upper_top"]] * clamp_both
@@ -40,7 +42,8 @@ def run(problem: vc.ContactProblem) -> Any:
 
 
 def test_meshes_that_are_not_merged_are_refused() -> None:
-    """The 25 nodes of the upper block are around (0.5, 1.5) m, and 5 of them lie at nodes of the lower one."""
+    """The 25 nodes of the upper block are around (0.5, 1.5) m, and 5 of them lie at nodes of the
+    lower one."""
     with pytest.raises(
         vc.InputError,
         match=r"nothing holds the body of 25 nodes around \(0.5, 1.5\), and no contact "

@@ -1,4 +1,5 @@
-"""The loop: starts, certificates and escalation, metamorphic tests, static stage, supports on springs."""
+"""The loop: starts, certificates and escalation, metamorphic tests, static stage, supports on
+springs."""
 
 from __future__ import annotations
 
@@ -158,8 +159,9 @@ def test_a_solver_that_cannot_take_the_problem_is_refused_also_for_escalation():
 
 
 def test_static_stage_of_a_bar_standing_on_its_foot():
-    """V2-like, exact at the nodes: a clamped bar pressed onto the wall by its weight; the wall carries what the clamp
-    does not: r = rho g L/2 - E gap/L for a gap that closes, and u from the discrete equations."""
+    """V2-like, exact at the nodes: a clamped bar pressed onto the wall by its weight; the wall
+    carries what the clamp does not: r = rho g L/2 - E gap/L for a gap that closes, and u from the
+    discrete equations."""
     E, L, rho, g, gap = 900.0, 10.0, 1.0, 10.0, 0.1
     problem = bar(20, clamped=True, gravity=g, gap=gap)
     state = static_equilibrium(problem, solver=Condensed())
@@ -203,7 +205,8 @@ def sprung(problem: ContactProblem, modulus: float) -> ContactProblem:
 
 
 def glued(problem: ContactProblem, k: float) -> ContactProblem:
-    """The same spring as a part of K, closed for good: K + k e eᵀ on the contact unknown, which then has no wall."""
+    """The same spring as a part of K, closed for good: K + k e eᵀ on the contact unknown, which
+    then has no wall."""
     system, row = problem.system, int(problem.surface.owned[0])
     extra = np.zeros(system.rows)
     extra[row] = k
@@ -250,7 +253,8 @@ def test_dynamic_spring_that_stays_closed_is_a_spring_of_the_structure(scheme):
 
 
 def test_midpoint_rule_converges_to_the_spring_with_first_order():
-    """Averages of the step meet the spring of its end, r = k u1: first order, and the spring loses ½ k du² a step."""
+    """Averages of the step meet the spring of its end, r = k u1: first order, and the spring loses
+    ½ k du² a step."""
     errors = []
     for dt in (2e-3, 1e-3, 5e-4):
         soft, stiff = sprung(ringing(), 4e3), glued(ringing(), 2e3)
@@ -266,8 +270,8 @@ def test_midpoint_rule_converges_to_the_spring_with_first_order():
 
 
 def test_springs_open():
-    """Unilateral: no tension; the body leaves and comes back; penetration = r/k while closed; energy with the springs'
-    own never grows."""
+    """Unilateral: no tension; the body leaves and comes back; penetration = r/k while closed;
+    energy with the springs' own never grows."""
     problem = sprung(shaken(gap=0.001, excitation=(), damping=0.0, v0=np.ones(6)), 4e4)
     reports = list(run(problem, HALF, dt=5e-3, steps=200))
     assert changes(reports) > 5

@@ -1,4 +1,5 @@
-"""Runs that step together take the steps that they take alone. On several ranks they go one by one."""
+"""Runs that step together take the steps that they take alone. On several ranks they go one by
+one."""
 
 from __future__ import annotations
 
@@ -104,7 +105,8 @@ def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps
 @pytest.mark.parametrize("friction", [None, vc.Coulomb(0.3)])
 @pytest.mark.parametrize("by_supernodes", [True, False])
 def test_bodies_in_space(monkeypatch, steps_together, by_supernodes, friction):
-    """A cube over the ground that it touches: substitutions by supernodes, as where bodies in space are large."""
+    """A cube over the ground that it touches: substitutions by supernodes, as where bodies in space
+    are large."""
     monkeypatch.setattr(contact_last, "SHORT_COLUMNS", 1.0 if by_supernodes else 1e3)
     mesh, tags = fem.build_mesh(
         BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(3, 3, 3)), MPI.COMM_WORLD

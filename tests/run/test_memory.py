@@ -15,7 +15,8 @@ from vi_contact.run.memory import in_words, memory
 
 
 def test_the_summary_counts_the_bytes(comm: Any, shared_tmp: Path) -> None:
-    """Twelve bytes an entry of every matrix that there is, on all ranks together; a peak for every rank."""
+    """Twelve bytes an entry of every matrix that there is, on all ranks together; a peak for every
+    rank."""
     pytest.importorskip("dolfinx")
     problem = wall(comm)
     solution = run_wall(comm, shared_tmp, 3, problem=problem)

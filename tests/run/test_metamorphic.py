@@ -1,4 +1,5 @@
-"""Metamorphic tests of whole runs (section 9 of the verification document): no reference is needed."""
+"""Metamorphic tests of whole runs (section 9 of the verification document): no reference is
+needed."""
 
 from __future__ import annotations
 
@@ -80,7 +81,8 @@ def test_a_gap_that_never_closes_is_no_contact():
 
 
 def test_units_do_not_matter():
-    """Metres or millimetres (K, M in N/mm, t): the same motion, contacts and certificates of the same size."""
+    """Metres or millimetres (K, M in N/mm, t): the same motion, contacts and certificates of the
+    same size."""
     metres = list(run(shaken(), HALF, dt=5e-3, steps=60))
     mm = shaken(gap=10.0, mass=2e-3, stiffness=20.0, excitation=replace(SHAKE, amplitude=-3e4))
     for one, other in zip(metres, run(mm, HALF, dt=5e-3, steps=60), strict=True):
@@ -91,7 +93,8 @@ def test_units_do_not_matter():
 
 @pytest.mark.parametrize("impact", [None, Inelastic()], ids=["none", "inelastic"])
 def test_mirror_symmetry(impact):
-    """A free chain between two walls: shaken the other way, with the gaps exchanged, it moves the other way."""
+    """A free chain between two walls: shaken the other way, with the gaps exchanged, it moves the
+    other way."""
     right = chain_problem(
         5, gap=0.02, left_gap=0.01, floating=True, stiffness=2e4, excitation=SHAKE, impact=impact
     )
@@ -108,7 +111,8 @@ def test_mirror_symmetry(impact):
 
 
 def test_doubled_condition_has_no_effect():
-    """The same bound twice would be two reactions for one motion: refused by name, not shared at random."""
+    """The same bound twice would be two reactions for one motion: refused by name, not shared at
+    random."""
     problem = shaken()
     surface = problem.surface
     twice = {

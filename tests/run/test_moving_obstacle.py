@@ -1,4 +1,5 @@
-"""Obstacles that move towards the body and along it: positions, velocities, and the work they do (V9.7)."""
+"""Obstacles that move towards the body and along it: positions, velocities, and the work they do
+(V9.7)."""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ RUBBING = [SCHEMES[0], *SCHEMES[4:]]
 
 
 def pushed(mass: Any, speed: float = 10.0, **more: Any) -> ContactProblem:
-    """The bar of V1.1 at rest, 5 m above a wall that rises with 10 m/s: V1.1 seen from the wall's rest frame."""
+    """The bar of V1.1 at rest, 5 m above a wall that rises with 10 m/s: V1.1 seen from the wall's
+    rest frame."""
     given = bar(60, gap=5.0, mass=mass, **more)
     return replace(given, surface=given.surface.moving(lambda t: speed * t))
 
@@ -53,11 +55,13 @@ def pushed(mass: Any, speed: float = 10.0, **more: Any) -> ContactProblem:
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme, mass", SCHEMES, ids=[repr(scheme) for scheme, _ in SCHEMES])
 def test_a_rising_wall_is_a_falling_bar(scheme: Any, mass: Any) -> None:
-    """Galilei: the reactions of the bar thrown at the wall at rest, step by step; u differs by the wall's way."""
+    """Galilei: the reactions of the bar thrown at the wall at rest, step by step; u differs by the
+    wall's way."""
     dt, steps = 10.0 / 60 / 30, 260
     thrown = bar(60, gap=5.0, v0=lambda x: np.full_like(x, -10.0), mass=mass)
     one, two = (list(run(p, scheme, dt=dt, steps=steps)) for p in (thrown, pushed(mass)))
-    # the very step that touches rounds differently, so the force of single steps is compared in the mean
+    # the very step that touches rounds differently, so the force of single steps is compared in the
+    # mean
     forces = [
         np.array([float(report.balance.r_n.sum()) for report in reports]) for reports in (one, two)
     ]
@@ -75,7 +79,8 @@ def test_a_rising_wall_is_a_falling_bar(scheme: Any, mass: Any) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme, mass", SCHEMES, ids=[repr(scheme) for scheme, _ in SCHEMES])
 def test_its_work_is_in_the_ledger(scheme: Any, mass: Any) -> None:
-    """The wall's force times its speed is input: with it the ledger closes, and is the energy of the rebound 2 m v²."""
+    """The wall's force times its speed is input: with it the ledger closes, and is the energy of
+    the rebound 2 m v²."""
     problem, work, largest = pushed(mass), 0.0, 0.0
     for report in run(problem, scheme, dt=10.0 / 60 / 30, steps=260):
         step = energy_balance(problem, report.old, before_impact(report), report.balance)
@@ -105,8 +110,9 @@ def test_a_held_point_follows_its_obstacle() -> None:
     ids=[repr(scheme) for scheme, _ in RUBBING],
 )
 def test_a_belt_drags_with_the_force_of_friction(scheme: Any, mass: Any) -> None:
-    """A block at rest on a running belt is dragged with mu times its weight until it has the belt's speed, and the
-    ledger closes with the work of the belt: half of it becomes motion, half is rubbed away."""
+    """A block at rest on a running belt is dragged with mu times its weight until it has the belt's
+    speed, and the ledger closes with the work of the belt: half of it becomes motion, half is
+    rubbed away."""
     g, mu, speed, dt = 10.0, 0.2, 0.5, 0.002
     mesh, tags = block(MPI.COMM_WORLD, lengths=(1.0, 0.5), divisions=(8, 4))
     rubber = LinearElastic(E=1.0e7, nu=0.2, rho=1000.0)

@@ -1,4 +1,5 @@
-"""V2.9: static stages of stiff bodies on soft ones: residuals of round-off, equilibrium of rigid bodies, few steps."""
+"""V2.9: static stages of stiff bodies on soft ones: residuals of round-off, equilibrium of rigid
+bodies, few steps."""
 
 from __future__ import annotations
 
@@ -82,7 +83,8 @@ class Counting:
     ("size", "far"), [(0.5, 1.0), (0.5, 4.0), (0.25, 2.0), (0.2, 2.0), (0.15, 4.0)]
 )
 def test_the_channel_comes_to_rest_on_every_mesh(size: float, far: float) -> None:
-    """Concrete in soil 200 times as soft, which contact alone holds: 1e-11, two digits below the tolerance."""
+    """Concrete in soil 200 times as soft, which contact alone holds: 1e-11, two digits below the
+    tolerance."""
     model = build(Channel(ChannelMesh(size=size, far=far)), COMM)
     for contact in ({}, {"friction": Coulomb(0.5)}, {"bilateral": True}):
         problem = model.problem(excitation=(), **contact)
@@ -90,8 +92,8 @@ def test_the_channel_comes_to_rest_on_every_mesh(size: float, far: float) -> Non
 
 
 def leaning(n: int, *, soil: float = 2.5e6, rho: float = 1800.0) -> ContactProblem:
-    """A block of concrete, n cells wide, on soft ground that is clamped at its base, under vertical and horizontal
-    pressure on its top."""
+    """A block of concrete, n cells wide, on soft ground that is clamped at its base, under vertical
+    and horizontal pressure on its top."""
     bodies = {
         "block": BlockMesh(
             lengths=(WIDTH, HEIGHT), divisions=(n, n + n // 4), corner=(WIDTH, WIDTH)
@@ -114,8 +116,8 @@ def leaning(n: int, *, soil: float = 2.5e6, rho: float = 1800.0) -> ContactProbl
     ("n", "soil", "rho"), [(16, 2.5e6, 1800.0), (32, 2.5e6, 24.0), (16, 2.5e5, 1800.0)]
 )
 def test_a_stiff_block_leans_on_soft_ground(n: int, soil: float, rho: float) -> None:
-    """Ten thousand times as soft and more, on any mesh and however light: weight, thrust and moment to 1e-9, in a few
-    dozen steps of one factorisation."""
+    """Ten thousand times as soft and more, on any mesh and however light: weight, thrust and moment
+    to 1e-9, in a few dozen steps of one factorisation."""
     problem, solver = leaning(n, soil=soil, rho=rho), Counting()
     state = static_equilibrium(problem, solver=solver)
     weight, x = WEIGHT * WIDTH * HEIGHT, problem.surface.points[:, 0] - 1.5 * WIDTH
@@ -133,7 +135,8 @@ def test_a_stiff_block_leans_on_soft_ground(n: int, soil: float, rho: float) -> 
 
 @pytest.mark.serial
 def test_nodal_residuals_add_up_on_a_body() -> None:
-    """Without resultants this would pass: every node off by 5e-10 of the largest load, the body by much more."""
+    """Without resultants this would pass: every node off by 5e-10 of the largest load, the body by
+    much more."""
     problem = leaning(16)
     state = static_equilibrium(problem)
     system = problem.static_load
@@ -148,8 +151,8 @@ def test_nodal_residuals_add_up_on_a_body() -> None:
 
 
 def test_held_bodies_and_components_are_no_free_motions() -> None:
-    """A block on one whose nodes are all prescribed, and the same if it moves up and down only: what is left to be free
-    carries the weight."""
+    """A block on one whose nodes are all prescribed, and the same if it moves up and down only:
+    what is left to be free carries the weight."""
     grid = {"lengths": (1.0, 1.0), "divisions": (1, 1)}
     bodies = {"lower": BlockMesh(corner=(0.0, -1.0), **grid), "upper": BlockMesh(**grid)}
     mesh, tags = build_mesh(Blocks(bodies), COMM)
@@ -170,7 +173,8 @@ def test_held_bodies_and_components_are_no_free_motions() -> None:
 
 @pytest.mark.parametrize("ratio", [1e-8, 1e-10])
 def test_a_clamped_body_floats_on_no_contrast(ratio: float) -> None:
-    """Steel and far more on a layer that is clamped: u = -p (h / E_layer + h / E) without contraction."""
+    """Steel and far more on a layer that is clamped: u = -p (h / E_layer + h / E) without
+    contraction."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(4, 8))
     high, low = (lambda x: x[1] > 1.0 - 1e-9), (lambda x: x[1] < 1.0 + 1e-9)
     parts = Cells.where("high", mesh, high), Cells.where("low", mesh, low)
@@ -189,7 +193,8 @@ def test_a_clamped_body_floats_on_no_contrast(ratio: float) -> None:
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_clamped_body_that_hardly_changes_volume_is_held(degree: int) -> None:
-    """On rollers it slides. Its stiffness against shear is 1e-11 of that against change of volume."""
+    """On rollers it slides. Its stiffness against shear is 1e-11 of that against change of
+    volume."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(4, 8))
     rubber = LinearElastic(E=1e7, nu=0.49999999999, rho=1000.0)
     for components, floats in (((0, 1), False), ((1,), True)):
@@ -199,8 +204,8 @@ def test_a_clamped_body_that_hardly_changes_volume_is_held(degree: int) -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_resultants_are_those_of_motions_that_nothing_holds(angle: float) -> None:
-    """A free body has all, one on rollers those along them, a clamped one none; the part of a force that has its
-    resultants leaves none, and costs no force that has none."""
+    """A free body has all, one on rollers those along them, a clamped one none; the part of a force
+    that has its resultants leaves none, and costs no force that has none."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2), angle=angle)
     ground = HalfSpace(point=(0.0, 0.0), normal=(-np.sin(angle), np.cos(angle)))
     for held, free in (
@@ -231,8 +236,8 @@ def test_a_moment_turns_a_free_body_on_the_spot() -> None:
 
 @pytest.mark.serial
 def test_a_method_that_crawls_comes_to_an_end() -> None:
-    """Gauss-Seidel on a body that is almost free: it gets stronger springs once, then an end, and no advice about time
-    steps."""
+    """Gauss-Seidel on a body that is almost free: it gets stronger springs once, then an end, and
+    no advice about time steps."""
     mesh, tags = block(COMM, lengths=(1.0, 3.0), divisions=(2, 4))
     system = assemble(mesh, CONCRETE, loads=BodyForce((2.0e3, -CONCRETE.rho * 9.81)))
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))

@@ -54,7 +54,8 @@ def ends(problem: ContactProblem, times: Any, **settings: Any) -> list[State]:
 
 
 def test_spring_and_slider():
-    """K u = F - r_t with |r_t| <= mu N: u stays until F has changed by 2 mu N, then follows; a hysteresis loop."""
+    """K u = F - r_t with |r_t| <= mu N: u stays until F has changed by 2 mu N, then follows; a
+    hysteresis loop."""
     pulls = [0.0, 0.5, 1.0, 3.0, 2.0, 1.0, 0.5, -3.0, -1.5, -1.0, 3.0]
     expected = [0.0, 0.0, 0.0, 2.0, 2.0, 2.0, 1.5, -2.0, -2.0, -2.0, 2.0]  # K u [N]
     found = ends(slider(lambda t: pulls[round(t)]), range(len(pulls)))
@@ -78,7 +79,8 @@ def test_one_stage_is_the_static_equilibrium():
 
 
 def test_a_base_that_slides_takes_the_mass_along():
-    """The base moves by s under the mass: u = s until K s = mu N, and on the way back likewise from there."""
+    """The base moves by s under the mass: u = s until K s = mu N, and on the way back likewise from
+    there."""
     problem = rubbing_mass(u0=0.0, friction=Coulomb(1.0))
     ways = [0.0, 0.5e-4, 1.0e-4, 5.0e-4, 4.5e-4, 3.0e-4, 0.0]
     moving = problem.surface.moving(along=lambda t: ways[round(t)])
@@ -91,9 +93,11 @@ def test_a_base_that_slides_takes_the_mass_along():
 def bar_on_bed(
     friction: FrictionLaw, history: Callable[[float], float], *, cells: int = 40
 ) -> ContactProblem:
-    """A bar pressed against a rough base by 200 N/m, held at its far end and pulled at its near end, node 0.
+    """A bar pressed against a rough base by 200 N/m, held at its far end and pulled at its near
+    end, node 0.
 
-    Half a cell belongs to the near end. The base is in direction +y, so that no change of basis is needed.
+    Half a cell belongs to the near end. The base is in direction +y, so that no change of basis is
+    needed.
     """
     lengths = np.full(cells, H)
     lengths[0] *= 0.5
@@ -124,9 +128,11 @@ def bar_on_bed(
 
 
 def first_pull(force: Array | float) -> Array:
-    """Displacement of the near end at the first loading: the zone of slip has the length F/q, u = F²/(2 EA q).
+    """Displacement of the near end at the first loading: the zone of slip has the length F/q, u =
+    F²/(2 EA q).
 
-    The lattice has (F² - (q h/2)²)/(2 EA q) exactly where F/(q h) is a half-integer, linear between.
+    The lattice has (F² - (q h/2)²)/(2 EA q) exactly where F/(q h) is a half-integer, linear
+    between.
     """
     return (np.asarray(force) ** 2 - 0.25 * (THRESHOLD * H) ** 2) / (2.0 * STIFFNESS * THRESHOLD)
 
@@ -134,10 +140,11 @@ def first_pull(force: Array | float) -> Array:
 @pytest.mark.parametrize("friction", [Coulomb(0.25), Tresca(THRESHOLD)], ids=repr)
 @pytest.mark.parametrize("stride", [1, 3, 21], ids=lambda n: f"every {n}")
 def test_bar_on_a_rough_bed(friction, stride):
-    """Zones of slip grow from the pulled end; after a turn half as fast (Masing): u = u* - 2 u1((F* - F)/2).
+    """Zones of slip grow from the pulled end; after a turn half as fast (Masing): u = u* - 2 u1((F*
+    - F)/2).
 
-    A closed loop from the second quarter on, u to 1e-11 of the largest with 21, 7 or one step a turn; loop area
-    2 F*³/(3 EA q) less a lattice term."""
+    A closed loop from the second quarter on, u to 1e-11 of the largest with 21, 7 or one step a
+    turn; loop area 2 F*³/(3 EA q) less a lattice term."""
     unit = THRESHOLD * H
     top = 10.5 * unit
     down = np.arange(10.5, -11.0, -1.0)[::stride] * unit
@@ -159,8 +166,8 @@ def test_bar_on_a_rough_bed(friction, stride):
 
 
 def test_the_part_that_moved_last_slips():
-    """Unloaded from F* = 10.75 q h to 3.25 q h: the near end and 3 nodes slip back, the next bears half, 6 bear +q h
-    still; the bar behind them never felt the load."""
+    """Unloaded from F* = 10.75 q h to 3.25 q h: the near end and 3 nodes slip back, the next bears
+    half, 6 bear +q h still; the bar behind them never felt the load."""
     unit = THRESHOLD * H
     problem = bar_on_bed(Coulomb(0.25), lambda t: unit * (10.75 if t == 1.0 else 3.25))
     there, back = ends(problem, [1.0, 2.0])

@@ -1,6 +1,8 @@
-"""What a user gives may fail on one rank alone: all ranks raise it together, and none waits for ever.
+"""What a user gives may fail on one rank alone: all ranks raise it together, and none waits for
+ever.
 
-Each failure is that of the last rank: of the only one where there is one. A run that hangs is killed by its alarm."""
+Each failure is that of the last rank: of the only one where there is one. A run that hangs is
+killed by its alarm."""
 
 from __future__ import annotations
 
@@ -32,7 +34,8 @@ NO_PROGRESS = {"dt": WALL_DT, "progress": False}
 
 @pytest.fixture(autouse=True)
 def _alarm() -> Iterator[None]:
-    """Kill this process when the test hangs: a rank that waits in a collective call hears no other signal."""
+    """Kill this process when the test hangs: a rank that waits in a collective call hears no other
+    signal."""
     before = signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(PATIENCE)
     yield
@@ -173,7 +176,8 @@ def test_a_friction_law(comm: Any, solver: Any) -> None:
 
 
 class Failing:
-    """A recorder that fails on the last rank in a step, and at another step tells a column that others do not have."""
+    """A recorder that fails on the last rank in a step, and at another step tells a column that
+    others do not have."""
 
     def __init__(self, comm: Any, k: int) -> None:
         self.last, self.k = last(comm), k
@@ -195,7 +199,8 @@ class Failing:
 
 @pytest.mark.parametrize("k", [0, 7])
 def test_a_recorder(comm: Any, shared_tmp: Path, k: int) -> None:
-    """The built-in recorders beside it are collective; what was computed is kept, with a checkpoint."""
+    """The built-in recorders beside it are collective; what was computed is kept, with a
+    checkpoint."""
     problem = shaken_wall(comm)
     run = {"scheme": vc.ZienkiewiczWoodTaylor(), **NO_PROGRESS, "out": shared_tmp}
     record = [Failing(comm, k), vc.Energy(), vc.Contact()]

@@ -1,4 +1,5 @@
-"""Recorders on the spring-mass chain: energy ledger (V9), contact quantities and probes against hand calculations."""
+"""Recorders on the spring-mass chain: energy ledger (V9), contact quantities and probes against
+hand calculations."""
 
 from __future__ import annotations
 
@@ -82,7 +83,8 @@ def ledger_defect(found: dict[str, Array]) -> Array:
     "impact", [None, Inelastic(), Inelastic(ImpulseUpdate()), Newton(0.5)], ids=repr
 )
 def test_v9_7_ledger_closes(scheme: Any, impact: Any) -> None:
-    """V9.7: W + E(0) = E + D_damping + D_contact + D_impact + D_algorithmic to 1e-10 max E, walls on both sides."""
+    """V9.7: W + E(0) = E + D_damping + D_contact + D_impact + D_algorithmic to 1e-10 max E, walls
+    on both sides."""
     problem = chain_problem(
         5,
         gap=1e-3,
@@ -118,7 +120,8 @@ def test_energies_are_those_of_the_final_state() -> None:
 
 @pytest.mark.parametrize("wrong", ["force", "reaction", "displacement"])
 def test_v9_7_defect_sees_a_wrong_step(wrong: str) -> None:
-    """A step that does not satisfy its equation of motion leaves a defect: the ledger is not a tautology."""
+    """A step that does not satisfy its equation of motion leaves a defect: the ledger is not a
+    tautology."""
     problem, scheme = (
         chain_problem(5, gap=1e-3, excitation=SHAKE, consistent=True),
         ZienkiewiczWoodTaylor(),
@@ -147,7 +150,8 @@ def test_v9_7_defect_sees_a_wrong_step(wrong: str) -> None:
 
 
 def test_v9_1_midpoint_loses_only_by_contact() -> None:
-    """V9.1: at phi = ½ nothing is lost by the scheme, and each closure loses reaction times the gap it closed."""
+    """V9.1: at phi = ½ nothing is lost by the scheme, and each closure loses reaction times the gap
+    it closed."""
     problem = chain_problem(5, gap=1e-3, left_gap=2e-3, excitation=SHAKE, consistent=True)
     found = history(problem, ZienkiewiczWoodTaylor(0.5))
     r_n, gap = 0.5 * found["pressure"], found["gap"]  # weights of the chain are ½
@@ -159,7 +163,8 @@ def test_v9_1_midpoint_loses_only_by_contact() -> None:
 
 
 def test_v9_2_newmark_gains_at_release() -> None:
-    """V9.2 at beta = ¼, gamma = ½, no load: E1 - E0 = ½ (r_n0 g1 - r_n1 g0), which gains energy at release."""
+    """V9.2 at beta = ¼, gamma = ½, no load: E1 - E0 = ½ (r_n0 g1 - r_n1 g0), which gains energy at
+    release."""
     problem = chain_problem(5, gap=1e-3, u0=np.linspace(0.0, -0.02, 5), consistent=True)
     found = history(problem, LinearMultistep.newmark(beta=0.25, gamma=0.5))
     total = found["energy_kinetic"] + found["energy_strain"]
@@ -173,7 +178,8 @@ def test_v9_2_newmark_gains_at_release() -> None:
 
 @pytest.mark.parametrize("reading", ["literal", "projection"])
 def test_v9_6_impact_loss(reading: str) -> None:
-    """V9.6: ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ step by step; for the M-projection and e = 0 it is ½ |v⁻ - v⁺|²_M >= 0."""
+    """V9.6: ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ step by step; for the M-projection and e = 0 it is ½ |v⁻ - v⁺|²_M
+    >= 0."""
     law = Inelastic() if reading == "literal" else Inelastic(ImpulseUpdate())
     problem = chain_problem(
         10, gap=1e-3, excitation=SHAKE, impact=law, consistent=True, stiffness=1e4
@@ -194,7 +200,8 @@ def test_v9_6_impact_loss(reading: str) -> None:
 
 
 def test_v9_8_momentum() -> None:
-    """V9.8: contact impulses of a free chain under a constant force are its change of momentum less the force's."""
+    """V9.8: contact impulses of a free chain under a constant force are its change of momentum less
+    the force's."""
     problem = chain_problem(
         5, gap=1e-2, left_gap=2e-2, floating=True, constant=7.0, consistent=True
     )
@@ -213,7 +220,8 @@ def state_of(r_n: list[float], active: list[bool], u: Array) -> State:
 
 
 def test_contact_by_hand() -> None:
-    """Resultant 8 N of 2 N at x = 5 and 6 N at x = 1 acts at x = 2; the walls push with -2 N and +6 N."""
+    """Resultant 8 N of 2 N at x = 5 and 6 N at x = 1 acts at x = 2; the walls push with -2 N and +6
+    N."""
     problem = chain_problem(5, gap=0.5, left_gap=0.25)
     surface = replace(problem.surface, weights=np.array([1.0, 3.0]))
     problem = replace(problem, surface=surface)
@@ -264,7 +272,8 @@ def test_contact_open_and_absent() -> None:
 
 
 def test_contact_on_springs_adds_their_shortening() -> None:
-    """The gap to a support that is pressed in by r_n compliance: body at u_n = 0.3, gap0 = 0.1, 2 N on 0.1 m/N."""
+    """The gap to a support that is pressed in by r_n compliance: body at u_n = 0.3, gap0 = 0.1, 2 N
+    on 0.1 m/N."""
     problem = chain_problem(2, gap=0.1)
     problem = replace(problem, surface=replace(problem.surface, compliance=np.array([0.1])))
     row = Contact().start(problem, state_of([2.0], [True], np.array([0.0, 0.3])))
@@ -283,7 +292,8 @@ def test_probe_turns_back_the_basis() -> None:
 
 
 def test_probe_absolute_acceleration_of_a_free_body_is_zero() -> None:
-    """Nothing holds the floating chain: it stays where it is while the ground moves, so relative plus ground is 0."""
+    """Nothing holds the floating chain: it stays where it is while the ground moves, so relative
+    plus ground is 0."""
     problem = chain_problem(3, gap=1.0, floating=True, excitation=SHAKE)
     probe = Probe({"a": (1.0,), "b": (3.0,)}, acceleration=True)
     found = history(problem, ZienkiewiczWoodTaylor(0.5), 50, record=[probe])

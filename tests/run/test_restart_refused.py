@@ -1,4 +1,5 @@
-"""What a restart compares: other matrices, loads, laws and plans are refused by name; ranks and round-off are not."""
+"""What a restart compares: other matrices, loads, laws and plans are refused by name; ranks and
+round-off are not."""
 
 from __future__ import annotations
 
@@ -145,7 +146,8 @@ def test_infinite_numbers_of_an_excitation_are_no_difference(tmp_path: Path) -> 
 
 @serial
 def test_texts_of_laws() -> None:
-    """No addresses, no types of numpy 2; numbers are compared with room for round-off, words are not."""
+    """No addresses, no types of numpy 2; numbers are compared with room for round-off, words are
+    not."""
 
     class Own:
         """Has the repr that Python gives it."""
@@ -254,7 +256,8 @@ def test_checksum_sees_everything() -> None:
     )
 
 
-# Any number of ranks --------------------------------------------------------------------------------------------------
+# Any number of ranks
+# --------------------------------------------------------------------------------------------------
 
 
 def test_other_ranks_are_the_same_problem(comm: Any) -> None:

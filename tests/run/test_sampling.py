@@ -1,4 +1,5 @@
-"""A time step that is too long for what acts is told, wherever the motion stands: half a period sees nothing at all."""
+"""A time step that is too long for what acts is told, wherever the motion stands: half a period
+sees nothing at all."""
 
 from __future__ import annotations
 

@@ -90,7 +90,8 @@ def test_same_steps_as_march(scheme: Any) -> None:
 
 
 def test_t_end_and_initial_state() -> None:
-    """steps or t_end say the same; a given state is where the run goes on, with its step number and time."""
+    """steps or t_end say the same; a given state is where the run goes on, with its step number and
+    time."""
     assert same(run(steps=None, t_end=100 * DT).state, run().state)
     middle = run(40).state
     rest = run(60, state=middle)
@@ -142,7 +143,8 @@ def test_summary_for_people_and_programs(tmp_path: Path) -> None:
 
 
 def test_cross_check_is_reported(tmp_path: Path) -> None:
-    """The comparison that accompanied the run is in the summary: two methods agree to 1e-8 (V9, metamorphic)."""
+    """The comparison that accompanied the run is in the summary: two methods agree to 1e-8 (V9,
+    metamorphic)."""
     checked = CrossChecked(Condensed(), (Condensed(Hildreth()),))
     solution = run(solver=checked, cross_check=checked, out=tmp_path)
     ((method, difference),) = summary_of(tmp_path)["cross_check"].items()
@@ -164,7 +166,8 @@ def test_escalation_is_recorded(tmp_path: Path) -> None:
 
 
 def test_failed_step_keeps_what_was_computed(tmp_path: Path) -> None:
-    """StepFailure passes through; the folder holds all steps before it and the reason, and a restart goes on."""
+    """StepFailure passes through; the folder holds all steps before it and the reason, and a
+    restart goes on."""
 
     class Late(Wrong):
         def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> Any:
@@ -190,7 +193,8 @@ def test_failed_step_keeps_what_was_computed(tmp_path: Path) -> None:
     "error", [KeyboardInterrupt(), RuntimeError("the recorder broke")], ids=["ctrl-c", "defect"]
 )
 def test_interrupted_run_goes_on(tmp_path: Path, error: BaseException) -> None:
-    """Ctrl-C or a defect in a recorder at step 57: all files are complete, and the restart equals the straight run."""
+    """Ctrl-C or a defect in a recorder at step 57: all files are complete, and the restart equals
+    the straight run."""
     with pytest.raises(type(error)):
         run(out=tmp_path, record=[Energy(), Contact(), AtStep(57, failing(error))])
     found = summary_of(tmp_path)
@@ -206,7 +210,8 @@ def test_interrupted_run_goes_on(tmp_path: Path, error: BaseException) -> None:
 
 
 def test_log_shows_progress(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Off a terminal a line every tenth of the run, with the time that is left, and nothing on the terminal itself."""
+    """Off a terminal a line every tenth of the run, with the time that is left, and nothing on the
+    terminal itself."""
     run(out=tmp_path, checkpoint_every=40)
     lines = (tmp_path / "run.log").read_text().splitlines()
     progress = [line for line in lines if " left" in line]
@@ -230,7 +235,8 @@ def test_log_shows_progress(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 def test_progress_line_on_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On a terminal a bar with time, iterations and worst certificate; none when it is not wanted."""
+    """On a terminal a bar with time, iterations and worst certificate; none when it is not
+    wanted."""
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     run(20)
     shown = capsys.readouterr().err

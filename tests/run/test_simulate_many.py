@@ -1,4 +1,5 @@
-"""Runs that are simulated together leave the folders that they leave alone. On several ranks they go one by one."""
+"""Runs that are simulated together leave the folders that they leave alone. On several ranks they
+go one by one."""
 
 from __future__ import annotations
 
@@ -77,7 +78,8 @@ def test_every_run_leaves_what_it_leaves_alone(shared_tmp):
 
 
 def test_a_run_that_cannot_begin_or_go_on_leaves_the_others(shared_tmp):
-    """The one is told before any step, the other when it fails; its folder says so and keeps its rows."""
+    """The one is told before any step, the other when it fails; its folder says so and keeps its
+    rows."""
     asked = runs(shared_tmp, [*SHAKEN, BASE])
     asked[1]["record"] = [vc.Contact(), AtStep(7, failing(vc.InputError("enough")))]
     asked[3]["state"] = replace(
@@ -99,7 +101,8 @@ def test_a_run_that_cannot_begin_or_go_on_leaves_the_others(shared_tmp):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_stops_all_and_a_restart_goes_on(shared_tmp, number):
-    """Every run that has begun has its checkpoint; continued they are the runs that nobody stopped."""
+    """Every run that has begun has its checkpoint; continued they are the runs that nobody
+    stopped."""
     asked = runs(shared_tmp)
 
     def recorded(k):
@@ -135,7 +138,8 @@ def test_a_signal_stops_all_and_a_restart_goes_on(shared_tmp, number):
 
 @pytest.mark.slow
 def test_who_no_longer_waits_leaves_checkpoints(shared_tmp):
-    """A loop that ends after the first result closes the others, which can be continued (one rank) or begun anew."""
+    """A loop that ends after the first result closes the others, which can be continued (one rank)
+    or begun anew."""
     asked = runs(shared_tmp, steps=30)
     asked[0]["steps"] = 10
     for number, _ in vc.simulate_many(asked):
@@ -152,7 +156,8 @@ def test_who_no_longer_waits_leaves_checkpoints(shared_tmp):
 
 @pytest.mark.two_ranks
 def test_runs_with_other_schemes_and_solvers_are_the_runs_alone(shared_tmp):
-    """What differs in more than its excitation is not stepped with the first one's scheme or tolerance."""
+    """What differs in more than its excitation is not stepped with the first one's scheme or
+    tolerance."""
     asked = runs(shared_tmp)
     asked[0] |= {"scheme": vc.Newmark()}
     asked[1] |= {"solver": vc.Condensed(), "tolerance": 1e-7}
@@ -182,7 +187,8 @@ class Raises:
 
 @pytest.mark.two_ranks
 def test_an_error_in_what_is_made_for_all_is_of_the_guilty_run_alone():
-    """The load of one raises while those of all are made: the others are the runs that they are alone."""
+    """The load of one raises while those of all are made: the others are the runs that they are
+    alone."""
     problems = [SHAKEN[0], replace(BASE, excitation=Raises()), SHAKEN[2]]
     found = dict(vc.simulate_many([{"problem": one, "dt": DT, "steps": 30} for one in problems]))
     assert isinstance(found[1], vc.InputError) and "no record any more" in str(found[1])
@@ -201,7 +207,8 @@ def test_an_error_in_what_is_made_for_all_is_of_the_guilty_run_alone():
 
 @pytest.mark.two_ranks
 def test_states_of_other_schemes_go_together():
-    """What only some states have in mind is left out: the scheme that marches them did not ask for it."""
+    """What only some states have in mind is left out: the scheme that marches them did not ask for
+    it."""
     light = replace(BASE, impact=None, mass=None)
     other = replace(
         vc.simulate(light, scheme=vc.HHT(), dt=DT, steps=1, progress=False).state, t=0.0, k=0

@@ -1,4 +1,5 @@
-"""What a solution, a problem and a state say of themselves: short, and safe to show in a notebook."""
+"""What a solution, a problem and a state say of themselves: short, and safe to show in a
+notebook."""
 
 from __future__ import annotations
 

@@ -64,7 +64,8 @@ def test_bar_stands_on_its_foot(gap):
 
 @pytest.mark.serial
 def test_chain_floats_onto_one_of_two_walls():
-    """Pushed by 3 N, the loose chain crosses a gap of 50 mm and rests on the right wall without strain."""
+    """Pushed by 3 N, the loose chain crosses a gap of 50 mm and rests on the right wall without
+    strain."""
     problem = chain_problem(5, floating=True, constant=3.0, gap=0.05, left_gap=0.01)
     state = static_equilibrium(problem, solver=Condensed())
     np.testing.assert_allclose(state.r_n, [3.0, 0.0], rtol=1e-10)
@@ -76,9 +77,9 @@ def test_chain_floats_onto_one_of_two_walls():
 @solvers
 @pytest.mark.parametrize("gap", [0.0, 1.0e-3])
 def test_v2_1_standing_column_presses_uniformly(gap, solver):
-    """No lateral contraction: sigma_yy = -rho g (H - y) in every fibre, p = rho g H at every node, to 1e-10; the
-    settlement of the top is rho g H² / 2E (nodally exact). Free to slide, the column keeps its place. A fall
-    of a hundred settlements costs a digit."""
+    """No lateral contraction: sigma_yy = -rho g (H - y) in every fibre, p = rho g H at every node,
+    to 1e-10; the settlement of the top is rho g H² / 2E (nodally exact). Free to slide, the column
+    keeps its place. A fall of a hundred settlements costs a digit."""
     problem = standing(material=COLUMN, gap=gap, start=(2.0e-4, 0.0))
     state = static_equilibrium(problem, solver=solver)
     pressure = 2400.0 * G * 3.0
@@ -104,7 +105,8 @@ def test_v2_1_standing_column_presses_uniformly(gap, solver):
     ids=["turned", "triangles", "slender", "hexahedra", "tetrahedra"],
 )
 def test_reactions_carry_the_weight(shape):
-    """Σ r_n = weight to 1e-10, every node balanced; the dynamic stage that continues from there stays still."""
+    """Σ r_n = weight to 1e-10, every node balanced; the dynamic stage that continues from there
+    stays still."""
     problem = standing(**shape)
     state = static_equilibrium(problem, solver=Condensed())
     push = COMM.allreduce(problem.surface.normals.T @ state.r_n)
@@ -122,8 +124,9 @@ def test_reactions_carry_the_weight(shape):
 
 @pytest.mark.two_ranks
 def test_free_motions_keep_their_place():
-    """On level ground nothing drives a block sideways: the M-weighted mean of u_x and, in 3D, of the spin stay zero
-    but for rounding, which a mode without stiffness sees magnified by that of the springs, 1e-4 of K."""
+    """On level ground nothing drives a block sideways: the M-weighted mean of u_x and, in 3D, of
+    the spin stay zero but for rounding, which a mode without stiffness sees magnified by that of
+    the springs, 1e-4 of K."""
     for shape in ({}, {"lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)}):
         problem = standing(**shape)
         state = static_equilibrium(problem, solver=Condensed())
@@ -143,7 +146,8 @@ def test_free_motions_keep_their_place():
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("push", [0.0, 5.0e3, -9.0e3])
 def test_two_corners_share_the_weight_like_a_beam(push):
-    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H."""
+    """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the
+    top at height H."""
     problem = standing(points=[(0.0, 0.0), (1.0, 0.0)], held=True, push=push)
     state = gathered(problem.surface, static_equilibrium(problem, solver=Condensed()))
     weight, moment = 2400.0 * G * 3.0, push * 3.0
@@ -152,7 +156,8 @@ def test_two_corners_share_the_weight_like_a_beam(push):
 
 
 def test_partly_lifted_base_balances_moments():
-    """Pushed beyond the kern the base opens: Σ r_n = W, Σ r_n x = W L/2 + T H, no tension anywhere."""
+    """Pushed beyond the kern the base opens: Σ r_n = W, Σ r_n x = W L/2 + T H, no tension
+    anywhere."""
     problem = standing(held=True, push=8.0e3, divisions=(12, 20))
     state = gathered(problem.surface, static_equilibrium(problem, solver=Condensed()))
     weight, moment = 2400.0 * G * 3.0, 8.0e3 * 3.0
@@ -165,7 +170,8 @@ def test_partly_lifted_base_balances_moments():
 
 @pytest.mark.two_ranks
 def test_springs_settle_by_the_weight():
-    """On springs of modulus k [Pa/m] a column without contraction settles by p / k, soft or stiff."""
+    """On springs of modulus k [Pa/m] a column without contraction settles by p / k, soft or
+    stiff."""
     for modulus in (1.0e6, 1.0e9, 1.0e12):
         problem = standing(material=COLUMN)
         problem = ContactProblem(problem.system, problem.surface.on_springs(modulus))
@@ -217,8 +223,9 @@ def test_no_equilibrium_is_refused(case, way, gap):
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("gap", [0.0, 1.0e-4])
 def test_friction_holds_a_block_up_to_its_coefficient(gap):
-    """Coulomb, mu = 0.3, on a plane inclined by theta: at tan theta = 0.99 mu it stands, Σ r_t = W sin theta and
-    Σ r_n = W cos theta to 1e-9 with part of its base slipping; at 1.01 mu there is no equilibrium."""
+    """Coulomb, mu = 0.3, on a plane inclined by theta: at tan theta = 0.99 mu it stands, Σ r_t = W
+    sin theta and Σ r_n = W cos theta to 1e-9 with part of its base slipping; at 1.01 mu there is no
+    equilibrium."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(8, 4))
     ground = HalfSpace(point=(0.0, -gap), normal=(0.0, 1.0))
 
@@ -260,7 +267,8 @@ def test_floating_without_contact_is_refused():
 
 @pytest.mark.two_ranks
 def test_pressed_by_a_moving_side_and_its_weight():
-    """Rollers move the left side by 1 mm to the right; the block follows as a whole and rests on its base."""
+    """Rollers move the left side by 1 mm to the right; the block follows as a whole and rests on
+    its base."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
 
     def shift(x: Array) -> Array:

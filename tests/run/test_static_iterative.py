@@ -1,4 +1,5 @@
-"""Gravity stages by conjugate gradients, of bodies that contact alone holds: as with a factor, to 1e-9, without one."""
+"""Gravity stages by conjugate gradients, of bodies that contact alone holds: as with a factor, to
+1e-9, without one."""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ GROUND = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
 @pytest.mark.parametrize("angle", [0.0, 0.5])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_gravity_stage_balances_forces_and_stays_still(angle, simplices):
-    """A block on a level or inclined plane, clamped on its left side: K u - f is the contact force, along the plane's
-    normal. The dynamic stage that continues from it stays still to 1e-12."""
+    """A block on a level or inclined plane, clamped on its left side: K u - f is the contact force,
+    along the plane's normal. The dynamic stage that continues from it stays still to 1e-12."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(6, 4), simplices=simplices, angle=angle)
     weight = 2.0 * CONCRETE.rho * 9.80665 * 0.4
     load = BodyForce((0.0, -CONCRETE.rho * 9.80665))
@@ -49,7 +49,8 @@ def test_gravity_stage_balances_forces_and_stays_still(angle, simplices):
 
 
 def test_gravity_stage_shares_the_weight():
-    """A column without lateral contraction between a held top and the ground: each carries half of the weight."""
+    """A column without lateral contraction between a held top and the ground: each carries half of
+    the weight."""
     mesh, tags = block(COMM, lengths=(1.0, 3.0), divisions=(2, 5))
     column = LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
     hold = [Prescribed(tags["top"], components=(1,)), Prescribed(tags["left"], components=(0,))]
@@ -66,7 +67,8 @@ def test_gravity_stage_shares_the_weight():
 
 
 def stays_still(problem: ContactProblem, start: State) -> None:
-    """Ten steps from a static state without excitation change nothing: neither displacements nor reactions."""
+    """Ten steps from a static state without excitation change nothing: neither displacements nor
+    reactions."""
     sag = max_over_ranks(COMM, start.u)
     for state, report in march(
         problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=10, state=start
@@ -77,8 +79,8 @@ def stays_still(problem: ContactProblem, start: State) -> None:
 
 
 def test_gravity_stage_of_a_clamped_wall_leaves_its_side_touching():
-    """A wall beside the ground, Poisson's ratio 0.2: its weight widens it against the ground, Σ r_n > 0. The clamped
-    base balances these reactions and carries the whole weight."""
+    """A wall beside the ground, Poisson's ratio 0.2: its weight widens it against the ground, Σ r_n
+    > 0. The clamped base balances these reactions and carries the whole weight."""
     mesh, tags = block(COMM, lengths=(2.0, 3.0), divisions=(4, 6))
     system = assemble(
         mesh, CONCRETE, clamped=tags["bottom"], loads=BodyForce((0.0, -CONCRETE.rho * 9.80665))
@@ -118,7 +120,8 @@ def test_bilateral_points_pull_as_well():
 
 
 def spring_support(stiffness: float | None) -> tuple[ContactSurface, Array, Array]:
-    """(surface, u_n, r_n) of a block pressed down by 1 mm at its top; nu = 0, so that it is a spring of 2e10 Pa/m."""
+    """(surface, u_n, r_n) of a block pressed down by 1 mm at its top; nu = 0, so that it is a
+    spring of 2e10 Pa/m."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
     press = [
         held_by(tags, "top", lambda x: 0.0 * x - 1e-3, 1),
@@ -138,8 +141,8 @@ def spring_support(stiffness: float | None) -> tuple[ContactSurface, Array, Arra
 
 @pytest.mark.parametrize("stiffness", [1.0e9, 1.0e12])
 def test_springs_in_series_with_the_body(stiffness):
-    """Foundation modulus k [Pa/m] under a body of modulus E/H: pressure 1 mm / (H/E + 1/k), settlement p/k, at every
-    node (the remark after eq. 6)."""
+    """Foundation modulus k [Pa/m] under a body of modulus E/H: pressure 1 mm / (H/E + 1/k),
+    settlement p/k, at every node (the remark after eq. 6)."""
     surface, u_n, r_n = spring_support(stiffness)
     pressure = 1e-3 / (1.0 / 2.0e10 + 1.0 / stiffness)
     assert r_n / surface.weights == pytest.approx(np.full(surface.count, pressure), rel=1e-11)

@@ -33,7 +33,8 @@ TESTS, PACKAGE = str(Path(__file__).parents[1] / "support"), str(Path(__file__).
 
 @pytest.fixture(autouse=True)
 def heard() -> Iterator[None]:
-    """Signals mean what they mean to Python by default, also where a shell, nohup or a test runner has changed that."""
+    """Signals mean what they mean to Python by default, also where a shell, nohup or a test runner
+    has changed that."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     for number, handler in before.items():
         if number == signal.SIGINT:
@@ -53,7 +54,8 @@ def kill(number: int) -> Callable[[], None]:
 @serial
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_ends_the_run_after_the_step(tmp_path: Path, number: signal.Signals) -> None:
-    """Checkpoint, summary and one sentence; the old handlers are back, and the restart is the straight run."""
+    """Checkpoint, summary and one sentence; the old handlers are back, and the restart is the
+    straight run."""
     before = [signal.getsignal(one) for one in SIGNALS]
     record = [Energy(), Contact(), AtStep(57, kill(number))]
     with pytest.raises(
@@ -120,8 +122,10 @@ def test_in_a_thread() -> None:
 def test_second_ctrl_c() -> None:
     """It ends the process at once, whatever it does."""
     code = (
-        "import os, signal, time\nfrom vi_contact.run.stop_signals import StopSignals\nwith StopSignals():\n"
-        "    os.kill(os.getpid(), signal.SIGINT)\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(600)"
+        "import os, signal, time\nfrom vi_contact.run.stop_signals import StopSignals\nwith "
+        "StopSignals():\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n    os.kill(os.getpid(), signal.SIGINT)\n    "
+        "time.sleep(600)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, timeout=600
@@ -160,7 +164,8 @@ class Parser:
 
 
 def test_one_rank_gets_the_signal(comm: Any, shared_tmp: Path) -> None:
-    """The last rank gets SIGTERM: all end after the same step, and what is on disk goes on like the straight run."""
+    """The last rank gets SIGTERM: all end after the same step, and what is on disk goes on like the
+    straight run."""
     pytest.importorskip("dolfinx")
     action = kill(signal.SIGTERM) if comm.rank == comm.size - 1 else bool
     with pytest.raises(Interrupted, match="SIGTERM ended the run after step 9, "):
@@ -172,7 +177,8 @@ def test_one_rank_gets_the_signal(comm: Any, shared_tmp: Path) -> None:
         assert np.abs(parts.history[name] - straight.history[name]).max() <= 1e-12 * size, name
 
 
-# One run at a time ----------------------------------------------------------------------------------------------------
+# One run at a time
+# ----------------------------------------------------------------------------------------------------
 
 FIRST = """
 import sys

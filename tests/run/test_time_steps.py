@@ -1,4 +1,5 @@
-"""Changing dt in a run: plans, energy across changes, halving at impact (files: test_time_steps_in_folders)."""
+"""Changing dt in a run: plans, energy across changes, halving at impact (files:
+test_time_steps_in_folders)."""
 
 from __future__ import annotations
 
@@ -100,7 +101,8 @@ def test_steps_of_a_schedule(steps, t_end, t0, parts):
 @serial
 @pytest.mark.parametrize("t0", [0.0, 0.3, 17.0])
 def test_round_off_of_many_pieces_adds_no_step(t0):
-    """1200 steps of a hundred lengths, each piece a dozen of them, end at the last one's time, wherever they begin."""
+    """1200 steps of a hundred lengths, each piece a dozen of them, end at the last one's time,
+    wherever they begin."""
     sizes = [1e-3 * (1.0 + 0.01 * i) for i in range(100)]
     ends = [t0 + 12.0 * sum(sizes[: i + 1]) for i in range(100)]
     plan = Schedule(tuple(zip(sizes, ends, strict=True)))
@@ -231,7 +233,8 @@ def test_a_schedule_is_runs_one_after_the_other(scheme):
 
 
 def with_mass_of(scheme: Any) -> ContactProblem:
-    """A thrown bar for the trapezoidal rule, whose contact nodes have no mass; the chain, an impact law for others."""
+    """A thrown bar for the trapezoidal rule, whose contact nodes have no mass; the chain, an impact
+    law for others."""
     if isinstance(scheme, Trapezoidal):
         return thrown(30, mass=Redistributed())
     return replace(shaken(Inelastic()), mass=ConsistentMass())
@@ -242,7 +245,8 @@ def with_mass_of(scheme: Any) -> ContactProblem:
 @pytest.mark.parametrize("plan", [LONG, HalvedAtImpact(LONG, 3), HalvedAtImpact(5e-3, 4)], ids=repr)
 @pytest.mark.parametrize("scheme", [*SCHEMES, Trapezoidal()], ids=repr)
 def test_ledger_closes_across_changes(scheme, plan):
-    """V9.7: a change of dt changes neither u nor v, and no energy appears or is lost between two steps."""
+    """V9.7: a change of dt changes neither u nor v, and no energy appears or is lost between two
+    steps."""
     problem = with_mass_of(scheme)
     reports = list(run(problem, scheme, dt=plan, steps=600))
     sizes = [report.new.t - report.old.t for report in reports]
@@ -257,7 +261,8 @@ def test_ledger_closes_across_changes(scheme, plan):
 
 
 def linear_error(scheme: Any, dt: float) -> float:
-    """max |u - exact| / max |u| at t = 1 s of a free vibration, dt changed to dt/2 at 0.3 s and to 2 dt at 0.6 s."""
+    """max |u - exact| / max |u| at t = 1 s of a free vibration, dt changed to dt/2 at 0.3 s and to
+    2 dt at 0.6 s."""
     problem = chain_problem(
         4, gap=1e3, stiffness=50.0, u0=[0.1, -0.2, 0.3, 0.1], v0=[1.0, 0.0, -1.0, 0.5]
     )
@@ -287,7 +292,8 @@ def linear_error(scheme: Any, dt: float) -> float:
     ids=repr,
 )
 def test_order_with_a_change_in_mid_run(scheme, order):
-    """Against the modes in closed form: the order of the scheme, as without changes (V8.5 without a mesh)."""
+    """Against the modes in closed form: the order of the scheme, as without changes (V8.5 without a
+    mesh)."""
     coarse, fine = (linear_error(scheme, dt) for dt in (5e-3, 2.5e-3))
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
 
@@ -297,7 +303,8 @@ def test_order_with_a_change_in_mid_run(scheme, order):
 
 @dataclass(frozen=True)
 class Counted(ZienkiewiczWoodTaylor):
-    """Remembers the dt of every effective matrix it made, and the matrices as long as somebody else keeps them."""
+    """Remembers the dt of every effective matrix it made, and the matrices as long as somebody else
+    keeps them."""
 
     made: list[tuple[float, Any]] = field(default_factory=list)
 
@@ -329,7 +336,8 @@ def test_one_matrix_for_every_dt_of_a_halved_run():
 
 @serial
 def test_factors_of_pieces_that_are_over_are_freed():
-    """A plan of ten pieces keeps one matrix (and that of the last report), with halves those of the piece."""
+    """A plan of ten pieces keeps one matrix (and that of the last report), with halves those of the
+    piece."""
     sizes = [1e-3 * (1.0 + 0.1 * i) for i in range(10)]
     times = np.cumsum([5.0 * dt for dt in sizes])
     plan = Schedule(tuple(zip(sizes, times, strict=True)))
@@ -354,7 +362,8 @@ def closes(report: Report) -> bool:
 @serial
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_every_closure_happens_in_a_shortest_step(scheme):
-    """Base steps end where they did; only steps of dt/8 close a contact; their times fit together."""
+    """Base steps end where they did; only steps of dt/8 close a contact; their times fit
+    together."""
     dt, halvings = 4e-3, 3
     reports = list(run(shaken(Inelastic()), scheme, dt=HalvedAtImpact(dt, halvings), steps=500))
     sizes = np.array([report.new.t - report.old.t for report in reports])
@@ -402,7 +411,8 @@ def test_no_halvings_is_the_constant_dt(scheme):
 
 @serial
 def test_resting_and_held_contacts_are_not_halved():
-    """Only points that were open close: a bilateral point never does, one that rests on its wall does not again."""
+    """Only points that were open close: a bilateral point never does, one that rests on its wall
+    does not again."""
     problem = shaken(gap=0.0, excitation=(), constant=3.0)
     resting = replace(next(run(problem, HALF, dt=1e-3, steps=1)).new, active=np.ones(1, dtype=bool))
     assert len(list(run(problem, HALF, dt=HalvedAtImpact(1e-3), steps=20, state=resting))) == 20
@@ -413,7 +423,8 @@ def test_resting_and_held_contacts_are_not_halved():
 @serial
 @pytest.mark.parametrize(("halvings", "dt"), [(0, 0.0125), (2, 0.0125), (4, 0.0125), (2, 0.006)])
 def test_time_of_the_first_contact_of_the_thrown_bar(halvings, dt):
-    """V1.1: at t = 1/2 exactly, found to dt/2**halvings; the steps before it are those without halving."""
+    """V1.1: at t = 1/2 exactly, found to dt/2**halvings; the steps before it are those without
+    halving."""
     dt *= 1.01  # 1/2 is not at the end of a step
     for report in run(thrown(20), HALF, dt=HalvedAtImpact(dt, halvings), steps=120):
         if report.new.active.any():
@@ -424,7 +435,8 @@ def test_time_of_the_first_contact_of_the_thrown_bar(halvings, dt):
 
 @serial
 def test_contact_work_of_the_thrown_bar_falls_with_halving():
-    """V9.1: the first closure loses its reaction times the gap before it, which halving makes smaller."""
+    """V9.1: the first closure loses its reaction times the gap before it, which halving makes
+    smaller."""
     lost, dt = (
         [],
         0.5 / 44.9,
@@ -441,7 +453,8 @@ def test_contact_work_of_the_thrown_bar_falls_with_halving():
 
 @serial
 def test_means_over_arrival_times_of_the_thrown_bar():
-    """The table in docs/guide/schemes.md: delay [dt] and work lost [J] of the first closure, halvings 0, 1, 2, 3."""
+    """The table in docs/guide/schemes.md: delay [dt] and work lost [J] of the first closure,
+    halvings 0, 1, 2, 3."""
     delay, lost = np.zeros(4), np.zeros(4)
     for halvings in range(4):
         for i in range(16):

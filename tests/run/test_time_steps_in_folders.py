@@ -1,4 +1,5 @@
-"""Runs with changing dt in folders: what they count, checkpoints, restarts to the last bit, on any number of ranks."""
+"""Runs with changing dt in folders: what they count, checkpoints, restarts to the last bit, on any
+number of ranks."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ THREE = Schedule(((4e-3, 0.2), (1e-3, 0.3), (2.5e-3, inf)))
 
 @serial
 def test_what_a_run_counts(tmp_path: Path):
-    """Base steps in steps and t_end, accepted steps in rows and k, attempts thrown away on their own."""
+    """Base steps in steps and t_end, accepted steps in rows and k, attempts thrown away on their
+    own."""
     plan = HalvedAtImpact(5e-3, 3)
     solution = run_chain(tmp_path, 300, dt=plan)
     facts, rows = solution.facts, len(solution.history["t"]) - 1
@@ -70,7 +72,8 @@ PLANS = [
     ids=repr,
 )
 def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: Any):
-    """From checkpoints here and there, also right after halved steps: state and files of the straight run."""
+    """From checkpoints here and there, also right after halved steps: state and files of the
+    straight run."""
     straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
     method = Method(chain(), scheme, [Condensed()], plan, tolerance=1e-9)
     loop = March(method, step_plan(plan, 199, None), initial_state(chain()))
@@ -99,7 +102,8 @@ class Stop(Exception):
 def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before(
     tmp_path: Path, scheme: Any
 ):
-    """Rows of the unfinished base step are in history.csv, and are computed again, to the last bit."""
+    """Rows of the unfinished base step are in history.csv, and are computed again, to the last
+    bit."""
     plan = HalvedAtImpact(5e-3, 3)
 
     def go(folder: str, k: int, **more: Any) -> Any:
@@ -143,7 +147,8 @@ def test_another_plan_is_refused(tmp_path: Path):
     wrong: list[tuple[Any, str]] = [
         (
             5e-3,
-            r"of a run with dt = HalvedAtImpact\(dt=0.005, halvings=3\) but this one has 0.005: restart the same",
+            r"of a run with dt = HalvedAtImpact\(dt=0.005, halvings=3\) but this one has 0.005: "
+            r"restart the same",
         ),
         (
             HalvedAtImpact(5e-3, 2),

@@ -1,4 +1,5 @@
-"""A wall time ends a run before the queue does: read as Slurm reads it, decided alike on all ranks, and restarted."""
+"""A wall time ends a run before the queue does: read as Slurm reads it, decided alike on all ranks,
+and restarted."""
 
 from __future__ import annotations
 
@@ -71,7 +72,8 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[Clock]:
     ],
 )
 def test_slurm_reads_it_so(text: str, seconds: float) -> None:
-    """The six forms of sbatch(1), --time: the same digits mean minutes first without days, hours first with them."""
+    """The six forms of sbatch(1), --time: the same digits mean minutes first without days, hours
+    first with them."""
     assert seconds_of(text) == seconds
 
 
@@ -109,7 +111,8 @@ def test_what_slurm_does_not_read(text: Any, tmp_path: Path) -> None:
 
 @serial
 def test_what_is_left_is_never_less_than_the_margin(clock: Clock) -> None:
-    """A step of 30 s, a checkpoint of 10 s: over once no more than 2 (30 + 2 · 10) s are left, no earlier."""
+    """A step of 30 s, a checkpoint of 10 s: over once no more than 2 (30 + 2 · 10) s are left, no
+    earlier."""
     one = WallTime("1000:00")
     one.begin()
     assert one.unsure
@@ -135,7 +138,8 @@ def test_without_a_wall_time_there_is_no_end(clock: Clock) -> None:
 
 @serial
 def test_the_run_ends_before_the_time_and_goes_on(tmp_path: Path, clock: Clock) -> None:
-    """Steps of 10 s, 600 s: saved, told and of a status of its own; the restart is the straight run to the last bit."""
+    """Steps of 10 s, 600 s: saved, told and of a status of its own; the restart is the straight run
+    to the last bit."""
     clock.now = 35.0  # what came before the run counts
     record = [Energy(), Contact(), clock.takes(10.0)]
     with pytest.raises(
@@ -160,7 +164,8 @@ def test_the_run_ends_before_the_time_and_goes_on(tmp_path: Path, clock: Clock) 
 
 @serial
 def test_too_little_time_still_makes_a_step(tmp_path: Path, clock: Clock) -> None:
-    """A chain of restarts ends, however short their time: every one of them does a step. The last one finishes."""
+    """A chain of restarts ends, however short their time: every one of them does a step. The last
+    one finishes."""
     record = [Energy(), Contact(), clock.takes(100.0)]
     for k in (1, 2, 3):
         with pytest.raises(OutOfTime, match=f"after step {k}, "):
@@ -172,7 +177,8 @@ def test_too_little_time_still_makes_a_step(tmp_path: Path, clock: Clock) -> Non
 
 
 def test_one_rank_is_late(comm: Any, shared_tmp: Path, clock: Clock) -> None:
-    """The last rank's clock alone runs out: all end after the same step, and go on like the straight run."""
+    """The last rank's clock alone runs out: all end after the same step, and go on like the
+    straight run."""
     pytest.importorskip("dolfinx")
     seconds = 10.0 if comm.rank == comm.size - 1 else 0.0
     with pytest.raises(OutOfTime, match="after step 9, "):
@@ -209,8 +215,8 @@ def test_the_command(
 @serial
 @pytest.mark.slow
 def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
-    """With srun and sbatch that run in place: jobs whose second is over when they begin, as they are as old as their
-    shell, make a step each and go on from one another until all is done."""
+    """With srun and sbatch that run in place: jobs whose second is over when they begin, as they
+    are as old as their shell, make a step each and go on from one another until all is done."""
     pytest.importorskip("dolfinx")
     guide = (Path(PACKAGE) / "docs" / "guide" / "clusters.md").read_text(encoding="utf-8")
     script = guide.split("```bash\n")[1].split("```")[0]
@@ -253,7 +259,8 @@ def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
 
 @serial
 def test_the_age_is_that_of_the_process() -> None:
-    """A process that has slept before it imports anything is at least so old, and no older than who has started it."""
+    """A process that has slept before it imports anything is at least so old, and no older than who
+    has started it."""
     code = "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import age\nprint(age())"
     begin = time.monotonic()
     said = subprocess.run(

@@ -1,5 +1,5 @@
-"""What schemes with contact in the balance of forces share: the acceleration they start from, the massless contact
-layer, ledger, impulses, friction, restarts (V1.1, V1.5, V9.7, V9.8)."""
+"""What schemes with contact in the balance of forces share: the acceleration they start from, the
+massless contact layer, ledger, impulses, friction, restarts (V1.1, V1.5, V9.7, V9.8)."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def acceleration(problem: ContactProblem, u: Array, v: Array) -> tuple[Array, Ar
 
 
 def test_acceleration_of_resting_contacts() -> None:
-    """A resting bar under its weight presses with all of it and does not accelerate; a lifted one falls; one that a
-    spring presses up leaves the wall."""
+    """A resting bar under its weight presses with all of it and does not accelerate; a lifted one
+    falls; one that a spring presses up leaves the wall."""
     resting = bar(10, gravity=10.0)
     a, reaction = acceleration(resting, np.zeros(11), np.zeros(11))
     assert a[0] == 0.0  # not the whole bar: stress has not built up, only the foot is held
@@ -97,7 +97,8 @@ def test_acceleration_with_springs_and_held_points() -> None:
 
 
 def test_acceleration_without_mass_at_the_contact() -> None:
-    """Massless unknowns have none, and a reaction that balances their forces; the others move as without contact."""
+    """Massless unknowns have none, and a reaction that balances their forces; the others move as
+    without contact."""
     problem = bar(10, gravity=10.0, damping=1e-3, mass=MASSLESS)
     system = problem.equations
     u, v = np.linspace(0.0, -0.02, 11), np.linspace(1.0, -3.0, 11)
@@ -112,7 +113,8 @@ def test_acceleration_without_mass_at_the_contact() -> None:
     ("pull", "speed", "slips"), [(0.2, 0.0, False), (2.0, 0.0, True), (0.0, 3.0, True)]
 )
 def test_acceleration_with_friction(pull: float, speed: float, slips: bool) -> None:
-    """A resting point holds a small pull, slips under a large one, and friction brakes what slides already."""
+    """A resting point holds a small pull, slips under a large one, and friction brakes what slides
+    already."""
     problem = column(1, v0=(speed, 0.0), friction=Coulomb(0.5), mass=CONSISTENT)
     system = problem.system
     force = np.array(
@@ -145,7 +147,8 @@ def ledger(problem: ContactProblem, reports: Iterable[Report]) -> tuple[float, R
 @pytest.mark.parametrize("mass", [MASSLESS, CONSISTENT], ids=["massless", "consistent"])
 @pytest.mark.parametrize("given", [thrown, bouncing, period_three])
 def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
-    """V9.7: what the energy of each step becomes is known to 1e-10 of the largest energy, with mass or without."""
+    """V9.7: what the energy of each step becomes is known to 1e-10 of the largest energy, with mass
+    or without."""
     dt = 0.5 / 20 * (1.0 if given is period_three else 1 / 3)
     problem = given(20, mass=mass)
     defect, last = ledger(problem, run(problem, scheme, dt=dt, steps=160))
@@ -158,7 +161,8 @@ def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
     "impact", [None, Inelastic(), Inelastic(ImpulseUpdate())], ids=["free", "reset", "project"]
 )
 def test_ledger_closes_with_damping_and_base_motion(scheme: Any, impact: Any) -> None:
-    """V9.7, also when impact laws change velocities and accelerations restart; on massless nodes the same loads."""
+    """V9.7, also when impact laws change velocities and accelerations restart; on massless nodes
+    the same loads."""
     reports = list(run(shaken(impact), scheme, dt=0.005, steps=300))
     assert changes(reports) > 8 and ledger(shaken(impact), reports)[0] <= 1e-12
     if impact is None:
@@ -175,8 +179,8 @@ def momentum(problem: ContactProblem, state: State) -> float:
 @schemes
 @pytest.mark.parametrize("mass", [MASSLESS, CONSISTENT], ids=["massless", "consistent"])
 def test_V98_impulse_of_an_impact(mass: Any, scheme: Any) -> None:
-    """V9.8: from free flight to free flight the sum of dt r_n, with the weights of the balance, is the change of
-    momentum to 1e-12; for Newmark in every step."""
+    """V9.8: from free flight to free flight the sum of dt r_n, with the weights of the balance, is
+    the change of momentum to 1e-12; for Newmark in every step."""
     problem, dt = (
         bar(20, gap=0.1, v0=lambda x: np.full_like(x, -10.0), damping=1e-4, mass=mass),
         1 / 60,
@@ -195,7 +199,8 @@ def test_V98_impulse_of_an_impact(mass: Any, scheme: Any) -> None:
 
 @schemes
 def test_contact_force_does_not_ring_without_mass(scheme: Any) -> None:
-    """V1.1 on redistributed mass, Courant number one: from 0.1 s after the impact the force stays within 1 % of 300."""
+    """V1.1 on redistributed mass, Courant number one: from 0.1 s after the impact the force stays
+    within 1 % of 300."""
     force = [
         r.new.r_n[0]
         for r in run(thrown(100, mass=MASSLESS), scheme, dt=1 / 300, steps=320)
@@ -227,7 +232,8 @@ def test_gravity_stage_stays_still(scheme: Any) -> None:
 
 @schemes
 def test_initial_data_are_put_into_equilibrium_once(scheme: Any) -> None:
-    """V1.3 starts with a stressed free end, which a massless node cannot hold: 1/N of the energy (V9.4)."""
+    """V1.3 starts with a stressed free end, which a massless node cannot hold: 1/N of the energy
+    (V9.4)."""
     problem = period_three(50, mass=MASSLESS)
     start = scheme.start(problem, initial_state(problem), 0.01)
     assert energy(problem, start) == pytest.approx(0.125 * (1.0 - 1.0 / 50), rel=1e-12)
@@ -238,7 +244,8 @@ def test_initial_data_are_put_into_equilibrium_once(scheme: Any) -> None:
 @schemes
 @pytest.mark.parametrize("mass", [MASSLESS, CONSISTENT], ids=["massless", "consistent"])
 def test_restart_from_a_checkpoint(tmp_path: Path, mass: Any, scheme: Any) -> None:
-    """The memory holds arrays only, and all that the scheme carries: restarts are exact to the last bit."""
+    """The memory holds arrays only, and all that the scheme carries: restarts are exact to the last
+    bit."""
     problem = bouncing(20, mass=mass)
     states = [report.new for report in run(problem, scheme, dt=1 / 60, steps=120)]
     assert any(state.active.any() for state in states[70:90])
@@ -259,7 +266,8 @@ def _numbers(state: State) -> Sequence[Array]:
 
 @schemes
 def test_acceleration_restarts_after_an_impact_law(scheme: Any) -> None:
-    """After a velocity jump the memory is that of a start with the new velocity: the collision's force is spent."""
+    """After a velocity jump the memory is that of a start with the new velocity: the collision's
+    force is spent."""
     problem, jumps = shaken(Inelastic()), 0
     for report in run(problem, scheme, dt=0.005, steps=100):
         if np.array_equal(report.new.v, report.v_minus):
@@ -274,7 +282,8 @@ def test_acceleration_restarts_after_an_impact_law(scheme: Any) -> None:
 
 @schemes
 def test_memory_of_another_time_or_scheme_is_not_used(scheme: Any) -> None:
-    """A single-step scheme hands on what it does not know: after it, and after another member, all begins anew."""
+    """A single-step scheme hands on what it does not know: after it, and after another member, all
+    begins anew."""
     problem = chain_problem(4, gap=1.0, constant=3.0, v0=np.ones(4))
     for other in (SS22(), GeneralisedAlpha.spectral_radius(0.6)):
         state = list(run(problem, scheme, dt=0.01, steps=5))[-1].new
@@ -288,7 +297,8 @@ def test_memory_of_another_time_or_scheme_is_not_used(scheme: Any) -> None:
 
 @schemes
 def test_V15_oblique_impact_with_friction(scheme: Any) -> None:
-    """V1.5 on redistributed mass: slip speed, impulses and friction work of the exact solution, and a closed ledger."""
+    """V1.5 on redistributed mass: slip speed, impulses and friction work of the exact solution, and
+    a closed ledger."""
     problem, dt = (
         column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=MASSLESS),
         0.01 / np.sqrt(2.0),
@@ -316,7 +326,8 @@ def problem_material() -> Any:
 
 
 def test_V15_friction_with_mass_at_the_contact() -> None:
-    """Consistent mass and enough damping of high frequencies: the same impulses and friction work."""
+    """Consistent mass and enough damping of high frequencies: the same impulses and friction
+    work."""
     exact = ObliqueImpact(1.0, problem_material(), 1.0, 1.0, 0.3)
     for scheme in (HHT(-1 / 3), Houbolt()):
         problem, dt, work = (

@@ -1,4 +1,5 @@
-"""Contact-stabilised Newmark: pressure without ringing, energy never gained by contact (V9.5), Kane's form (1.7)."""
+"""Contact-stabilised Newmark: pressure without ringing, energy never gained by contact (V9.5),
+Kane's form (1.7)."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 pytestmark = pytest.mark.serial
 STABILISED = ContactStabilisedNewmark()
 MASS: dict[str, Any] = {"mass": ConsistentMass()}
-# 25 elements: (bar, steps in a second at Courant number one, steps for a fall and an impact, energy)
+# 25 elements: (bar, steps in a second at Courant number one, steps for a fall and an impact,
+# energy)
 BARS = {
     "V1.1": (thrown, 75, 113, 500.0),
     "V1.2": (bouncing, 75, 160, 500.0),
@@ -41,8 +43,8 @@ def chain(n: int = 6, **more: Any) -> ContactProblem:
 
 @pytest.mark.parametrize("other", [ZienkiewiczWoodTaylor(0.5), SS22()])
 def test_kanes_form_is_the_midpoint_rule(other):
-    """1.7 (ii): without the projection it equals Zienkiewicz-Wood-Taylor(½) and SS22(½, ½) to 1e-10 in every third
-    step of the thrown bar; with the former even the end of the run does."""
+    """1.7 (ii): without the projection it equals Zienkiewicz-Wood-Taylor(½) and SS22(½, ½) to 1e-10
+    in every third step of the thrown bar; with the former even the end of the run does."""
     problem, closed = thrown(**MASS), 0
     for report in run(problem, ContactStabilisedNewmark(False), dt=1 / 300, steps=450):
         closed += int(report.new.active[0])
@@ -59,7 +61,8 @@ def test_kanes_form_is_the_midpoint_rule(other):
 
 
 def test_kanes_form_with_damping_base_motion_and_springs():
-    """The same, every second step, with everything in the equations; springs are not projected: both forms agree."""
+    """The same, every second step, with everything in the equations; springs are not projected:
+    both forms agree."""
     problem = chain(
         gap=0.01, damping=1e-3, constant=30.0, excitation=SHAKEN, v0=np.ones(6), consistent=True
     )
@@ -80,7 +83,8 @@ def test_kanes_form_with_damping_base_motion_and_springs():
 
 
 def test_order_and_stability_without_contact():
-    """Second order with damping, constant load and base motion; spectral radius one without damping."""
+    """Second order with damping, constant load and base motion; spectral radius one without
+    damping."""
     assert observed_order(STABILISED) == pytest.approx(2.0, abs=0.06)
     for frequency in np.logspace(-2, 4, 13):
         undamped, damped = (
@@ -92,7 +96,8 @@ def test_order_and_stability_without_contact():
 
 @pytest.mark.parametrize(("courant", "oscillation"), [(0.5, 0.001), (1.0, 0.003), (2.0, 0.007)])
 def test_V11_pressure_does_not_oscillate(courant, oscillation):
-    """Table 1.7: largest error of the contact pressure, E_end/E0 = 0.9957 at Courant number one; V1.1 pass criteria."""
+    """Table 1.7: largest error of the contact pressure, E_end/E0 = 0.9957 at Courant number one;
+    V1.1 pass criteria."""
     problem, dt = thrown(**MASS), courant / 300.0
     reports = list(run(problem, STABILISED, dt=dt, steps=round(1.5 / dt)))
     t = np.array([report.new.t for report in reports])
@@ -119,8 +124,9 @@ def test_V12_energy_after_five_periods():
 @pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
 @pytest.mark.parametrize("name", BARS)
 def test_V95_energy_never_rises(name, courant):
-    """V9.5, V9.7: no step gains 1e-11 E0 under constant load, every ledger closes, nothing penetrates. (Kane's form is
-    the midpoint rule step by step, see above; the energy of that one: V9.1 in its own file.)"""
+    """V9.5, V9.7: no step gains 1e-11 E0 under constant load, every ledger closes, nothing
+    penetrates. (Kane's form is the midpoint rule step by step, see above; the energy of that one:
+    V9.1 in its own file.)"""
     body, rate, steps, E0 = BARS[name]
     found = course(body(25, **MASS), STABILISED, dt=courant / rate, steps=round(steps / courant))
     assert found.rise <= 1e-11 * E0
@@ -130,7 +136,8 @@ def test_V95_energy_never_rises(name, courant):
 
 
 def test_V95_identity():
-    """V9.5: E1 - E0 = -r·gap(u0) - 2/dt² q·gap(u1), and the predictor is the projection in the norm of the mass."""
+    """V9.5: E1 - E0 = -r·gap(u0) - 2/dt² q·gap(u1), and the predictor is the projection in the norm
+    of the mass."""
     problem, dt, opened = thrown(**MASS), 1 / 300, 0.0
     surface, M = problem.surface, problem.equations.M
     for report in run(problem, STABILISED, dt=dt, steps=450):
@@ -153,7 +160,8 @@ def test_V95_identity():
 
 @pytest.mark.parametrize("name", BARS)
 def test_V97_ledger_with_damping_and_base_motion(name):
-    """V9.7: with both, the ledger closes to 1e-10 of the largest energy; contact and algorithm only take."""
+    """V9.7: with both, the ledger closes to 1e-10 of the largest energy; contact and algorithm only
+    take."""
     body, rate, steps, E0 = BARS[name]
     shake = Harmonic(amplitude=5.0, frequency=3.0, direction=(1.0,))
     for damping in (0.0, 1e-3):
@@ -168,7 +176,8 @@ def test_V97_ledger_with_damping_and_base_motion(name):
 
 
 def test_damping_never_gains_energy_in_impacts():
-    """V9.5: heavy damping with C (u1 - u0)/dt keeps the energy non-increasing where the projection moves points."""
+    """V9.5: heavy damping with C (u1 - u0)/dt keeps the energy non-increasing where the projection
+    moves points."""
     assert (
         course(bouncing(50, damping=0.02, **MASS), STABILISED, dt=1 / 150, steps=1600).rise
         <= 1e-11 * 500.0

@@ -1,4 +1,5 @@
-"""Generalised-alpha: range, spectrum, order, the printed equations, and contact on both masses (V8.5 orders, V9.2)."""
+"""Generalised-alpha: range, spectrum, order, the printed equations, and contact on both masses
+(V8.5 orders, V9.2)."""
 
 from __future__ import annotations
 
@@ -67,7 +68,8 @@ def test_unconditionally_stable(scheme: GeneralisedAlpha, damping: float) -> Non
 
 @pytest.mark.parametrize("rho", RADII)
 def test_spectral_radius_at_infinite_frequency(rho: float) -> None:
-    """Chung and Hulbert: all three roots become -rho_inf; no member of order 2 with it damps low frequencies less."""
+    """Chung and Hulbert: all three roots become -rho_inf; no member of order 2 with it damps low
+    frequencies less."""
     found = amplification(of(rho), 1e6)
     assert np.trace(found) == pytest.approx(-3.0 * rho, abs=1e-6)
     assert np.linalg.det(found) == pytest.approx(-(rho**3), abs=1e-6)
@@ -76,7 +78,8 @@ def test_spectral_radius_at_infinite_frequency(rho: float) -> None:
 
 
 def test_members() -> None:
-    """rho_inf = 1 has alpha_m = alpha_f = ½; rho_inf = ½ is HHT(-1/3); rho_inf = 0 has alpha_m = -1, alpha_f = 0."""
+    """rho_inf = 1 has alpha_m = alpha_f = ½; rho_inf = ½ is HHT(-1/3); rho_inf = 0 has alpha_m =
+    -1, alpha_f = 0."""
     assert of(1.0) == GeneralisedAlpha(0.5, 0.5, 0.25, 0.5)
     assert of(0.0) == GeneralisedAlpha(-1.0, 0.0, 1.0, 1.5)
     ours, theirs = of(0.5).weights, HHT(-1 / 3).weights
@@ -94,7 +97,8 @@ def test_first_order_with_more_damping() -> None:
 
 
 def test_the_printed_equations() -> None:
-    """Against dense algebra: acceleration from the weighted equation of motion, damping and weighted loads included."""
+    """Against dense algebra: acceleration from the weighted equation of motion, damping and
+    weighted loads included."""
     problem, dt = oscillators(4, damping=0.02, constant=3.0, excitation=SHAKEN), 0.03
     M, C, K = dense(problem)
     f, u, v = problem.equations.load, problem.equations.u0, problem.equations.v0
@@ -146,7 +150,7 @@ def test_V92_no_energy_from_contact_without_mass(rho: float, courant: float, end
 
 @pytest.mark.parametrize(("rho", "ends"), [(0.5, 0.966), (0.0, 0.933)])
 def test_V92_with_mass_the_damping_must_see_the_highest_frequency(rho: float, ends: float) -> None:
-    """V1.3 at Courant number ½ on consistent mass: with strong damping of high frequencies no gain; with rho_inf = 0.8
-    there is one, several times the energy."""
+    """V1.3 at Courant number ½ on consistent mass: with strong damping of high frequencies no gain;
+    with rho_inf = 0.8 there is one, several times the energy."""
     assert four_bounces(of(rho), ConsistentMass(), 0.5) == pytest.approx(ends, abs=2e-3)
     assert four_bounces(of(0.8), ConsistentMass(), 0.5) > 2.0

@@ -46,8 +46,9 @@ def test_alpha_zero_is_newmark() -> None:
 
 @pytest.mark.slow
 def test_V92_mass_at_the_contact() -> None:
-    """V1.3, four bounces at Courant number one: no gain on consistent mass; two with a dt that resolves the highest
-    frequency (Courant number 0.1): the energy multiplies. On redistributed mass neither (V9.4)."""
+    """V1.3, four bounces at Courant number one: no gain on consistent mass; two with a dt that
+    resolves the highest frequency (Courant number 0.1): the energy multiplies. On redistributed
+    mass neither (V9.4)."""
     for mass, courant, low, high in (
         (ConsistentMass(), 1.0, 0.94, 0.96),
         (Redistributed(), 1.0, 0.95, 0.965),

@@ -1,4 +1,5 @@
-"""Houbolt: its formulas, order, spectrum, and contact with mass at the contact nodes (V4.1, V9.2)."""
+"""Houbolt: its formulas, order, spectrum, and contact with mass at the contact nodes (V4.1,
+V9.2)."""
 
 from __future__ import annotations
 
@@ -83,7 +84,8 @@ def test_V92_no_energy_from_contact_on_either_mass(courant: float, ends: float, 
 
 
 def test_V92_falling_bar_with_a_small_step() -> None:
-    """V1.2 on consistent mass at Courant number 0.1, where Newmark reaches 37 E0: energy is never exceeded."""
+    """V1.2 on consistent mass at Courant number 0.1, where Newmark reaches 37 E0: energy is never
+    exceeded."""
     problem = bouncing(50, mass=ConsistentMass())
     energies = [
         energy(problem, r.new) / 500.0 + 1.0 for r in run(problem, SCHEME, dt=0.1 / 150, steps=4000)

@@ -1,4 +1,5 @@
-"""Multistep operators: Newmark in one-step form, coefficients, order, stability, restart, energy (V4.1, V9.2)."""
+"""Multistep operators: Newmark in one-step form, coefficients, order, stability, restart, energy
+(V4.1, V9.2)."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def test_V41_trapezoidal_rule():
 
 
 def test_V41_effective_matrix():
-    """V4.1: A = rho gamma0/(mu dt² b0) + c a0/(dt b0) (+ K): 4 rho/dt² + 2 c/dt for the trapezoidal rule."""
+    """V4.1: A = rho gamma0/(mu dt² b0) + c a0/(dt b0) (+ K): 4 rho/dt² + 2 c/dt for the trapezoidal
+    rule."""
     rho, dt = 2.0, 0.1
     problem = chain_problem(1, mass=rho, stiffness=7.0, damping=3.0 / 7.0)  # c = 3
     for scheme, expected in (
@@ -91,7 +93,8 @@ def test_third_order_backward_differences_are_refused():
 
 @pytest.mark.parametrize(("beta", "gamma"), [(0.25, 0.5), (0.3025, 0.6), (0.4, 0.5), (0.5, 1.0)])
 def test_V41_newmark_in_its_one_step_form(beta, gamma):
-    """The two-step form reproduces the one-step formulas, to 1e-10, with damping and base motion."""
+    """The two-step form reproduces the one-step formulas, to 1e-10, with damping and base
+    motion."""
     problem, dt = oscillators(4, damping=0.02, constant=3.0, excitation=SHAKEN), 0.03
     M, C, K = dense(problem)
     f, u, v = problem.equations.load, problem.equations.u0, problem.equations.v0
@@ -107,7 +110,8 @@ def test_V41_newmark_in_its_one_step_form(beta, gamma):
 
 
 def test_V41_trapezoidal_rule_is_the_midpoint_rule_for_constant_loads():
-    """V4.1: Newmark(¼, ½) and Zienkiewicz-Wood-Taylor(½) in (u, v) to 1e-10, with damping and a constant load."""
+    """V4.1: Newmark(¼, ½) and Zienkiewicz-Wood-Taylor(½) in (u, v) to 1e-10, with damping and a
+    constant load."""
     problem = oscillators(4, damping=0.02, constant=3.0)
     midpoint = run(problem, ZienkiewiczWoodTaylor(), dt=0.05, steps=300)
     for one, other in zip(run(problem, NEWMARK, dt=0.05, steps=300), midpoint, strict=True):
@@ -121,12 +125,14 @@ def test_V41_trapezoidal_rule_is_the_midpoint_rule_for_constant_loads():
     ids=["trapezoidal", "beta 0.4", "Houbolt", "gamma 0.6"],
 )
 def test_order(scheme, order):
-    """With damping, constant load and base motion; Houbolt (q = 3) keeps second order through its start."""
+    """With damping, constant load and base motion; Houbolt (q = 3) keeps second order through its
+    start."""
     assert observed_order(scheme, steps=400) == pytest.approx(order, abs=0.1)
 
 
 def test_restart_in_flight_changes_nothing_for_newmark():
-    """A jump to the velocity it already has: the restarted past is Newmark's own, and costs Houbolt O(dt²) only."""
+    """A jump to the velocity it already has: the restarted past is Newmark's own, and costs Houbolt
+    O(dt²) only."""
     problem, dt = oscillators(4, damping=0.02, constant=3.0), 0.02
     for scheme, tolerance in ((NEWMARK, 1e-10), (DISSIPATIVE, 1e-10), (HOUBOLT, 5e-3)):
         half = last_state(problem, scheme, dt=dt, steps=50)
@@ -149,7 +155,8 @@ def test_another_dt_or_another_member_starts_a_new_past():
 
 @pytest.mark.parametrize(("beta", "gamma"), [(0.25, 0.5), (0.3025, 0.6), (0.4, 0.5)])
 def test_V92_krenks_energy_identity_with_contact(beta, gamma):
-    """V9.2, undamped: the change of E + ½(beta-gamma/2)dt² aᵀMa is the work of the contact and of the weights."""
+    """V9.2, undamped: the change of E + ½(beta-gamma/2)dt² aᵀMa is the work of the contact and of
+    the weights."""
     dt = 0.01
     problem = bar(20, gap=0.02, gravity=10.0, v0=lambda x: -10.0 - 0.1 * x)
     system, surface = problem.equations, problem.surface
@@ -173,8 +180,9 @@ def test_V92_krenks_energy_identity_with_contact(beta, gamma):
 
 
 def test_V92_hard_contact_in_the_acceleration_balance_gains_energy():
-    """1.7, the negative result: V1.1 at Courant number one ends with 10.9 E0 and pressure oscillations of 2.3; V1.2
-    with some two hundred E0 after five periods. A limitation of the method, not to be repaired silently."""
+    """1.7, the negative result: V1.1 at Courant number one ends with 10.9 E0 and pressure
+    oscillations of 2.3; V1.2 with some two hundred E0 after five periods. A limitation of the
+    method, not to be repaired silently."""
     problem, worst = thrown(), 0.0
     for report in run(problem, NEWMARK, dt=1 / 300, steps=450):
         if 0.6 < report.new.t < 1.067:

@@ -1,4 +1,5 @@
-"""Massless contact nodes at the start of a run: in equilibrium, at the cost of their own rows of K."""
+"""Massless contact nodes at the start of a run: in equilibrium, at the cost of their own rows of
+K."""
 
 from __future__ import annotations
 
@@ -81,7 +82,8 @@ PROBLEMS = {
 
 
 def disturbed(problem: ContactProblem) -> State:
-    """A state whose contact layer is not in equilibrium: it points into the obstacle and along it."""
+    """A state whose contact layer is not in equilibrium: it points into the obstacle and along
+    it."""
     system, surface = problem.equations, problem.surface
     size = 1e-4 * surface.whole().weights.mean()
     u = size * np.sin(1.0 + 7.0 * system.space.coordinates.sum(axis=1))
@@ -108,7 +110,8 @@ def with_the_whole_matrix(problem: ContactProblem, state: State) -> tuple[Array,
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_only_contact_rows_are_factorised(name: str, factorised: Rows) -> None:
-    """The equilibrium of the layer is that of the whole matrix, to 1e-11, and inner unknowns stay as they are."""
+    """The equilibrium of the layer is that of the whole matrix, to 1e-11, and inner unknowns stay
+    as they are."""
     problem = PROBLEMS[name]()
     state = disturbed(problem)
     u, r_n = with_the_whole_matrix(problem, state)

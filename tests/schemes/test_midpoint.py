@@ -1,4 +1,5 @@
-"""The midpoint rule is Zienkiewicz-Wood-Taylor(½), SS22(½, ½) and Kane's rule: (ii) of table 1.7; V9.1."""
+"""The midpoint rule is Zienkiewicz-Wood-Taylor(½), SS22(½, ½) and Kane's rule: (ii) of table 1.7;
+V9.1."""
 
 from __future__ import annotations
 
@@ -25,8 +26,9 @@ SCHEME, CONSISTENT = Midpoint(), ConsistentMass()
 
 @pytest.mark.parametrize("other", [ZienkiewiczWoodTaylor(0.5), SS22(0.5, 0.5)], ids=repr)
 def test_17_same_as_its_other_names_over_the_thrown_bar(other: object) -> None:
-    """Table 1.7 (ii): V1.1 from flight through contact to flight, every step to 1e-10. It starts 5 cm above the
-    wall instead of 5 m, or the closing velocity would show the rounding errors of 5 m over dt."""
+    """Table 1.7 (ii): V1.1 from flight through contact to flight, every step to 1e-10. It starts 5
+    cm above the wall instead of 5 m, or the closing velocity would show the rounding errors of 5 m
+    over dt."""
     closed = 0
     problem = bar(100, gap=0.05, v0=lambda x: np.full_like(x, -10.0), mass=CONSISTENT)
     for one, two in zip(
@@ -43,7 +45,8 @@ def test_17_same_as_its_other_names_over_the_thrown_bar(other: object) -> None:
 
 
 def test_17_same_as_kane_step_by_step() -> None:
-    """Table 1.7 (ii): the other derivation, from the same state, to 1e-10. Kane's formulas have the contact last."""
+    """Table 1.7 (ii): the other derivation, from the same state, to 1e-10. Kane's formulas have the
+    contact last."""
     dt, closed = 5e-3, 0
     undamped = shaken(excitation=(), v0=np.ones(6), damping=0.0)
     for report in run(undamped, SCHEME, dt=dt, steps=200):
@@ -61,7 +64,8 @@ def test_second_order() -> None:
 
 @pytest.mark.parametrize("given", [thrown, bouncing, period_three])
 def test_V91_contact_never_creates_energy_and_the_ledger_closes(given: object) -> None:
-    """V9.1: the change is minus r_n times the gap before the closure; V9.7 to 1e-12 of the largest energy."""
+    """V9.1: the change is minus r_n times the gap before the closure; V9.7 to 1e-12 of the largest
+    energy."""
     dt = 0.5 / 40 * (1.0 if given is period_three else 1 / 3)
     problem, largest = given(40, mass=CONSISTENT), 0.0  # type: ignore[operator]
     gap0 = problem.surface.gap0
@@ -75,7 +79,8 @@ def test_V91_contact_never_creates_energy_and_the_ledger_closes(given: object) -
 
 
 def test_V91_friction_takes_energy_and_the_ledger_closes() -> None:
-    """V9.1: D_fric = r_t·du_t >= 0 in every step of the oblique impact (V1.5); impulses change momentum (V9.8)."""
+    """V9.1: D_fric = r_t·du_t >= 0 in every step of the oblique impact (V1.5); impulses change
+    momentum (V9.8)."""
     problem, dt = (
         column(50, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=CONSISTENT),
         0.02 / np.sqrt(2.0),

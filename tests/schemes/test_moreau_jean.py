@@ -36,7 +36,8 @@ DISSIPATIVE = [
     MoreauJean(2.0 / 3.0, 0.5),
     MoreauJean(1.0),
 ]
-# 25 elements: (bar, steps in a second at Courant number one, steps for a fall and an impact, energy)
+# 25 elements: (bar, steps in a second at Courant number one, steps for a fall and an impact,
+# energy)
 BARS = {
     "V1.1": (thrown, 75, 113, 500.0),
     "V1.2": (bouncing, 75, 160, 500.0),
@@ -50,7 +51,8 @@ def chain(n: int = 6, **more: Any) -> ContactProblem:
 
 
 def rattling(seed: int) -> ContactProblem:
-    """A free chain between two walls: impacts at both ends, points that bounce, press and separate again."""
+    """A free chain between two walls: impacts at both ends, points that bounce, press and separate
+    again."""
     rng = np.random.default_rng(seed)
     gaps = 0.01 * rng.random(2)
     motion = {"v0": rng.normal(size=6), "constant": 20.0 * rng.normal()}
@@ -101,7 +103,8 @@ def test_what_cannot_work_is_refused(problem, words):
 
 @pytest.mark.parametrize(("theta", "order"), [(0.5, 2.0), (0.6, 1.0), (1.0, 1.0)])
 def test_order_and_stability_without_contact(theta, order):
-    """Second order at theta = ½, else first, with damping, constant load and base motion; stable at every frequency."""
+    """Second order at theta = ½, else first, with damping, constant load and base motion; stable at
+    every frequency."""
     scheme = MoreauJean(theta)
     assert observed_order(scheme, steps=200 if order > 1 else 400) == pytest.approx(order, abs=0.06)
     for frequency in np.logspace(-2, 4, 13):
@@ -124,8 +127,8 @@ def pressures(scheme: Any, courant: float) -> tuple[np.ndarray, np.ndarray, floa
 
 @pytest.mark.parametrize(("courant", "oscillation"), [(0.5, 0.001), (1.0, 0.002), (2.0, 0.003)])
 def test_V11_pressure_does_not_oscillate_without_restitution(courant, oscillation):
-    """Table 1.7, e = 0: error of the contact pressure, E_end/E0 = 0.9942, the mean force of the step is 300; the gap
-    closes late, by ½ dt v0 = 1.67e-2 at Courant number one."""
+    """Table 1.7, e = 0: error of the contact pressure, E_end/E0 = 0.9942, the mean force of the
+    step is 300; the gap closes late, by ½ dt v0 = 1.67e-2 at Courant number one."""
     t, p, share, gap = pressures(INELASTIC, courant)
     assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(
         oscillation, abs=6e-4
@@ -149,8 +152,8 @@ def test_V11_restitution_of_nodes_chatters(courant, oscillation):
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "share", "periods"), [(LITERAL, 0.940, 5), (ELASTIC, 1.000, 1)])
 def test_V12_energy_after_five_periods(scheme, share, periods):
-    """Table 1.7: E/E0 after five periods of the bouncing bar at Courant number one, with Newton's law to the letter;
-    that nothing is lost with e = 1 is seen after one."""
+    """Table 1.7: E/E0 after five periods of the bouncing bar at Courant number one, with Newton's
+    law to the letter; that nothing is lost with e = 1 is seen after one."""
     problem = bouncing(**MASS)
     *_, last = run(problem, scheme, dt=1 / 300, steps=1600 * periods)
     assert energy(problem, last.new) / 500.0 + 1.0 == pytest.approx(share, abs=5e-4)
@@ -158,7 +161,8 @@ def test_V12_energy_after_five_periods(scheme, share, periods):
 
 @pytest.mark.slow
 def test_V12_energy_falls_monotonically_over_five_periods():
-    """1.7 (iii): the default is dissipative in every step, at the price of 0.937 instead of 0.940 in the end."""
+    """1.7 (iii): the default is dissipative in every step, at the price of 0.937 instead of 0.940
+    in the end."""
     found = course(bouncing(**MASS), INELASTIC, dt=1 / 300, steps=8000)
     assert found.rise <= 1e-11 * 500.0 and abs(found.defect) <= 1e-10 * found.largest
     assert found.last / 500.0 + 1.0 == pytest.approx(0.940, abs=4e-3)
@@ -180,7 +184,8 @@ def test_V93_energy_never_rises_on_bars(name, courant, scheme):
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", DISSIPATIVE)
 def test_V93_energy_never_rises_where_points_separate(scheme):
-    """V9.3: points that separate within a drifted gap and are caught again create no energy either."""
+    """V9.3: points that separate within a drifted gap and are caught again create no energy
+    either."""
     caught = 0
     for seed in range(4):
         problem = rattling(seed)
@@ -197,14 +202,16 @@ def test_V93_energy_never_rises_where_points_separate(scheme):
 
 
 def test_V93_newtons_law_on_separating_points_gains_energy():
-    """Why they have a bound of their own: with the literal law the same runs gain, with e = ½ a thousandth at once."""
+    """Why they have a bound of their own: with the literal law the same runs gain, with e = ½ a
+    thousandth at once."""
     for e, least in ((0.0, 4e-6), (0.5, 1e-4)):
         found = course(rattling(2), MoreauJean(0.5, e, allow_energy_gain=True), dt=5e-3, steps=200)
         assert found.rise > least * found.first and found.contact < -least * found.first
 
 
 def test_V93_negative_test():
-    """V9.3: theta = 0.6, e = 1 gains energy in impacts: more than 0.5 % of all there is in a single step of V1.1."""
+    """V9.3: theta = 0.6, e = 1 gains energy in impacts: more than 0.5 % of all there is in a single
+    step of V1.1."""
     found = course(
         thrown(**MASS), MoreauJean(0.6, 1.0, allow_energy_gain=True), dt=1 / 300, steps=450
     )
@@ -214,7 +221,8 @@ def test_V93_negative_test():
 
 @pytest.mark.parametrize("scheme", DISSIPATIVE)
 def test_V93_identity(scheme):
-    """V9.3: E1 - E0 = -v_θ·BᵀP - (θ - ½)(|Δv|²_M + |Δu|²_K), and P B v_θ = ((1 - θ) - θ e) P B v0 for an approach."""
+    """V9.3: E1 - E0 = -v_θ·BᵀP - (θ - ½)(|Δv|²_M + |Δu|²_K), and P B v_θ = ((1 - θ) - θ e) P B v0
+    for an approach."""
     problem, dt, impacts = rattling(1), 5e-3, 0
     surface, system, theta = problem.surface, problem.equations, scheme.theta
     E0 = energy(problem, initial_state(problem))
@@ -242,7 +250,8 @@ def test_V93_identity(scheme):
 @pytest.mark.parametrize("scheme", [INELASTIC, ELASTIC, MoreauJean(0.6, 0.5)])
 @pytest.mark.parametrize("name", BARS)
 def test_V97_ledger_with_damping_and_base_motion(name, scheme):
-    """V9.7: with both, the ledger closes to 1e-10 of the largest energy; contact and algorithm only take."""
+    """V9.7: with both, the ledger closes to 1e-10 of the largest energy; contact and algorithm only
+    take."""
     body, rate, steps, E0 = BARS[name]
     shake = Harmonic(amplitude=5.0, frequency=3.0, direction=(1.0,))
     for damping in (0.0, 1e-3):
@@ -271,7 +280,8 @@ def test_V98_contact_impulse_is_the_change_of_momentum(scheme):
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
 def test_single_mass_rebounds_with_its_restitution(e):
-    """A free mass at a wall: v+ = -e v-, mean reaction m (1 + e) v-/dt, at any theta that is allowed."""
+    """A free mass at a wall: v+ = -e v-, mean reaction m (1 + e) v-/dt, at any theta that is
+    allowed."""
     for theta in {0.5, 1.0 / (1.0 + e)}:
         problem = chain(1, gap=0.1, mass=2.0, floating=True, v0=np.array([3.0]))
         reports = list(run(problem, MoreauJean(theta, e), dt=0.01, steps=10))
@@ -283,7 +293,8 @@ def test_single_mass_rebounds_with_its_restitution(e):
 
 @pytest.mark.parametrize("gap", [0.1, 0.11, 0.12, 0.129])
 def test_gap_closes_late_by_less_than_a_step_of_the_approach(gap):
-    """Drift: between 0 and dt v, here dt v = 0.03; it stays while the mass rests, and the recorder shows it."""
+    """Drift: between 0 and dt v, here dt v = 0.03; it stays while the mass rests, and the recorder
+    shows it."""
     problem = chain(1, gap=gap, mass=2.0, floating=True, v0=np.array([3.0]))
     recorder = Contact()
     recorder.start(problem, initial_state(problem))
@@ -293,7 +304,8 @@ def test_gap_closes_late_by_less_than_a_step_of_the_approach(gap):
 
 
 def test_halved_steps_take_the_drift_with_them():
-    """HalvedAtImpact: three halvings of the closing step leave an eighth of the penetration of V1.1."""
+    """HalvedAtImpact: three halvings of the closing step leave an eighth of the penetration of
+    V1.1."""
     problem, smallest = thrown(**MASS), 0.0
     for report in run(problem, INELASTIC, dt=HalvedAtImpact(1 / 300, halvings=3), steps=160):
         smallest = min(smallest, 5.0 - report.new.u[0])
@@ -318,7 +330,8 @@ def test_a_weight_at_rest_stays_at_rest():
 
 
 def test_held_points_stay_and_open_points_are_free():
-    """Bilateral points keep their place, pulled or pushed; with a wall out of reach nothing happens at all."""
+    """Bilateral points keep their place, pulled or pushed; with a wall out of reach nothing happens
+    at all."""
     problem = chain(
         gap=0.0, v0=np.linspace(0.0, 1.0, 6) * np.array([1, 1, 1, 1, 1, 0]), consistent=True
     )

@@ -1,4 +1,5 @@
-"""Newmark: its multistep and trapezoidal forms, Krenk's identity, and the negative result (V9.2, V9.4)."""
+"""Newmark: its multistep and trapezoidal forms, Krenk's identity, and the negative result (V9.2,
+V9.4)."""
 
 from __future__ import annotations
 
@@ -54,7 +55,8 @@ def test_order(beta: float, gamma: float, order: float) -> None:
 
 @MEMBERS
 def test_same_as_the_multistep_form(beta: float, gamma: float) -> None:
-    """Contact runs, to round-off: on redistributed mass, with an impact law and damping, and under a plan of steps."""
+    """Contact runs, to round-off: on redistributed mass, with an impact law and damping, and under
+    a plan of steps."""
     ours, theirs = Newmark(beta, gamma), LinearMultistep.newmark(beta, gamma)
     for problem, dt, steps in (
         (thrown(40, mass=Redistributed(), damping=1e-4), 1 / 120, 200),
@@ -75,8 +77,9 @@ def test_same_as_the_multistep_form(beta: float, gamma: float) -> None:
 def test_quarter_half_is_the_trapezoidal_rule(
     height: float, damping: float, per_second: int
 ) -> None:
-    """V1.1 on redistributed mass, every step to 1e-9: displacements, velocities, contact force; the same ledger. No
-    step ends at touch-down, a tie that round-off decides; it also starts from 5 cm, for less round-off."""
+    """V1.1 on redistributed mass, every step to 1e-9: displacements, velocities, contact force; the
+    same ledger. No step ends at touch-down, a tie that round-off decides; it also starts from 5 cm,
+    for less round-off."""
     v0 = lambda x: np.full_like(x, -10.0)  # noqa: E731
     problem = bar(100, gap=height, v0=v0, damping=damping, mass=Redistributed())
     schemes, steps = (Newmark(), Trapezoidal()), round(1.5 * per_second)
@@ -93,8 +96,8 @@ def test_quarter_half_is_the_trapezoidal_rule(
 )
 @MEMBERS
 def test_V92_krenks_identity_is_the_ledger(beta: float, gamma: float, mass: Any) -> None:
-    """V9.2, undamped: E + ½(beta-gamma/2)dt² aᵀMa changes by the work of the contact, which the ledger books, and by
-    the damping of the weights, which it books as algorithmic."""
+    """V9.2, undamped: E + ½(beta-gamma/2)dt² aᵀMa changes by the work of the contact, which the
+    ledger books, and by the damping of the weights, which it books as algorithmic."""
     dt = 0.01
     problem = bar(20, gap=0.02, gravity=10.0, v0=lambda x: -10.0 - 0.1 * x, mass=mass)
     system, surface = problem.equations, problem.surface
@@ -136,8 +139,8 @@ def test_V94_contact_work_without_mass() -> None:
 def test_V92_negative_mass_at_the_contact_multiplies_energy(
     courant: float, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """V1.3 on consistent mass: more than tenfold energy within four bounces, and one warning that says so. A limitation
-    of the method, not to be repaired silently."""
+    """V1.3 on consistent mass: more than tenfold energy within four bounces, and one warning that
+    says so. A limitation of the method, not to be repaired silently."""
     problem = period_three(100, mass=ConsistentMass())
     with caplog.at_level(logging.WARNING):
         *_, last = run(problem, Newmark(), dt=courant / 100, steps=round(1200 / courant))

@@ -1,4 +1,5 @@
-"""Schemes on finite elements: volume and condensed routes take the same steps, on any number of ranks."""
+"""Schemes on finite elements: volume and condensed routes take the same steps, on any number of
+ranks."""
 
 from __future__ import annotations
 
@@ -56,7 +57,8 @@ def scheme(request: pytest.FixtureRequest) -> Any:
 
 @pytest.mark.two_ranks
 def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
-    """V4.0, step by step: bounds on displacements and, where contact is predicted, on velocities (+inf elsewhere)."""
+    """V4.0, step by step: bounds on displacements and, where contact is predicted, on velocities
+    (+inf elsewhere)."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))
     checked = cross_check(
         wall(MPI.COMM_WORLD), scheme=scheme, solvers=solvers, dt=WALL_DT, steps=STEPS
@@ -69,7 +71,8 @@ def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     "dt", [WALL_DT, HalvedAtImpact(WALL_DT, halvings=2)], ids=["whole", "halved"]
 )
 def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
-    """V4.0: no scheme and no mass named, so redistributed mass and the trapezoidal rule; steps may be halved."""
+    """V4.0: no scheme and no mass named, so redistributed mass and the trapezoidal rule; steps may
+    be halved."""
     problem = replace(wall(MPI.COMM_WORLD), mass=None)
     solvers = (Condensed(), Volume(method=ReducedNewton()))
     checked = cross_check(problem, solvers=solvers, dt=dt, steps=STEPS)
@@ -114,8 +117,9 @@ def test_ranks_agree_and_contact_opens_and_closes(scheme: Any, law: dict[str, An
     ],
 )
 def test_friction_of_impulses_may_add_energy(scheme: MoreauJean, law: Any, gain: float) -> None:
-    """V9.3 is about the normal direction: where sliding turns within a step, the mean velocity and the friction at its
-    end may have the same direction. The gains that docs/guide/schemes.md prints; none at theta = 1."""
+    """V9.3 is about the normal direction: where sliding turns within a step, the mean velocity and
+    the friction at its end may have the same direction. The gains that docs/guide/schemes.md
+    prints; none at theta = 1."""
     mesh, tags = build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(8, 8)), MPI.COMM_SELF)
     system = assemble(mesh, LinearElastic(E=1000.0, nu=0.3, rho=1.0), initial_velocity=(0.5, -1.0))
     ground = HalfSpace(point=(0.0, -0.05), normal=(0.0, 1.0))

@@ -1,4 +1,5 @@
-"""Friction in the schemes with projections and impulses: exact impact (V1.5), ledger and energy (V9.5, V9.7), stick."""
+"""Friction in the schemes with projections and impulses: exact impact (V1.5), ledger and energy
+(V9.5, V9.7), stick."""
 
 from __future__ import annotations
 
@@ -22,8 +23,9 @@ STABILISED, INELASTIC, ELASTIC = ContactStabilisedNewmark(), MoreauJean(), Morea
 
 @pytest.mark.parametrize("scheme", [STABILISED, INELASTIC, ELASTIC])
 def test_V15_oblique_impact(scheme: Any) -> None:
-    """V1.5: slip speed 0.575736 during the contact, impulses (2.0, 0.6) on the base, energy 1 - 0.345442; reactions
-    are means of the steps, whether forces or impulses are what is solved for. Courant number one, 100 elements."""
+    """V1.5: slip speed 0.575736 during the contact, impulses (2.0, 0.6) on the base, energy 1 -
+    0.345442; reactions are means of the steps, whether forces or impulses are what is solved for.
+    Courant number one, 100 elements."""
     problem, dt = (
         column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=ConsistentMass()),
         0.01 / np.sqrt(2.0),
@@ -44,7 +46,8 @@ def test_V15_oblique_impact(scheme: Any) -> None:
 @pytest.mark.parametrize("law", [Coulomb(0.3), Coulomb(0.0), Tresca(0.01)])
 @pytest.mark.parametrize("damping", [0.0, 0.05])
 def test_V95_friction_takes_energy_in_every_step(law: Any, damping: float) -> None:
-    """V9.5, V9.7, contact-stabilised: E never rises and the ledger closes, with slips B_t (u1 - u0)."""
+    """V9.5, V9.7, contact-stabilised: E never rises and the ledger closes, with slips B_t (u1 -
+    u0)."""
     found = course(rubbing_block(law, damping=damping), STABILISED, dt=0.1, steps=150)
     assert found.rise <= 1e-11 * found.first and abs(found.defect) <= 1e-10 * found.largest
     assert found.friction >= -1e-12 * found.first
@@ -54,7 +57,8 @@ def test_V95_friction_takes_energy_in_every_step(law: Any, damping: float) -> No
 @pytest.mark.parametrize("law", [Coulomb(0.3), Tresca(0.01)])
 @pytest.mark.parametrize("scheme", [INELASTIC, ELASTIC, MoreauJean(1.0)])
 def test_V97_ledger_with_impulses_of_friction(scheme: MoreauJean, law: Any) -> None:
-    """V9.7, Moreau-Jean; at theta = 1, where law and work are at the same time, friction takes energy in every step."""
+    """V9.7, Moreau-Jean; at theta = 1, where law and work are at the same time, friction takes
+    energy in every step."""
     found = course(rubbing_block(law), scheme, dt=0.1, steps=150)
     assert abs(found.defect) <= 1e-10 * found.largest
     assert found.min_gap < 0.0 and found.last < 0.999 * found.first
@@ -73,7 +77,8 @@ def test_tresca_impulses_grow_with_the_step() -> None:
 
 @pytest.mark.parametrize("scheme", [STABILISED, INELASTIC])
 def test_enough_friction_sticks(scheme: Any) -> None:
-    """Closed points with friction without limit: no tangential displacement in the step, or no velocity at its end."""
+    """Closed points with friction without limit: no tangential displacement in the step, or no
+    velocity at its end."""
     problem, stuck = rubbing_block(Coulomb(1e3)), 0
     for report in run(problem, scheme, dt=0.1, steps=60):
         slip = report.new.u - report.old.u if scheme is STABILISED else report.new.v

@@ -28,8 +28,8 @@ def test_weights_outside_the_stable_range_are_refused(weights):
 
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_V41_spectrum_is_that_of_newmark(weights):
-    """V4.1: eigenvalues of the amplification = roots of gamma(z) + 2 xi w dt a(z) + (w dt)² b(z) of Newmark(theta2/2,
-    theta1), to 1e-10."""
+    """V4.1: eigenvalues of the amplification = roots of gamma(z) + 2 xi w dt a(z) + (w dt)² b(z) of
+    Newmark(theta2/2, theta1), to 1e-10."""
     theta1, theta2 = weights
     newmark = LinearMultistep.newmark(theta2 / 2.0, theta1)
     a, b, gamma = (np.array(c) for c in (newmark.a, newmark.b, newmark.gamma))
@@ -44,7 +44,8 @@ def test_V41_spectrum_is_that_of_newmark(weights):
 
 @pytest.mark.parametrize("impact", [None, Inelastic()])
 def test_V41_half_half_is_the_midpoint_rule_with_contact(impact):
-    """V4.1: SS22(½, ½) and Zienkiewicz-Wood-Taylor(½), every step to 1e-10, with damping, base motion and contact."""
+    """V4.1: SS22(½, ½) and Zienkiewicz-Wood-Taylor(½), every step to 1e-10, with damping, base
+    motion and contact."""
     problem = chain_problem(5, gap=0.02, damping=1e-3, excitation=SHAKEN, impact=impact)
     changes = 0
     for report in run(problem, ZienkiewiczWoodTaylor(), dt=0.01, steps=300):
@@ -58,8 +59,8 @@ def test_V41_half_half_is_the_midpoint_rule_with_contact(impact):
 
 
 def test_V41_the_printed_formulas():
-    """V4.1: alpha = (M + theta1 dt C + ½ theta2 dt² K)⁻¹ (f - C v - K (u + theta1 dt v)), u1 = u + dt v + ½dt² alpha,
-    v1 = v + dt alpha; the load at t + theta1 dt."""
+    """V4.1: alpha = (M + theta1 dt C + ½ theta2 dt² K)⁻¹ (f - C v - K (u + theta1 dt v)), u1 = u +
+    dt v + ½dt² alpha, v1 = v + dt alpha; the load at t + theta1 dt."""
     theta1, theta2, dt = 0.6, 0.9, 0.05
     problem = oscillators(4, damping=0.01, constant=3.0, excitation=SHAKEN)
     M, C, K = dense(problem)

@@ -62,7 +62,8 @@ def test_without_contact_it_is_the_midpoint_rule_but_for_the_load() -> None:
 @pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
 @pytest.mark.parametrize("given", [thrown, bouncing, period_three])
 def test_ledger_closes(given: Any, courant: float) -> None:
-    """V9.7: defect <= 1e-10 of the largest energy in every step; V9.4: nothing is lost but contact work."""
+    """V9.7: defect <= 1e-10 of the largest energy in every step; V9.4: nothing is lost but contact
+    work."""
     problem = given(25, mass=MASSLESS)
     wave = 1.0 if given is period_three else 30.0
     dt = courant * (1.0 if given is period_three else 10.0) / 25 / wave
@@ -73,7 +74,8 @@ def test_ledger_closes(given: Any, courant: float) -> None:
 
 
 def test_ledger_closes_with_damping_base_motion_and_springs() -> None:
-    """The chain of shaken.py has both; its lumped masses stay (consistent mass asked for by name)."""
+    """The chain of shaken.py has both; its lumped masses stay (consistent mass asked for by
+    name)."""
     assert (
         ledger(replace(shaken(), mass=ConsistentMass(), impact=None), dt=0.004, steps=300)["defect"]
         <= 1e-12
@@ -110,8 +112,8 @@ def test_momentum() -> None:
 
 
 def test_initial_data_are_put_into_equilibrium_once() -> None:
-    """V1.3 starts with a stressed free end, which a massless node cannot hold: its equilibrium is found at the start,
-    costs the energy of the first element (1/N), and is kept by restarts."""
+    """V1.3 starts with a stressed free end, which a massless node cannot hold: its equilibrium is
+    found at the start, costs the energy of the first element (1/N), and is kept by restarts."""
     problem = period_three(50, mass=MASSLESS)
     start = DEFAULT.start(problem, initial_state(problem), 0.01)
     assert energy(problem, start) == pytest.approx(0.125 * (1.0 - 1.0 / 50), rel=1e-12)
@@ -140,8 +142,9 @@ def test_restart_in_mid_run_is_exact() -> None:
 
 @pytest.mark.parametrize("damping", [0.0, 1e-4, 1e-2])
 def test_damping_does_not_ring_in_the_contact_layer(damping: float) -> None:
-    """Stiffness-proportional damping of the massless nodes goes inwards with their mass: the force stays smooth, and
-    near 300 (strong damping smears the front, but 0.1 s after the impact it is within 5 %)."""
+    """Stiffness-proportional damping of the massless nodes goes inwards with their mass: the force
+    stays smooth, and near 300 (strong damping smears the front, but 0.1 s after the impact it is
+    within 5 %)."""
     problem = thrown(50, damping=damping, mass=MASSLESS)
     force = np.array(
         [report.new.r_n[0] for report in run(problem, DEFAULT, dt=1 / 300, steps=300)]
@@ -151,7 +154,8 @@ def test_damping_does_not_ring_in_the_contact_layer(damping: float) -> None:
 
 
 def test_mass_at_the_contact_is_a_choice_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
-    """Consistent mass makes it Newmark(¼, ½): V1.3 gains more than tenfold energy; told once, with figures."""
+    """Consistent mass makes it Newmark(¼, ½): V1.3 gains more than tenfold energy; told once, with
+    figures."""
     problem = period_three(100, mass=ConsistentMass())
     with caplog.at_level(logging.WARNING):
         last = [report.new for report in run(problem, DEFAULT, dt=0.01, steps=1200)][-1]

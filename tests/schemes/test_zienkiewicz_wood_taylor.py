@@ -1,4 +1,5 @@
-"""Zienkiewicz-Wood-Taylor: midpoint and Kane's rule at phi = ½, order, stability, energy with contact (V4.1, V9.1)."""
+"""Zienkiewicz-Wood-Taylor: midpoint and Kane's rule at phi = ½, order, stability, energy with
+contact (V4.1, V9.1)."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ def test_unstable_weights_are_refused(phi):
 @pytest.mark.parametrize("phi", [0.5, 0.6, 1.0])
 @pytest.mark.parametrize("damping", [0.0, 0.3])
 def test_unconditionally_stable(phi, damping):
-    """Spectral radius <= 1 at every frequency; exactly 1 at phi = ½ without damping (no algorithmic damping)."""
+    """Spectral radius <= 1 at every frequency; exactly 1 at phi = ½ without damping (no algorithmic
+    damping)."""
     scheme = ZienkiewiczWoodTaylor(phi)
     for frequency in np.logspace(-2, 4, 13):
         radius = np.abs(
@@ -54,7 +56,8 @@ def test_exact_motion_is_what_it_converges_to():
 
 
 def test_V41_half_is_kanes_implicit_contact_rule():
-    """1.7 (ii): g(n+1) >= 0 at phi = ½ is Kane's implicit-contact Newmark, to 1e-10, step by step, open and closed."""
+    """1.7 (ii): g(n+1) >= 0 at phi = ½ is Kane's implicit-contact Newmark, to 1e-10, step by step,
+    open and closed."""
     problem, dt, closed = (
         chain_problem(6, gap=0.01, consistent=True, v0=np.ones(6), constant=20.0),
         5e-3,
@@ -78,7 +81,8 @@ def test_V41_half_is_kanes_implicit_contact_rule():
     ],
 )
 def test_V91_contact_never_creates_energy(problem, dt, steps, E0, zero):
-    """V9.1: E is non-increasing through contact and release, to 1e-12 E0; each closure loses r_n gap_old, no more."""
+    """V9.1: E is non-increasing through contact and release, to 1e-12 E0; each closure loses r_n
+    gap_old, no more."""
     body = problem()
     surface, last = body.surface, energy(body, initial_state(body)) + zero
     assert last == pytest.approx(E0, rel=1e-12)
@@ -105,7 +109,8 @@ def window(scheme, courant: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("courant", "oscillation"), [(0.5, 0.50), (1.0, 0.58), (2.0, 0.30)])
 def test_V11_published_behaviour_of_the_midpoint_rule(courant, oscillation):
-    """Table 1.7, row midpoint: pressure oscillation 0.50, 0.58, 0.30 and E_end/E0 = 0.9987 at Courant number one."""
+    """Table 1.7, row midpoint: pressure oscillation 0.50, 0.58, 0.30 and E_end/E0 = 0.9987 at
+    Courant number one."""
     worst, share = window(HALF, courant)
     assert worst == pytest.approx(oscillation, abs=0.005)
     if courant == 1.0:
@@ -113,7 +118,8 @@ def test_V11_published_behaviour_of_the_midpoint_rule(courant, oscillation):
 
 
 def test_V11_contact_time_pressure_and_rebound():
-    """V1.1: touch-down 0.5, release 7/6, mean pressure 300 in between, rebound 10 m/s, stress free."""
+    """V1.1: touch-down 0.5, release 7/6, mean pressure 300 in between, rebound 10 m/s, stress
+    free."""
     problem, dt = thrown(), 1 / 300
     reports = list(run(problem, HALF, dt=dt, steps=450))
     closed = np.array([report.new.t for report in reports if report.new.active[0]])
@@ -142,7 +148,8 @@ def bouncing_foot(t: float) -> float:
 
 
 def test_V12_foot_position_and_energy_after_five_periods():
-    """V1.2, Courant number one: rms of the foot about 0.01 h0 in the first period; E/E0 = 0.949 after five."""
+    """V1.2, Courant number one: rms of the foot about 0.01 h0 in the first period; E/E0 = 0.949
+    after five."""
     assert [round(bouncing_foot(t), 6) for t in (2.0, 8 / 3, 29 / 6)] == [1.666667, 3.888889, 3.75]
     problem, square = bouncing(), 0.0
     for report in run(problem, HALF, dt=1 / 300, steps=8000):
@@ -167,7 +174,8 @@ def test_V13_foot_converges_with_the_published_rate():
 
 
 def test_V98_contact_impulse_is_the_change_of_momentum():
-    """V9.8: for the free bar, rho-weighted sum of velocities changes by the contact impulse and its weight, 1e-12."""
+    """V9.8: for the free bar, rho-weighted sum of velocities changes by the contact impulse and its
+    weight, 1e-12."""
     problem, dt = bar(20, gap=0.02, gravity=10.0, v0=lambda x: -1.0 - 0.1 * x), 0.01
     rigid = problem.equations.M @ problem.equations.influence[:, 0]
     weight = rigid @ problem.equations.influence[:, 0] * 10.0

@@ -1,4 +1,5 @@
-"""Curves of G/Gmax and damping: published tables and Darendeli's formulas, and what they refuse (V8.8)."""
+"""Curves of G/Gmax and damping: published tables and Darendeli's formulas, and what they refuse
+(V8.8)."""
 
 from __future__ import annotations
 
@@ -9,7 +10,8 @@ from vi_contact.core.errors import InputError
 from vi_contact.soil import SoilCurves
 
 pytestmark = pytest.mark.serial
-DARENDELI = {  # (PI, OCR, p [Pa], f [Hz], N) -> G/Gmax and damping at 1e-6, 1e-5, … 1e-2, of pystrata 0.5.4
+# (PI, OCR, p [Pa], f [Hz], N) -> G/Gmax and damping at 1e-6, 1e-5, … 1e-2, of pystrata 0.5.4
+DARENDELI = {
     (0, 1, 101.3e3, 2, 5): (
         [0.995452402, 0.963474042, 0.760686456, 0.276952474, 0.044120609],
         [0.010008902, 0.013387182, 0.041385595, 0.140379290, 0.210033073],
@@ -36,7 +38,8 @@ def test_darendeli(case):
 
 
 def test_darendeli_at_the_reference_strain():
-    """One atmosphere, sand: half of Gmax at 0.0352 %, but for straight lines between ten strains a decade."""
+    """One atmosphere, sand: half of Gmax at 0.0352 %, but for straight lines between ten strains a
+    decade."""
     assert abs(SoilCurves.darendeli(mean_stress=101325.0).at(np.array(0.0352e-2))[0] - 0.5) < 1e-3
 
 
@@ -53,7 +56,8 @@ def test_published_tables():
 
 
 def test_between_the_rows_and_beyond_them():
-    """Straight over the logarithm; small strains are the first row; larger ones than the last are told."""
+    """Straight over the logarithm; small strains are the first row; larger ones than the last are
+    told."""
     own = SoilCurves([1e-5, 1e-3], [1.0, 0.5], [0.01, 0.11])
     reduction, damping = own.at(np.array([0.0, 1e-7, 1e-4, 1e-2]))
     assert np.allclose(reduction, [1.0, 1.0, 0.75, 0.5], rtol=1e-12)

@@ -1,4 +1,5 @@
-"""Equivalent-linear columns: closed form, the sample of SHAKE91 by pystrata, the same damping in time (V8.8)."""
+"""Equivalent-linear columns: closed form, the sample of SHAKE91 by pystrata, the same damping in
+time (V8.8)."""
 
 from __future__ import annotations
 
@@ -47,7 +48,8 @@ def test_one_linear_layer_is_the_closed_form(rock):
 
 
 def test_the_sample_of_shake91_is_that_of_pystrata():
-    """G, damping, strains and the peak of 16 layers, of numbers that were kept; 1 % as usual is 1 % off at most."""
+    """G, damping, strains and the peak of 16 layers, of numbers that were kept; 1 % as usual is 1 %
+    off at most."""
     expected = (
         shake91.EXPECTED_SHEAR,
         shake91.EXPECTED_DAMPING,
@@ -70,7 +72,8 @@ def test_pystrata_itself_finds_the_same(peak):
 
 
 def test_its_column_moves_alike_in_time():
-    """Damping of the stiffness, within motion: elements of a quarter of a metre against waves, to second order."""
+    """Damping of the stiffness, within motion: elements of a quarter of a metre against waves, to
+    second order."""
     record = shake91.motion(peak=1.5, dt=0.005, n=1600)
     curves = SoilCurves.vucetic_dobry(15)
     found = equivalent_linear([(3.0, SOIL, curves)] * 4, record, frequency=3.0)

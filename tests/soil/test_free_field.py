@@ -1,4 +1,5 @@
-"""Free-field sides: without a structure they are not there (seismic practice, free-field column with dashpots)."""
+"""Free-field sides: without a structure they are not there (seismic practice, free-field column
+with dashpots)."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ SCHEMES = {"trapezoidal": vc.Trapezoidal(), "zwt": vc.ZienkiewiczWoodTaylor()}
 
 
 def layered(comm, kind, *, simplices=False, n=1):
-    """A wide strip of two layers with free-field sides on one of the three bases, and the same with tied sides."""
+    """A wide strip of two layers with free-field sides on one of the three bases, and the same with
+    tied sides."""
     mesh, tags = strip(comm, 6.0, 8.0, (4 * n, 8 * n), simplices=simplices)
     upper = middles(mesh)[:, 1] > 4.0
     soft, stiff = (
@@ -78,7 +80,8 @@ def test_with_other_schemes(comm, scheme):
 
 @pytest.mark.serial
 def test_on_triangles_to_second_order(comm):
-    """A side node has a share of its triangles that differs from node to node: only whole strips are columns there."""
+    """A side node has a share of its triangles that differs from node to node: only whole strips
+    are columns there."""
     errors = []
     for n in (1, 2):
         pair = layered(comm, "relative", simplices=True, n=n)
@@ -89,7 +92,8 @@ def test_on_triangles_to_second_order(comm):
 
 @pytest.mark.serial
 def test_waves_of_a_structure_leave(comm):
-    """A pulse on the surface between the sides: most of its energy has left when the sides are absorbing."""
+    """A pulse on the surface between the sides: most of its energy has left when the sides are
+    absorbing."""
     mesh, tags = strip(comm, 6.0, 8.0, (12, 16))
     push = fem.Traction(
         tags["top"], lambda x, t: np.outer(np.abs(x[:, 0] - 3.0) < 1.0, [0.0, 1e4 * (t < 0.01)])

@@ -1,4 +1,5 @@
-"""A moved base and the frame of the ground are the same discrete problem: both base inputs of seismic practice."""
+"""A moved base and the frame of the ground are the same discrete problem: both base inputs of
+seismic practice."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ SCHEMES: dict[str, Any] = {
 
 @pytest.mark.serial
 def test_the_base_is_integrated_as_the_schemes_do():
-    """Trapezoidal rule, twice; Zienkiewicz-Wood-Taylor with the acceleration in the middle of the step."""
+    """Trapezoidal rule, twice; Zienkiewicz-Wood-Taylor with the acceleration in the middle of the
+    step."""
     shake = vc.Harmonic(2.0, 1.5, phase=0.4, direction=(1.0, -0.5))
     t = DT * np.arange(40)
     a = np.array([shake.acceleration(s) for s in t])
@@ -97,7 +99,8 @@ def test_time_steps_that_nobody_knows_and_motions_that_nobody_binds_are_refused(
 def two_frames(
     comm: Any, *, damping: Any = None, friction: Any = None, waves: Any = WAVES
 ) -> tuple[Any, Any]:
-    """A panel beside a rigid wall, shaken both ways: (problem in the ground's frame, with a moved base)."""
+    """A panel beside a rigid wall, shaken both ways: (problem in the ground's frame, with a moved
+    base)."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 2.0), divisions=(3, 6)), comm)
     data = {
         "section": vc.PlaneStress(0.2),
@@ -121,7 +124,8 @@ def two_frames(
 def difference(
     pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bool = False, changes: int = 4
 ) -> float:
-    """Largest difference of the reactions of two problems over the largest reaction; contact opens and closes.
+    """Largest difference of the reactions of two problems over the largest reaction; contact opens
+    and closes.
 
     ``rest``: both start from their static stage.
     """
@@ -171,7 +175,8 @@ def test_with_friction_on_an_obstacle_that_goes_along(comm):
 @pytest.mark.serial
 @pytest.mark.slow
 def test_a_block_on_a_box_of_soil_whose_base_moves(comm):
-    """In space, three components, sides tied both ways: a block rubs on the soil, is thrown off and comes down."""
+    """In space, three components, sides tied both ways: a block rubs on the soil, is thrown off and
+    comes down."""
     waves = [
         vc.Ricker(a, f, direction=tuple(e))
         for a, f, e in zip((9.0, 40.0, 7.0), (16.0, 19.0, 15.0), np.eye(3), strict=True)

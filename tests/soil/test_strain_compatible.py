@@ -1,4 +1,5 @@
-"""Strain-compatible soil of finite elements: the column of waves, and a block that rocks on it (V8.8)."""
+"""Strain-compatible soil of finite elements: the column of waves, and a block that rocks on it
+(V8.8)."""
 
 from __future__ import annotations
 
@@ -86,7 +87,8 @@ def level_ground(
 
 
 def beside_column(comm: Any, base: str, n: int, dt: float) -> tuple[Any, Any, list[float]]:
-    """The strip, the column of waves, and how far G, damping, strain and the peak of the surface are from it."""
+    """The strip, the column of waves, and how far G, damping, strain and the peak of the surface
+    are from it."""
     found = level_ground(comm, base, "tied", n, dt, tolerance=1e-3)
     column = soil.equivalent_linear(
         [(DEPTH / n, SOIL, CURVES)] * n,
@@ -131,7 +133,8 @@ def test_what_is_left_is_of_second_order(comm):
 
 @pytest.mark.serial
 def test_free_field_sides_follow(comm):
-    """Their columns have the stiffness and damping of the cells beside them, run by run: nothing else is different."""
+    """Their columns have the stiffness and damping of the cells beside them, run by run: nothing
+    else is different."""
     tied, free = (level_ground(comm, "rock", sides, n=6, t_end=1.0) for sides in ("tied", "free"))
     assert np.allclose(from_top(free.material.E), from_top(tied.material.E), rtol=1e-9)
     assert np.allclose(free.changes, tied.changes, rtol=1e-7)
@@ -192,7 +195,8 @@ def block_on_soil(comm: Any, peak: float, **options: Any) -> Any:
 
 @pytest.mark.serial
 def test_a_block_on_soil(comm):
-    """Where it stands the soil is softer than at the sides; the block stays as it is; the weight is carried."""
+    """Where it stands the soil is softer than at the sides; the block stays as it is; the weight is
+    carried."""
     found = block_on_soil(comm, 3.0)
     assert found.changes[-1] <= 0.01 < found.changes[0] and len(found.changes) < 12
     place = compat.cell_blocks(found.strain.function_space)[:, 0]
@@ -236,7 +240,8 @@ def test_on_any_number_of_ranks(comm):
 
 @pytest.mark.serial
 def test_cells_without_curves_keep_their_damping(comm):
-    """Soil under a structure with xi = 0.05: this stays in every run, and that of the soil is the curves'."""
+    """Soil under a structure with xi = 0.05: this stays in every run, and that of the soil is the
+    curves'."""
     mesh, _ = strip(comm, 2.0, DEPTH, (1, 12))
     lower = fem.Cells.where("lower", mesh, lambda x: x[1] < 0.5 * DEPTH + 1e-9)
     body, found = fem.Heterogeneous(E=1e8, nu=0.3, rho=2000.0, xi=0.05), []

@@ -1,4 +1,5 @@
-"""The primal-dual active set: warm starts, memory of the last factor, and problems on which the plain method cycles."""
+"""The primal-dual active set: warm starts, memory of the last factor, and problems on which the
+plain method cycles."""
 
 from __future__ import annotations
 
@@ -41,7 +42,8 @@ CYCLING = np.array([[4.0, 5.0, -5.0], [5.0, 9.0, -5.0], [-5.0, -5.0, 7.0]])
 
 @pytest.mark.parametrize("q", [(2.0, 1.0, -3.0), (-2.0, -1.0, 3.0), (2.0, 0.0, -3.0)])
 def test_a_cycle_of_the_plain_method_is_broken(q):
-    """SPD, m = 3 (the least order with cycles; Ben Gharbia and Gilbert 2012 have unsymmetric P-matrices)."""
+    """SPD, m = 3 (the least order with cycles; Ben Gharbia and Gilbert 2012 have unsymmetric
+    P-matrices)."""
     q = np.array(q)
     assert np.linalg.eigvalsh(CYCLING)[0] > 0.03
     visited = full_exchange(CYCLING, q, q < 0.0, 30)
@@ -56,7 +58,8 @@ def test_a_cycle_of_the_plain_method_is_broken(q):
 
 
 def test_many_cycling_blocks_at_once():
-    """Ten cycling problems side by side, weakly coupled; the fallback needs fewer changes than there are rows."""
+    """Ten cycling problems side by side, weakly coupled; the fallback needs fewer changes than
+    there are rows."""
     rng = np.random.default_rng(4)
     G = np.kron(np.eye(10), CYCLING) + 1e-4 * spd(rng, 30)
     q = np.tile([2.0, 1.0, -3.0], 10)
@@ -67,8 +70,8 @@ def test_many_cycling_blocks_at_once():
 
 
 def test_a_worst_case_of_pivoting_is_harmless():
-    """Fathi (Math. Program. 17, 1979): G = L Lᵀ with ones on and twos below the diagonal, q = -1: 2^m pivots for Lemke
-    and Murty; r = (1, 0, …, 0)."""
+    """Fathi (Math. Program. 17, 1979): G = L Lᵀ with ones on and twos below the diagonal, q = -1:
+    2^m pivots for Lemke and Murty; r = (1, 0, …, 0)."""
     for m in (8, 16, 24):
         L = np.eye(m) + 2.0 * np.tril(np.ones((m, m)), -1)
         result = solve(ActiveSet(), LCP(L @ L.T, -np.ones(m), np.zeros(m, dtype=bool)))
@@ -78,8 +81,8 @@ def test_a_worst_case_of_pivoting_is_harmless():
 
 
 def test_an_ill_conditioned_problem_does_not_wander():
-    """Condition 1e10, m = 60: full exchange by itself goes through hundreds of sets without a cycle (761 in one of
-    these); with patience, at most twice as many changes as rows."""
+    """Condition 1e10, m = 60: full exchange by itself goes through hundreds of sets without a cycle
+    (761 in one of these); with patience, at most twice as many changes as rows."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
         Q = np.linalg.qr(rng.normal(size=(60, 60)))[0]
@@ -102,7 +105,8 @@ def test_a_warm_start_at_the_solution_costs_no_iteration(kind):
 
 
 def test_iterations_count_changes_of_the_set_and_history_the_rows():
-    """G = I: the rows with q < 0 are active, so that a guess off by two rows is mended in one change."""
+    """G = I: the rows with q < 0 are active, so that a guess off by two rows is mended in one
+    change."""
     problem = LCP(np.eye(4), np.array([-1.0, -2.0, 3.0, 4.0]), np.zeros(4, dtype=bool))
     result = solve(ActiveSet(), problem, guess=np.array([True, False, True, False]))
     assert result.iterations == 1 and result.history == (2.0,)
@@ -135,7 +139,8 @@ def test_grazing_rows_do_not_flip_for_ever():
 
 
 def test_an_ill_conditioned_answer_is_certified():
-    """Hilbert matrix, condition 1.5e10: the residual stays at rounding level although r itself has six digits."""
+    """Hilbert matrix, condition 1.5e10: the residual stays at rounding level although r itself has
+    six digits."""
     G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
     r = np.ones(8)
     result = solve(ActiveSet(), LCP(G, -G @ r, np.zeros(8, dtype=bool)))
@@ -160,7 +165,8 @@ def test_failure_tells_what_happened_and_what_to_do():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_several_problems_at_once_have_the_answers_of_each(kind, route):
-    """From right and wrong guesses, after other problems, and with one among them that is refused."""
+    """From right and wrong guesses, after other problems, and with one among them that is
+    refused."""
     rng = np.random.default_rng(12)
     made = kind(rng, 9)
     prepared, alone = (ActiveSet().prepare(made.G, made.bilateral) for _ in range(2))

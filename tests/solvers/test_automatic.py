@@ -1,4 +1,5 @@
-"""The default solver takes the condensed route for small problems and the iterative one for large ones."""
+"""The default solver takes the condensed route for small problems and the iterative one for large
+ones."""
 
 from __future__ import annotations
 
@@ -46,7 +47,8 @@ def test_small_problems_are_condensed(caplog: pytest.LogCaptureFixture) -> None:
 
 @pytest.mark.parametrize("limits", [{"IN_SPACE": 100, "ALONE_IN_SPACE": 100}, {"DENSE": {3: 10}}])
 def test_large_ones_are_not(monkeypatch: pytest.MonkeyPatch, limits: dict[str, Any]) -> None:
-    """By unknowns or by contact points: the same motion as the condensed route's, to 1e-9, without its factor."""
+    """By unknowns or by contact points: the same motion as the condensed route's, to 1e-9, without
+    its factor."""
     problem = box()
     *_, (expected, _) = march(problem, dt=BOX_DT, steps=8)
     for name, limit in limits.items():
@@ -63,8 +65,8 @@ def test_large_ones_are_not(monkeypatch: pytest.MonkeyPatch, limits: dict[str, A
 
 
 def test_friction_and_ranks_make_it_iterative_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With friction the small problem has rows for the tangents too; several ranks factorise what is large in space by
-    MUMPS, as does one without CHOLMOD."""
+    """With friction the small problem has rows for the tangents too; several ranks factorise what
+    is large in space by MUMPS, as does one without CHOLMOD."""
     problem, rule = box(), vc.Automatic()
     K, surface = problem.system.K, problem.surface
     monkeypatch.setattr(automatic, "DENSE", {3: surface.total})

@@ -1,4 +1,5 @@
-"""The condensed route: D~ from its definition, primal and dual, all small methods, special surfaces (V4.0)."""
+"""The condensed route: D~ from its definition, primal and dual, all small methods, special surfaces
+(V4.0)."""
 
 from __future__ import annotations
 
@@ -67,8 +68,8 @@ def stepped(p: ContactProblem, k: int) -> StepProblem:
 
 
 def test_V40_schur_matrix_from_its_definition():
-    """V4.0, 4.1: D~ = K_cc - K_ci K_ii⁻¹ K_ic, the reactions to unit displacements, to 1e-10; symmetric to 1e-12, SPD;
-    its eigenvalues are the inverse ones of the flexibility."""
+    """V4.0, 4.1: D~ = K_cc - K_ci K_ii⁻¹ K_ic, the reactions to unit displacements, to 1e-10;
+    symmetric to 1e-12, SPD; its eigenvalues are the inverse ones of the flexibility."""
     p = problem()
     K = dense(p, DT)
     c = p.surface.owned
@@ -87,7 +88,8 @@ def test_V40_schur_matrix_from_its_definition():
 
 
 def test_V40_primal_and_dual_forms_of_a_step():
-    """V4.0: (49) swept in v on D~ and z~, and (42) in r: the same (u_n, r_n) to 1e-10; z~ from its partition."""
+    """V4.0: (49) swept in v on D~ and z~, and (42) in r: the same (u_n, r_n) to 1e-10; z~ from its
+    partition."""
     p = problem()
     step = next(
         report.step for report in run(p, HALF, dt=DT, steps=60) if 2 <= report.new.active.sum() <= 3
@@ -140,7 +142,8 @@ def test_conditions_out_of_reach(method):
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)
 def test_held_beside_unilateral(method):
-    """Two of five points held: an equality with reactions of either sign; with all held, the reduced linear system."""
+    """Two of five points held: an equality with reactions of either sign; with all held, the
+    reduced linear system."""
     mixed = problem(bilateral=np.array([True, False, False, True, False]))
     mixed = replace(
         mixed, surface=replace(mixed.surface, gap0=np.array([0.0, 0.01, 0.01, 0.0, 0.01]))

@@ -1,4 +1,5 @@
-"""Contact unknowns last beside the route with two whole substitutions, on any number of ranks (V4.0)."""
+"""Contact unknowns last beside the route with two whole substitutions, on any number of ranks
+(V4.0)."""
 
 from __future__ import annotations
 
@@ -124,7 +125,8 @@ def test_impulses_agree() -> None:
 
 
 def test_what_else_factorises(monkeypatch: Any) -> None:
-    """What CHOLMOD cannot do, what users order otherwise, and machines without it: PETSc factorises."""
+    """What CHOLMOD cannot do, what users order otherwise, and machines without it: PETSc
+    factorises."""
     problem = thrown_box(COMM)
     A = vc.ZienkiewiczWoodTaylor().effective_matrix(problem, BOX_DT)
     last = np.arange(3)

@@ -1,4 +1,5 @@
-"""Residual correction: an answer that is a little wrong is put right by the solver that gave it, whatever the law."""
+"""Residual correction: an answer that is a little wrong is put right by the solver that gave it,
+whatever the law."""
 
 from __future__ import annotations
 
@@ -61,7 +62,8 @@ def spoilt(step: StepProblem, result: StepResult, size: float) -> StepResult:
 
 @dataclass(frozen=True)
 class Spoiling:
-    """A solver whose first answer to every full step is wrong by ``size``; counts what it is asked."""
+    """A solver whose first answer to every full step is wrong by ``size``; counts what it is
+    asked."""
 
     solver: Any
     size: float
@@ -84,8 +86,8 @@ class Spoiling:
 @pytest.mark.serial
 @pytest.mark.parametrize("name", CASES)
 def test_an_answer_near_the_tolerance_is_corrected(name: str) -> None:
-    """Spoilt by 1e-7 it is right to a hundredth of the tolerance after three corrections at most, with the same contact
-    set; a clean answer is left as it is to the last digit."""
+    """Spoilt by 1e-7 it is right to a hundredth of the tolerance after three corrections at most,
+    with the same contact set; a clean answer is left as it is to the last digit."""
     given, law, solver = CASES[name]
     problem = replace(
         shaken_wall(COMM, contacts=None, **given), **({"friction": law} if law else {})
@@ -109,7 +111,8 @@ def test_an_answer_near_the_tolerance_is_corrected(name: str) -> None:
 
 
 def test_what_is_left_over_is_a_step_of_the_contract() -> None:
-    """With every share, from every answer whose reactions are too large by less than that: the solution of the step."""
+    """With every share, from every answer whose reactions are too large by less than that: the
+    solution of the step."""
     problem = replace(shaken_wall(COMM), friction=Coulomb(0.4))
     step = pressed(problem, MoreauJean(), 2e-3)
     solver = Condensed().prepare(step.A, problem.surface, step.scale)

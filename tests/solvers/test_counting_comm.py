@@ -1,5 +1,6 @@
-"""What a run with ``Iterative()`` sends over the ranks and multiplies: no factor, no array of the contact points, at
-most a dozen numbers at a time, and the products of its ledger and certificate."""
+"""What a run with ``Iterative()`` sends over the ranks and multiplies: no factor, no array of the
+contact points, at most a dozen numbers at a time, and the products of its ledger and
+certificate."""
 
 from __future__ import annotations
 
@@ -38,8 +39,8 @@ DOZEN = 12
 
 @dataclass
 class Traffic:
-    """Sizes of what was reduced, gathered or sent to all since it began, how often outside the solver, and how often a
-    matrix of the equations was applied."""
+    """Sizes of what was reduced, gathered or sent to all since it began, how often outside the
+    solver, and how often a matrix of the equations was applied."""
 
     begin: Callable[[], None] = lambda: None
     sizes: list[int] = field(default_factory=list)
@@ -55,7 +56,8 @@ class Traffic:
 
 @pytest.fixture
 def traffic(monkeypatch: pytest.MonkeyPatch) -> Traffic:
-    """From ``begin`` on all problems are large, and factors and gathered contact arrays are refused, on one rank too."""
+    """From ``begin`` on all problems are large, and factors and gathered contact arrays are
+    refused, on one rank too."""
     found = Traffic()
 
     def refuse(owner: Any, name: str) -> None:
@@ -110,9 +112,9 @@ def box(**data: Any) -> vc.ContactProblem:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
-    """From a prediction that is all wrong. The solver's products are its own; the certificate has two, M x
-    and K x, which the ledger and the next step use again, and one reduction where there are
-    several ranks."""
+    """From a prediction that is all wrong. The solver's products are its own; the certificate has
+    two, M x and K x, which the ledger and the next step use again, and one reduction where there
+    are several ranks."""
     problem, scheme = box(), vc.Midpoint()
     assert problem.surface.total > 2 * DOZEN
     state = initial_state(problem)
@@ -131,7 +133,8 @@ def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
     )
 
 
-# name -> problem, scheme, products a step outside the solver, certificate (1) and ledger (3) included
+# name -> problem, scheme, products a step outside the solver, certificate (1) and ledger (3)
+# included
 STEPPED: dict[str, tuple[dict[str, Any], Any, float]] = {
     "midpoint": ({}, vc.Midpoint(), 6),
     "default": ({"mass": Redistributed()}, None, 6),
@@ -165,7 +168,8 @@ def test_steps_with_their_ledger(name: str, traffic: Traffic) -> None:
 
 
 def test_a_gravity_stage(traffic: Traffic) -> None:
-    """Of a body that contact alone holds: at most three forms of its six rigid motions, 6 x 6, at once."""
+    """Of a body that contact alone holds: at most three forms of its six rigid motions, 6 x 6, at
+    once."""
     problem = standing(lengths=(1.0, 3.0, 1.0), divisions=(4, 6, 4), simplices=True)
     assert problem.surface.total > 2 * DOZEN and problem.static_load.rows >= 0
     solver = vc.Iterative()
@@ -175,7 +179,8 @@ def test_a_gravity_stage(traffic: Traffic) -> None:
 
 
 def test_a_whole_run(traffic: Traffic) -> None:
-    """To its summary, without arrays of the contact points in its histories; a linear step is not timed."""
+    """To its summary, without arrays of the contact points in its histories; a linear step is not
+    timed."""
     problem, _ = with_defaults(box(), None)
     assert problem.equations.rows >= 0
     traffic.begin()

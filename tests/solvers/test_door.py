@@ -1,4 +1,5 @@
-"""What no step lets in: negative limits of friction and NaN, of every solver, scheme and dimension."""
+"""What no step lets in: negative limits of friction and NaN, of every solver, scheme and
+dimension."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ NAN = math.nan
 
 @dataclass(frozen=True)
 class Own:
-    """A law of a user's own: cohesion [Pa] and slope, those at points to the right of x, and only when it slides."""
+    """A law of a user's own: cohesion [Pa] and slope, those at points to the right of x, and only
+    when it slides."""
 
     cohesion: float = 0.0
     slope_: float = 0.3
@@ -199,7 +201,8 @@ def test_an_excitation_that_is_no_number(scheme):
 
 
 def test_gaps_slips_and_states_that_are_no_numbers():
-    """Of an obstacle whose motion somebody set by hand, and of a scheme that leaves NaN in its guess."""
+    """Of an obstacle whose motion somebody set by hand, and of a scheme that leaves NaN in its
+    guess."""
     system, surface = body(2)
 
     def late(shape: Any) -> Any:
@@ -241,7 +244,8 @@ def test_the_guess_of_a_scheme():
 @pytest.mark.parametrize("name", ["M", "K"])
 @pytest.mark.parametrize("solver", ["newton", "volume", "iterative"])
 def test_matrices_with_entries_that_are_no_numbers(solver, name):
-    """An entry off the diagonal of a matrix that somebody put in: named, with its place, before a solver has it."""
+    """An entry off the diagonal of a matrix that somebody put in: named, with its place, before a
+    solver has it."""
     system, surface = body(2)
     mat = getattr(system, name).mat.copy()
     first, last = mat.getOwnershipRange()

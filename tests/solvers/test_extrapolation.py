@@ -27,7 +27,8 @@ def steps(way: Any, g: Callable[[Array], Array], x: Array, *, limit: int = 300) 
 
 
 def test_one_unknown_and_a_linear_map_need_three_images() -> None:
-    """x <- a x + 1, contracting, alternating or expanding the other way: the secant through two points is exact."""
+    """x <- a x + 1, contracting, alternating or expanding the other way: the secant through two
+    points is exact."""
     for a in (0.9, 0.5, -0.5, -3.0):
         assert steps(Anderson(), lambda x, a=a: a * x + 1.0, np.zeros(1)) <= 4
     assert steps(Plain(), lambda x: 0.9 * x + 1.0, np.zeros(1)) > 200
@@ -43,8 +44,8 @@ def test_linear_maps_of_n_unknowns() -> None:
 
 
 def test_plain_steps_where_the_map_expands() -> None:
-    """g = min(1.2 x + 1, 10) from 0, kept positive: the fixed point is 10, a secant through the first two points leads
-    to -5, and from there back to the start."""
+    """g = min(1.2 x + 1, 10) from 0, kept positive: the fixed point is 10, a secant through the
+    first two points leads to -5, and from there back to the start."""
     for way in (Plain(), Anderson()):
         assert steps(way, lambda x: np.clip(1.2 * x + 1.0, 0.0, 10.0), np.zeros(1)) < 16
 

@@ -1,4 +1,5 @@
-"""The condensed route with friction: its Delassus operator, what it stores and when, springs under it, its fallback."""
+"""The condensed route with friction: its Delassus operator, what it stores and when, springs under
+it, its fallback."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ def problem(friction: Any = Coulomb(0.4), **more: Any) -> ContactProblem:
 
 
 def rough(order: tuple[int, ...] = (1, 0, 2)) -> ContactProblem:
-    """The column rubbing with three of its nodes, in any order; the last one may not move along the wall."""
+    """The column rubbing with three of its nodes, in any order; the last one may not move along the
+    wall."""
     p, places = problem(), np.argsort(order)
     surface: ContactSurface = replace(
         p.surface,
@@ -63,7 +65,8 @@ def reports(
 
 
 def test_delassus_operator_from_its_definition() -> None:
-    """DᵀA⁻¹D node by node, compliance/scale on the diagonal of normal rows; a prescribed tangent stands alone."""
+    """DᵀA⁻¹D node by node, compliance/scale on the diagonal of normal rows; a prescribed tangent
+    stands alone."""
     p = rough()
     A = SCHEME.effective_matrix(p, DT)
     inverse = np.linalg.inv(np.column_stack([A @ e for e in np.eye(p.equations.rows)]))
@@ -127,7 +130,8 @@ def test_no_coefficient_no_friction() -> None:
 
 
 def test_newton_that_wanders_is_led_back() -> None:
-    """Friction far beyond real values (mu = 3): two iterations do not solve some problems, sweeps and more do."""
+    """Friction far beyond real values (mu = 3): two iterations do not solve some problems, sweeps
+    and more do."""
     rescued = 0
     for seed in range(60):
         G, q, bilateral = small(seed, 10, 3)
@@ -143,8 +147,8 @@ def test_newton_that_wanders_is_led_back() -> None:
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_sweeps_leave_little_to_newton(monkeypatch: pytest.MonkeyPatch, d: int) -> None:
-    """Compiled sweeps find the states in the plane, and in space the answer, of more nodes than a group of theirs has;
-    the answer is that of Newton's method alone."""
+    """Compiled sweeps find the states in the plane, and in space the answer, of more nodes than a
+    group of theirs has; the answer is that of Newton's method alone."""
     if library(SerialComm()) is None:
         pytest.skip("nothing is compiled here")
     for seed in range(4):
@@ -162,7 +166,8 @@ def test_sweeps_leave_little_to_newton(monkeypatch: pytest.MonkeyPatch, d: int) 
 
 
 def test_without_an_inverse_in_single_precision_sweeps_go_on() -> None:
-    """A matrix that is positive definite in double precision only: sweeps do without its inverse."""
+    """A matrix that is positive definite in double precision only: sweeps do without its
+    inverse."""
     vectors = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 40)))[0]
     G = vectors @ np.diag(np.logspace(0.0, -9.0, 40)) @ vectors.T
     prepared = FrictionNewton().prepare(0.5 * (G + G.T), np.zeros(20, dtype=bool))

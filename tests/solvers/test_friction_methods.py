@@ -1,4 +1,5 @@
-"""Friction methods on small random problems: against an enumeration of states in 2D, against each other in 3D."""
+"""Friction methods on small random problems: against an enumeration of states in 2D, against each
+other in 3D."""
 
 from __future__ import annotations
 
@@ -37,12 +38,14 @@ NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "anderson", "given", "given an
 
 
 def enumerated(G: Array, q: Array, bilateral: Mask, cohesion: Array, slope: Array) -> list[Array]:
-    """All solutions in 2D: every set of states (open, pressed or pulled; stick, slip either way) with right signs."""
+    """All solutions in 2D: every set of states (open, pressed or pulled; stick, slip either way)
+    with right signs."""
     m, found = len(q), []
     kinds = [(1, 2) if held else (0, 1) for held in bilateral]  # 0 open, 1 pressed, 2 pulled
     states = [list(product(of_node, (0, 1, -1))) for of_node in kinds]
     for state in product(*states):
-        # unknowns r; row of node i: r_n = 0 (open) or w_n = 0; w_t = 0 or r_t = side (cohesion + slope r_n)
+        # unknowns r; row of node i: r_n = 0 (open) or w_n = 0; w_t = 0 or r_t = side (cohesion +
+        # slope r_n)
         matrix, right = G.copy(), -q.ravel()
         for i, (kind, side) in enumerate(state):
             if kind == 0:
@@ -83,7 +86,8 @@ def energy_norm(r: Array, G: Array) -> float:
 
 @cache
 def enumeration(seed: int, law: str) -> tuple[tuple[Array, Array, Mask], Array, Array, list[Array]]:
-    """One to three nodes, some held, with a law, for every method: the problem, cohesion, slope and all solutions."""
+    """One to three nodes, some held, with a law, for every method: the problem, cohesion, slope and
+    all solutions."""
     m = 1 + seed % 3
     G, q, bilateral = small(seed, m, 2)
     slope = np.full(m, 0.3 if law != "tresca" else 0.0)
@@ -113,8 +117,8 @@ def test_two_dimensions_against_enumeration(method: Any, law: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("d, mu", [(2, 0.3), (2, 0.8), (3, 0.5), (3, 0.8)])
 def test_methods_agree(d: int, mu: float) -> None:
-    """Up to twelve nodes, every second number with each coefficient, 1e-9; slip and stick both occur; no reaction
-    leaves its cone by more than the last digit."""
+    """Up to twelve nodes, every second number with each coefficient, 1e-9; slip and stick both
+    occur; no reaction leaves its cone by more than the last digit."""
     sticking = slipping = 0
     for seed in range(mu == 0.8, 12, 2):
         m = 1 + seed
@@ -140,7 +144,8 @@ def test_methods_agree(d: int, mu: float) -> None:
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("method", METHODS, ids=NAMES)
 def test_no_friction_is_the_frictionless_problem(method: Any, d: int) -> None:
-    """mu = 0 and threshold 0 alike: the answer of ActiveSet on the normal rows to round-off, no tangential reaction."""
+    """mu = 0 and threshold 0 alike: the answer of ActiveSet on the normal rows to round-off, no
+    tangential reaction."""
     G, q, bilateral = small(7, 8, d)
     result = method.prepare(G, bilateral).solve(q, np.zeros(8), np.zeros(8))
     normal = ActiveSet().prepare(G[::d, ::d], bilateral).solve(q[:, 0])
@@ -152,7 +157,8 @@ def test_no_friction_is_the_frictionless_problem(method: Any, d: int) -> None:
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_huge_friction_is_stick(d: int) -> None:
-    """mu = 1e6: every pressed node keeps its place, and the reactions are those of the linear problem held there."""
+    """mu = 1e6: every pressed node keeps its place, and the reactions are those of the linear
+    problem held there."""
     G, q, _ = small(3, 6, d)
     free = np.zeros(6, dtype=bool)
     result = FrictionNewton().prepare(G, free).solve(q, np.zeros(6), np.full(6, 1e6))
@@ -166,7 +172,8 @@ def test_huge_friction_is_stick(d: int) -> None:
 
 @pytest.mark.parametrize("method", METHODS, ids=NAMES)
 def test_out_of_reach_and_at_rest(method: Any) -> None:
-    """q_n = +inf carries nothing under Coulomb's law and rubs under Tresca's; an open problem takes no iteration."""
+    """q_n = +inf carries nothing under Coulomb's law and rubs under Tresca's; an open problem takes
+    no iteration."""
     G, q, _ = small(11, 4, 2)
     free = np.zeros(4, dtype=bool)
     q[:, 0] = [np.inf, -np.abs(q[1, 0]), np.inf, np.abs(q[3, 0])]
@@ -213,7 +220,8 @@ def test_newton_without_a_compiler_is_the_same(d: int, monkeypatch: Any) -> None
 
 @pytest.mark.parametrize(("d", "held"), [(2, 0.0), (2, 0.2), (2, 1e9), (3, 1e9)])
 def test_places_that_are_left_solve_the_problem_too(d: int, held: float, monkeypatch: Any) -> None:
-    """Where most places hold, the small matrix of the others gives the answer of the large one, to rounding."""
+    """Where most places hold, the small matrix of the others gives the answer of the large one, to
+    rounding."""
     rests = []
     rest = friction_linear.Factored._rest
 
@@ -253,7 +261,8 @@ def test_newton_is_exact_in_few_steps_from_any_guess() -> None:
 
 
 def test_points_that_stick_stick_to_rounding() -> None:
-    """Their slip is taken as zero by the solver, which moves the body: what is left of it is an error of the step."""
+    """Their slip is taken as zero by the solver, which moves the body: what is left of it is an
+    error of the step."""
     sticking = 0
     for seed in range(20):
         G, q, bilateral = small(seed, 10, 2)
@@ -275,7 +284,8 @@ def test_a_point_that_slips_a_little_does_not_stick(method: Any) -> None:
 
 
 def contraction(result: FrictionResult) -> float:
-    """Return the mean factor between changes of the thresholds above rounding (1e-10 of the first); NaN below two."""
+    """Return the mean factor between changes of the thresholds above rounding (1e-10 of the first);
+    NaN below two."""
     changes = [change for change in result.history if change > 1e-10 * result.history[0]]
     return (
         float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1)))
@@ -323,7 +333,8 @@ def test_extrapolation_shortens_fixed_points() -> None:
 
 
 def test_given_forces_are_the_right_hand_side_of_the_normal_problem() -> None:
-    """Seed 000 eqs. 6, 40, 42: with the tangential reactions of the answer as C_T, its normal ones are the solution."""
+    """Seed 000 eqs. 6, 40, 42: with the tangential reactions of the answer as C_T, its normal ones
+    are the solution."""
     for d in (2, 3):
         G, q, bilateral = small(7, 8, d)
         r = GivenForces().prepare(G, bilateral).solve(q, np.zeros(8), np.full(8, 0.4)).r
@@ -348,7 +359,8 @@ def test_mirror_image() -> None:
 
 
 def test_units_do_not_matter() -> None:
-    """Metres or millimetres, newtons or meganewtons: the same iterations, the same answer to round-off."""
+    """Metres or millimetres, newtons or meganewtons: the same iterations, the same answer to
+    round-off."""
     G, q, bilateral = small(40, 6, 3)
     mu, none = np.full(6, 0.3), np.zeros(6)
     for method in METHODS:

@@ -1,4 +1,5 @@
-"""Blocks thrown obliquely onto a plane with friction, in 2D and 3D: certified on any number of ranks, alike on all."""
+"""Blocks thrown obliquely onto a plane with friction, in 2D and 3D: certified on any number of
+ranks, alike on all."""
 
 from __future__ import annotations
 
@@ -70,7 +71,8 @@ def reports(problem: ContactProblem, scheme: Any, **solver: Any) -> list[Report]
 @pytest.mark.parametrize(("scheme", "mass"), SCHEMES, ids=NAMES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_every_step_is_certified(comm: Any, d: int, scheme: Any, mass: Any, friction: Any) -> None:
-    """Certificate 1e-9 (V9); reactions in their cones, no slip where the cone has room; slip and stick both occur."""
+    """Certificate 1e-9 (V9); reactions in their cones, no slip where the cone has room; slip and
+    stick both occur."""
     problem = thrown(comm, d, friction, mass)
     slipping = sticking = 0
     for report in reports(problem, scheme):
@@ -90,7 +92,8 @@ def test_every_step_is_certified(comm: Any, d: int, scheme: Any, mass: Any, fric
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_ranks_agree(comm: Any, d: int) -> None:
-    """All ranks together and each alone: displacements and reactions to 1e-10, the same contact sets and iterations."""
+    """All ranks together and each alone: displacements and reactions to 1e-10, the same contact
+    sets and iterations."""
     scheme, mass = SCHEMES[0]
     together = run(thrown(comm, d, Coulomb(0.3), mass), dt=BOX_DT, steps=STEPS, scheme=scheme)
     alone = run(thrown(_self(), d, Coulomb(0.3), mass), dt=BOX_DT, steps=STEPS, scheme=scheme)
@@ -110,7 +113,8 @@ def _self() -> Any:
 @pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_gauss_seidel_agrees(comm: Any, d: int) -> None:
-    """An independent method for the small problem: the same run to 1e-8 of the largest displacement."""
+    """An independent method for the small problem: the same run to 1e-8 of the largest
+    displacement."""
     scheme, mass = SCHEMES[1]
     one = reports(thrown(comm, d, Coulomb(0.3), mass), scheme)
     other = reports(thrown(comm, d, Coulomb(0.3), mass), scheme, friction_method=NSGS())
@@ -121,7 +125,8 @@ def test_gauss_seidel_agrees(comm: Any, d: int) -> None:
 
 
 def test_prescribed_tangents_carry_no_friction(comm: Any) -> None:
-    """A box on rollers along z: its nodes there have one free tangent, and rub along that one only."""
+    """A box on rollers along z: its nodes there have one free tangent, and rub along that one
+    only."""
     material = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
     mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2))
     rollers = Prescribed(tags["front"], components=(2,))

@@ -1,5 +1,6 @@
-"""Blocks on slopes and shaken tables: stick below tan(angle), slide with g (sin - mu cos) above, in every length unit;
-friction work is the area of the loop; the force does not depend on the number of contact points."""
+"""Blocks on slopes and shaken tables: stick below tan(angle), slide with g (sin - mu cos) above, in
+every length unit; friction work is the area of the loop; the force does not depend on the number of
+contact points."""
 
 from __future__ import annotations
 
@@ -78,7 +79,8 @@ def along(problem: ContactProblem, x: Array, angle: float = SLOPE) -> float:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("scale", [1.0, pytest.param(0.1, marks=pytest.mark.slow), 0.01])
 def test_incline_sticks(comm: Any, scale: float) -> None:
-    """tan 30° = 0.577 < mu = 0.6: the static stage stands, and the block stays where it is, in every length unit."""
+    """tan 30° = 0.577 < mu = 0.6: the static stage stands, and the block stays where it is, in
+    every length unit."""
     problem = resting(comm, Coulomb(0.6), scale=scale)
     start = static_equilibrium(problem, solver=Condensed())
     r_t, r_n = (problem.surface.everywhere(one) for one in (start.r_t, start.r_n))
@@ -97,8 +99,9 @@ def test_incline_sticks(comm: Any, scale: float) -> None:
 def slid(
     comm: Any, scale: float, *, cells: int = 4, steps: int = 300
 ) -> tuple[float, float, Array]:
-    """mu = 0.5: (acceleration of the centre of mass, friction force over weight) once vibrations have died out, means
-    of 50 steps over which the ringing of contact nodes cancels, and the way in block heights after every 50 steps."""
+    """mu = 0.5: (acceleration of the centre of mass, friction force over weight) once vibrations
+    have died out, means of 50 steps over which the ringing of contact nodes cancels, and the way in
+    block heights after every 50 steps."""
     problem, dt, rows = (
         resting(comm, Coulomb(0.5), scale=scale, cells=cells),
         0.01 * sqrt(scale),
@@ -121,7 +124,8 @@ def slid(
 @pytest.mark.serial
 @pytest.mark.slow
 def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
-    """g (sin - mu cos) to 1e-9 at 1, 0.1 and 0.01 times the length; the same dimensionless motion to 1e-9."""
+    """g (sin - mu cos) to 1e-9 at 1, 0.1 and 0.01 times the length; the same dimensionless motion
+    to 1e-9."""
     expected = G * (sin(SLOPE) - 0.5 * cos(SLOPE))
     first: Array | None = None
     for scale in (1.0, 0.1, 0.01):
@@ -134,7 +138,8 @@ def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.serial
 def test_friction_force_does_not_depend_on_the_number_of_points(comm: Any) -> None:
-    """4 and 10 elements along the base in full sliding: mu times the normal weight, 1e-6 asked, 1e-9 found."""
+    """4 and 10 elements along the base in full sliding: mu times the normal weight, 1e-6 asked,
+    1e-9 found."""
     for cells in (4, 10):
         assert slid(comm, 1.0, cells=cells)[1] == pytest.approx(0.5 * cos(SLOPE), rel=1e-9)
 
@@ -148,9 +153,10 @@ PERIOD = 100  # steps
     ("friction", "cycles"), zip(LAWS, (9, 6), strict=True), ids=["constant", "slip rate"]
 )
 def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw, cycles: int) -> None:
-    """A block on a table that shakes with 0.4 g and 2 Hz. The last cycle: the area inside the closed loops of
-    tangential reaction over slip, point by point, is the friction work of the ledger, to 1e-8. The whole run: the work
-    of the shaking force on the mean displacement is friction, damping and what the energy gained, to 1e-8."""
+    """A block on a table that shakes with 0.4 g and 2 Hz. The last cycle: the area inside the
+    closed loops of tangential reaction over slip, point by point, is the friction work of the
+    ledger, to 1e-8. The whole run: the work of the shaking force on the mean displacement is
+    friction, damping and what the energy gained, to 1e-8."""
     shake = vc.Harmonic(0.4 * G, 2.0, direction=(1.0, 0.0))
     problem, dt = resting(comm, friction, angle=0.0, excitation=shake), 0.5 / PERIOD
     start = static_equilibrium(problem, solver=Condensed())
@@ -174,7 +180,8 @@ def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw, cycles: in
 
 
 def loops(slips: Array, forces: Array) -> float:
-    """Area of the polygons with corners (slip before, force), (slip after, force) of every step, all points."""
+    """Area of the polygons with corners (slip before, force), (slip after, force) of every step,
+    all points."""
     s = np.stack([slips[:-1], slips[1:]], axis=1).reshape(-1, slips[0].size)
     f = np.repeat(forces.reshape(len(forces), -1), 2, axis=0)
     return float(0.5 * np.sum((f + np.roll(f, -1, axis=0)) * (np.roll(s, -1, axis=0) - s)))
@@ -183,8 +190,8 @@ def loops(slips: Array, forces: Array) -> float:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("d", [2, 3])
 def test_all_methods_agree_on_a_finite_element_step(comm: Any, d: int) -> None:
-    """The step with the most closed points of a thrown box, sticking and slipping: FrictionNewton and all others to
-    1e-9 of the largest displacement increment and reaction, each certified."""
+    """The step with the most closed points of a thrown box, sticking and slipping: FrictionNewton
+    and all others to 1e-9 of the largest displacement increment and reaction, each certified."""
     if d == 2:
         problem = resting(comm, Coulomb(0.3))
         steps = 40
@@ -227,7 +234,8 @@ def test_ranks_agree_on_friction_of_the_slip_rate(comm: Any) -> None:
     "solver", [Condensed(), solvers.Iterative(), solvers.Volume(ReducedNewton())], ids=repr
 )
 def test_a_law_that_fails_on_one_rank_stops_all(comm: Any, solver: Any) -> None:
-    """At rest, before anything is computed, and once points slide; with the line of the user's function."""
+    """At rest, before anything is computed, and once points slide; with the line of the user's
+    function."""
 
     def broken(speed: Array, *, from_speed: float) -> Array:
         if comm.rank == comm.size - 1 and np.any(speed >= from_speed):

@@ -1,4 +1,5 @@
-"""Hildreth–d'Esopo: monotone descent, duality, and seed 000's (42), (46) and (49) against each other (V4.0)."""
+"""Hildreth–d'Esopo: monotone descent, duality, and seed 000's (42), (46) and (49) against each
+other (V4.0)."""
 
 from __future__ import annotations
 
@@ -14,8 +15,9 @@ pytestmark = pytest.mark.serial
 
 
 def membrane_schur() -> tuple[np.ndarray, np.ndarray]:
-    """D~ and z~ of (49) by seed 000's recipe on a stand-in structure: a 12 x 8 grid of unit springs, base fixed, loaded
-    at random; the contact nodes are the eleven of its right edge above the base (case b of the seed's wall)."""
+    """D~ and z~ of (49) by seed 000's recipe on a stand-in structure: a 12 x 8 grid of unit
+    springs, base fixed, loaded at random; the contact nodes are the eleven of its right edge above
+    the base (case b of the seed's wall)."""
     rows, columns = 12, 8
     chain = np.diag(np.full(rows, 2.0)) - np.eye(rows, k=1) - np.eye(rows, k=-1)
     chain[-1, -1] = 1.0
@@ -49,8 +51,8 @@ def literal_49(D: np.ndarray, z: np.ndarray, bound: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("gap", [0.0, 0.3])
 def test_V40_primal_and_dual_give_the_same_displacements_and_reactions(gap):
-    """V4.0: (46)/(49) swept literally, Hildreth in both forms, and the dual (42): (v, r) equal to 1e-10; D~ symmetric
-    to 1e-12 and positive definite."""
+    """V4.0: (46)/(49) swept literally, Hildreth in both forms, and the dual (42): (v, r) equal to
+    1e-10; D~ symmetric to 1e-12 and positive definite."""
     D, z = membrane_schur()
     assert np.abs(D - D.T).max() <= 1e-12 * np.abs(D).max() and np.linalg.eigvalsh(D)[0] > 0.0
     bound = np.full(z.size, gap)
@@ -66,8 +68,9 @@ def test_V40_primal_and_dual_give_the_same_displacements_and_reactions(gap):
 
 
 def test_few_sweeps_on_a_wall():
-    """The seed: "the convergence is very rapid"; 30 sweeps on its own wall (verification document, 4.1 (8)). This
-    stand-in takes 31 from a cold start, 47 in the dual form, and next to none from its own answer."""
+    """The seed: "the convergence is very rapid"; 30 sweeps on its own wall (verification document,
+    4.1 (8)). This stand-in takes 31 from a cold start, 47 in the dual form, and next to none from
+    its own answer."""
     D, z = membrane_schur()
     G = np.linalg.inv(D)
     problem = LCP(G, -G @ z, np.zeros(z.size, dtype=bool))

@@ -1,4 +1,5 @@
-"""Incomplete factors that are not positive definite: made again with a larger diagonal, once, and said in the log."""
+"""Incomplete factors that are not positive definite: made again with a larger diagonal, once, and
+said in the log."""
 
 import logging
 

@@ -1,4 +1,5 @@
-"""The iterative volume route against brute force over all contact sets, and its parts; serial and parallel."""
+"""The iterative volume route against brute force over all contact sets, and its parts; serial and
+parallel."""
 
 from __future__ import annotations
 
@@ -54,7 +55,8 @@ def prepared(c: Case, kind: str = "icc", **settings: Any) -> Any:
 
 
 def agree(c: Case, result: Any, exact: Any) -> None:
-    """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the loop."""
+    """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the
+    loop."""
     bilateral, worst = (
         c.step.surface.everywhere(c.step.surface.bilateral),
         kkt_residual(c.step, result).worst,
@@ -83,7 +85,8 @@ def test_agrees_with_brute_force(
 
 @pytest.mark.parametrize("seed", range(3, 8))
 def test_springs_that_open_and_close_by_projected_gradients(parallel: bool, seed: int) -> None:
-    """Given springs are searched with a line search around: from a prediction that is all wrong, too."""
+    """Given springs are searched with a line search around: from a prediction that is all wrong,
+    too."""
     c = pushed_block(parallel=parallel, seed=seed, compliance=10.0 ** np.linspace(-3.0, 1.0, M))
     exact = c.exact()
     wrong = replace(c.step, active=~exact.active[c.step.surface.slots])
@@ -134,8 +137,9 @@ def test_is_deterministic_and_warm_starts(parallel: bool) -> None:
 
 
 def test_work_is_counted(parallel: bool) -> None:
-    """A product for every iteration, one in the beginning and in the end, and for a set with more closed points; where
-    points only open, and at springs, the residual is known. GAMG is renewed."""
+    """A product for every iteration, one in the beginning and in the end, and for a set with more
+    closed points; where points only open, and at springs, the residual is known. GAMG is
+    renewed."""
     for options, start, extra in (
         ({}, False, 1),
         ({}, True, 0),
@@ -153,7 +157,8 @@ def test_work_is_counted(parallel: bool) -> None:
 
 
 class Counting:
-    """A communicator that notes how many numbers are reduced at a time, and refuses the other operations."""
+    """A communicator that notes how many numbers are reduced at a time, and refuses the other
+    operations."""
 
     def __init__(self, comm: Any) -> None:
         self._comm, self.rank, self.size, self.most = comm, comm.rank, comm.size, 0
@@ -170,7 +175,8 @@ class Counting:
 @pytest.mark.parametrize("changes", [15, 0], ids=["active set", "projected gradients"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_more_than_a_dozen_numbers_are_reduced(parallel: bool, kind: str, changes: int) -> None:
-    """Of a contact set of 24 points nothing is gathered, and no array of their number is reduced."""
+    """Of a contact set of 24 points nothing is gathered, and no array of their number is
+    reduced."""
     c = pushed_block(6, 24, parallel=parallel)
     counting = Counting(c.step.surface.comm)
     c.step.A.algebra.comm = counting  # type: ignore[misc]
@@ -181,7 +187,8 @@ def test_no_more_than_a_dozen_numbers_are_reduced(parallel: bool, kind: str, cha
     assert kkt_residual(c.step, result).worst <= 3e-10
 
 
-# What cannot be solved ------------------------------------------------------------------------------------------------
+# What cannot be solved
+# ------------------------------------------------------------------------------------------------
 
 
 def failing(matrix: Any, b: Any, words: str, **settings: Any) -> None:
@@ -227,7 +234,8 @@ def test_history_shows_first_some_and_last() -> None:
     )
 
 
-# Settings -------------------------------------------------------------------------------------------------------------
+# Settings
+# -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -291,7 +299,8 @@ def test_options_that_nothing_reads_are_refused(
     ],
 )
 def test_options_of_parts_are_taken(parallel: bool, kind: str, options: dict[str, Any]) -> None:
-    """Those of blocks and levels, read late or not at all on so few unknowns; with "auto" those of every kind."""
+    """Those of blocks and levels, read late or not at all on so few unknowns; with "auto" those of
+    every kind."""
     c = pushed_block(parallel=parallel)
     agree(c, prepared(c, kind, petsc_options=options).solve(c.step), c.exact())
 
@@ -339,7 +348,8 @@ def test_blocks_of_whole_nodes_multiply_alike(ids: Any) -> None:
 
 @pytest.mark.serial
 def test_the_courant_number_follows_the_matrices() -> None:
-    """Sums of the diagonals: stiffness 100 times inertia is 10; no inertia in statics; not known, not a number."""
+    """Sums of the diagonals: stiffness 100 times inertia is 10; no inertia in statics; not known,
+    not a number."""
     M, K = SerialMatrix(np.diag([1.0, 0.0, 3.0, 4.0])), np.diag([100.0, 200.0, 300.0, 200.0])
     A = effective(2.0 * M.csr.toarray() + 2.0 * K, range(4), (2.0, M))
     assert courant(A) == pytest.approx(10.0, rel=1e-14)

@@ -1,4 +1,5 @@
-"""Friction on the iterative route against the condensed one and the reference in the volume; serial and parallel."""
+"""Friction on the iterative route against the condensed one and the reference in the volume; serial
+and parallel."""
 
 from __future__ import annotations
 
@@ -59,7 +60,8 @@ def solve(c: Case, solver: Any = None) -> StepResult:
 
 
 def sound(c: Case, result: StepResult) -> None:
-    """The certificate with room; cone and dissipation but for the last digits; what sticks is where it was."""
+    """The certificate with room; cone and dissipation but for the last digits; what sticks is where
+    it was."""
     certificate = kkt_residual(c.step, result)
     assert certificate.worst <= 3.3e-10 and certificate.cone <= 1e-14
     slip = c.step.surface.tangential_values(result.x) - c.step.slip0
@@ -67,14 +69,16 @@ def sound(c: Case, result: StepResult) -> None:
     assert not np.any(slip[np.linalg.norm(result.r_t, axis=1) < 0.999 * limit])
 
 
-# Closed forms --------------------------------------------------------------------------------------------------------
+# Closed forms
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize(("push", "pull"), [(2.0, 0.5), (2.0, -3.0), (2.0, 3.0), (-1.0, 3.0)])
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
-    """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2; open: Coulomb none."""
+    """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2;
+    open: Coulomb none."""
     c = rubbing(
         case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0
     )
@@ -91,7 +95,8 @@ def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_slip_direction_in_space_by_hand(law: Any) -> None:
-    """A = diag(4, 1, 3), s = 1: r_t = (cos a, sin a), slip = (r·k) factor: the pull is r_t + K slip, K = diag(1, 3)."""
+    """A = diag(4, 1, 3), s = 1: r_t = (cos a, sin a), slip = (r·k) factor: the pull is r_t + K
+    slip, K = diag(1, 3)."""
     r_t = np.array([np.cos(0.7), np.sin(0.7)])
     slip, origin = 2.5 * r_t, np.array([0.3, -0.2])
     b = np.array([2.0, *(r_t + np.array([1.0, 3.0]) * (origin + slip))])
@@ -109,7 +114,8 @@ def test_slip_direction_in_space_by_hand(law: Any) -> None:
     )
 
 
-# Random bodies -------------------------------------------------------------------------------------------------------
+# Random bodies
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
@@ -182,7 +188,8 @@ def test_rates_in_space(parallel: bool, mu: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_newton_in_circles_goes_on_with_given_limits(parallel: bool) -> None:
-    """mu = 2 on ten points that hardly stand alone: Tresca problems lead out of the circle, and the answer is right."""
+    """mu = 2 on ten points that hardly stand alone: Tresca problems lead out of the circle, and the
+    answer is right."""
     c, _ = spatial(Coulomb(2.0), 7, parallel=parallel, m=10, alone=0.01)
     solver = prepared(c, "jacobi")
     result = solver.solve(c.step)
@@ -193,7 +200,8 @@ def test_newton_in_circles_goes_on_with_given_limits(parallel: bool) -> None:
 
 @pytest.mark.two_ranks
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
-    """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
+    """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless
+    steps mixed."""
     cases = [
         random_case(law, seed=seed, parallel=parallel)
         for seed in range(3)
@@ -248,8 +256,8 @@ def test_the_mirrored_problem_has_the_mirrored_answer(parallel: bool) -> None:
 
 
 def test_infinite_bounds_nothing_and_everything_opens(parallel: bool) -> None:
-    """Points without predicted contact (+inf) rub under Tresca's law only; no load at rest moves nothing; pulled off,
-    nothing rubs."""
+    """Points without predicted contact (+inf) rub under Tresca's law only; no load at rest moves
+    nothing; pulled off, nothing rubs."""
     for law in (Coulomb(0.4), Tresca(0.2)):
         c = random_case(law, seed=3, parallel=parallel)
         c = c.bounded(np.where(np.arange(M) < 4, np.inf, c.step.surface.everywhere(c.step.bound)))
@@ -290,7 +298,8 @@ def test_work_is_counted_and_a_warm_start_is_one(parallel: bool) -> None:
     assert np.array_equal(again.active, result.active)
 
 
-# What cannot be solved ------------------------------------------------------------------------------------------------
+# What cannot be solved
+# ------------------------------------------------------------------------------------------------
 
 
 def test_not_a_number_is_a_sentence(parallel: bool) -> None:

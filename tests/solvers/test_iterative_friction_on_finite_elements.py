@@ -1,4 +1,5 @@
-"""The iterative route with friction beside the condensed one, step by step on finite elements, any number of ranks."""
+"""The iterative route with friction beside the condensed one, step by step on finite elements, any
+number of ranks."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ RATES, AT_REST = (SlipRateCoulomb(ExponentialDecay(*mu, 2.0)) for mu in ((0.5, 0
 def checked(
     problem: vc.ContactProblem, dt: float, steps: int, kind: str = "icc"
 ) -> tuple[CrossChecked, np.ndarray]:
-    """The cross-check of a run: u, r_n and r_t to 1e-9; and the counts of open, sticking and slipping points."""
+    """The cross-check of a run: u, r_n and r_t to 1e-9; and the counts of open, sticking and
+    slipping points."""
     compared, counts = CrossChecked(Iterative(kind), [vc.Condensed()]), np.zeros(3)
     for _, report in vc.march(problem, solver=compared, dt=dt, steps=steps):
         result = report.result
@@ -108,7 +110,8 @@ def test_statics_agree_with_the_condensed_route(d: int, law: Any) -> None:
 
 
 def test_newton_steps_are_few_and_reductions_short() -> None:
-    """At most 12 Newton steps where contact comes and goes, and no reduction of more than a dozen numbers."""
+    """At most 12 Newton steps where contact comes and goes, and no reduction of more than a dozen
+    numbers."""
     problem, prepared = replace(thrown_box(COMM, divisions=(6, 3, 6)), friction=vc.Coulomb(0.3)), []
     lengths: list[int] = []
 

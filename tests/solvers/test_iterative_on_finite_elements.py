@@ -1,4 +1,5 @@
-"""The iterative volume route beside the condensed one and PETSc's, step by step on finite elements."""
+"""The iterative volume route beside the condensed one and PETSc's, step by step on finite
+elements."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ def wall(**how: Any) -> vc.ContactProblem:
 
 
 def on_rollers(d: int) -> vc.ContactProblem:
-    """A quarter of a block between two symmetry planes, whose nodes keep some of their components, thrown down."""
+    """A quarter of a block between two symmetry planes, whose nodes keep some of their components,
+    thrown down."""
     mesh, tags = block(COMM, lengths=(1.5, 1.0, 1.2)[:d], divisions=(4, 3, 3)[:d])
     planes = [("left", 0), ("back", 2)][: d - 1]
     held = [fem.Prescribed(tags[name], components=(c,)) for name, c in planes]
@@ -107,7 +109,8 @@ PROBLEMS: dict[str, tuple[Callable[[], vc.ContactProblem], float]] = {  # name -
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_steps_agree_with_the_condensed_route(name: str, kind: str) -> None:
-    """u and r_n of every step to 1e-9 of their largest values; contact closes, and on most of them opens again."""
+    """u and r_n of every step to 1e-9 of their largest values; contact closes, and on most of them
+    opens again."""
     make, dt = PROBLEMS[name]
     checked = vc.cross_check(make(), solvers=(Iterative(kind), vc.Condensed()), dt=dt, steps=8)
     assert max_over_ranks(COMM, np.array([checked.found[0].size["r_n"]])) > 0.0
@@ -147,7 +150,8 @@ def test_statics_agree_with_the_condensed_route(d: int, kind: str) -> None:
 
 
 def test_a_rebound_opens_all_points_at_once() -> None:
-    """The box pressed flat, then pulled off: the prediction is all wrong, and the answer is right in the first step."""
+    """The box pressed flat, then pulled off: the prediction is all wrong, and the answer is right
+    in the first step."""
     problem = thrown_box(COMM, divisions=(5, 3, 5))
     solver, reports = Iterative("icc"), []
     for _, report in vc.march(problem, solver=solver, dt=3e-3, steps=4):
@@ -170,8 +174,8 @@ class Kept(Iterative):
 
 @pytest.mark.parametrize("simplices", [False, True])
 def test_ranks_that_overlap_take_hardly_more_iterations_than_one(simplices: bool) -> None:
-    """A layer that all its factors share: at most a fifth more than one rank, where none takes a third more, and so
-    does a layer that is counted twice."""
+    """A layer that all its factors share: at most a fifth more than one rank, where none takes a
+    third more, and so does a layer that is counted twice."""
     counts = []
     for comm in (MPI.COMM_SELF, COMM):
         solver = Kept("icc")
@@ -186,7 +190,8 @@ def test_ranks_that_overlap_take_hardly_more_iterations_than_one(simplices: bool
 
 
 def test_the_answer_is_taken_as_it_is() -> None:
-    """An answer that stopped where it was told to is not corrected: products are those of one solve a step."""
+    """An answer that stopped where it was told to is not corrected: products are those of one solve
+    a step."""
     problem, solver = thrown_box(COMM), Kept("icc")
     changes, worst = 0, 0.0
     for _, report in vc.march(problem, solver=solver, dt=3e-3, steps=4):

@@ -1,4 +1,5 @@
-"""Lemke's method against enumeration of all sets, classical examples, ties, units; friction without symmetry."""
+"""Lemke's method against enumeration of all sets, classical examples, ties, units; friction without
+symmetry."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ def lemke(G: Array, q: Array, **more: int) -> Array:
 
 
 def random_p_matrices(count: int, m: int) -> list[Array]:
-    """P-matrices, most of them without positive definite symmetric part, with rows in units of their own."""
+    """P-matrices, most of them without positive definite symmetric part, with rows in units of
+    their own."""
     rng, found = np.random.default_rng(7), []
     while len(found) < count:
         G = rng.normal(size=(m, m)) + 1.2 * np.eye(m)
@@ -34,7 +36,8 @@ def random_p_matrices(count: int, m: int) -> list[Array]:
 
 
 def test_p_matrices_have_the_solution_that_enumeration_finds():
-    """30 P-matrices of 5 rows that are far from symmetric, 5 loads each: one solution, and this one."""
+    """30 P-matrices of 5 rows that are far from symmetric, 5 loads each: one solution, and this
+    one."""
     rng = np.random.default_rng(8)
     for G in random_p_matrices(30, 5):
         assert p_matrix(G).holds
@@ -48,7 +51,8 @@ def test_p_matrices_have_the_solution_that_enumeration_finds():
 
 @pytest.mark.parametrize("index", range(len(KINDS)), ids=[kind.__name__ for kind in KINDS])
 def test_symmetric_problems_have_the_answer_of_the_active_set(index):
-    """SPD, bilateral rows, rows out of reach, grazing rows, rows in units from 1e-6 to 1e6; and by enumeration."""
+    """SPD, bilateral rows, rows out of reach, grazing rows, rows in units from 1e-6 to 1e6; and by
+    enumeration."""
     for problem in problems(index):
         found, other = solve(Lemke(), problem), solve(ActiveSet(), problem)
         d = np.diag(problem.G) ** -0.5
@@ -128,7 +132,8 @@ def test_other_matrices_have_a_solution_several_or_none(G, q, count):
 
 
 def test_a_ray_need_not_mean_that_there_is_no_solution():
-    """Not copositive-plus: r = (1, 0) solves it (Cottle, Pang and Stone, section 4.4, in kind); the guess finds it."""
+    """Not copositive-plus: r = (1, 0) solves it (Cottle, Pang and Stone, section 4.4, in kind); the
+    guess finds it."""
     rng, missed = np.random.default_rng(3), 0
     for _ in range(300):
         G, q = rng.normal(size=(3, 3)), rng.normal(size=3)
@@ -147,8 +152,9 @@ def test_a_ray_need_not_mean_that_there_is_no_solution():
 
 
 def test_murty_needs_all_pivots():
-    """Murty (1978): ones on, twos below the diagonal, q = -d parallel to the covering vector, both in its units:
-    r = d (1, 0, ..., 0) after 2^m pivots; fewer allowed are too few in words. For q = -1 two are enough."""
+    """Murty (1978): ones on, twos below the diagonal, q = -d parallel to the covering vector, both
+    in its units: r = d (1, 0, ..., 0) after 2^m pivots; fewer allowed are too few in words. For q =
+    -1 two are enough."""
     for m in (3, 6, 9):
         G, d, none = (
             np.eye(m) + 2.0 * np.tril(np.ones((m, m)), -1),
@@ -164,8 +170,9 @@ def test_murty_needs_all_pivots():
 
 
 def test_equal_gaps_cost_no_more_pivots_than_others():
-    """A kernel that depends on the distance alone, by 30 % not symmetric, under equal loads: with the covering vector
-    1 all rows are tied, which took 872 pivots on 40 rows and more than 10 000 on 150."""
+    """A kernel that depends on the distance alone, by 30 % not symmetric, under equal loads: with
+    the covering vector 1 all rows are tied, which took 872 pivots on 40 rows and more than 10 000
+    on 150."""
     for m in (40, 80):
         x = np.linspace(0.0, 1.0, m)
         G = np.exp(-np.abs(x[:, None] - x)) * (1.0 + 0.3 * np.sign(x[:, None] - x))
@@ -174,8 +181,8 @@ def test_equal_gaps_cost_no_more_pivots_than_others():
 
 
 def test_a_guess_that_leads_to_huge_reactions_is_not_taken():
-    """Three springs in the plane push in three directions: G has rank 2, and all three at once have no answer. Rounding
-    of r = 1e16 forgives any residual; the tolerance does not."""
+    """Three springs in the plane push in three directions: G has rank 2, and all three at once have
+    no answer. Rounding of r = 1e16 forgives any residual; the tolerance does not."""
     angles = 0.1 + np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
     G, q = np.cos(angles[:, None] - angles), np.array([-1.0, 0.4, 0.7])
     B = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -187,7 +194,8 @@ def test_a_guess_that_leads_to_huge_reactions_is_not_taken():
 
 
 def test_ties_end():
-    """All rows tied at all pivots: the least rule could go round, the lexicographic one ends (Kostreva 1979)."""
+    """All rows tied at all pivots: the least rule could go round, the lexicographic one ends
+    (Kostreva 1979)."""
     G = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 2.0], [2.0, 0.0, 1.0]])
     q = -np.ones(3)
     assert lemke(G, q) == pytest.approx(np.full(3, 1.0 / 3.0), abs=1e-14)
@@ -200,7 +208,8 @@ def test_ties_end():
 
 
 def test_units_do_not_matter():
-    """Every row in a unit of its own: the same pivots and the same answer; twice the same digits."""
+    """Every row in a unit of its own: the same pivots and the same answer; twice the same
+    digits."""
     G, q = np.eye(8) + 2.0 * np.triu(np.random.default_rng(4).normal(size=(8, 8)), 1), -np.ones(8)
     units = 10.0 ** np.random.default_rng(1).uniform(-5.0, 5.0, size=8)
     method, other = (
@@ -213,7 +222,8 @@ def test_units_do_not_matter():
 
 
 def test_refused():
-    """Bilateral rows that depend on each other; NaN; what the others say of matrices that are not symmetric."""
+    """Bilateral rows that depend on each other; NaN; what the others say of matrices that are not
+    symmetric."""
     both = np.ones(2, dtype=bool)
     with pytest.raises(InputError, match="bilateral rows of the Delassus operator depend"):
         Lemke().prepare(np.ones((2, 2)), both)
@@ -224,7 +234,8 @@ def test_refused():
 
 
 def friction_states(G: Array, q: Array, cohesion: float, slope: float) -> list[Array]:
-    """All solutions r (m, 2) of the small problem with friction in the plane, by enumeration of the 4^m states."""
+    """All solutions r (m, 2) of the small problem with friction in the plane, by enumeration of the
+    4^m states."""
     m, found = len(q), []
     for states in product(("open", "stick", 1.0, -1.0), repeat=m):
         A, b = np.zeros((2 * m, 2 * m)), np.zeros(2 * m)
@@ -261,8 +272,9 @@ def friction_states(G: Array, q: Array, cohesion: float, slope: float) -> list[A
 
 
 def test_friction_without_symmetry_by_enumeration():
-    """40 problems of 3 points in the plane, G with positive definite symmetric part and up to 40 % skew, Coulomb's law:
-    the answer of FrictionNewton is among all solutions, and the only one; exactly symmetric G goes the way it went."""
+    """40 problems of 3 points in the plane, G with positive definite symmetric part and up to 40 %
+    skew, Coulomb's law: the answer of FrictionNewton is among all solutions, and the only one;
+    exactly symmetric G goes the way it went."""
     rng, none, slope = np.random.default_rng(11), np.zeros(3), np.full(3, 0.3)
     for _ in range(40):
         skew, A = np.triu(rng.uniform(-0.4, 0.4, size=(6, 6)), 1), rng.normal(size=(6, 8))
@@ -279,8 +291,9 @@ def test_friction_without_symmetry_by_enumeration():
 
 
 def test_friction_that_is_not_solved_ends_in_its_sentence():
-    """Skew parts far larger than the rest, and nodes whose own blocks are not positive definite: an answer, or a
-    sentence; no warning of overflows, no other error. A guess may do no work, or negative one."""
+    """Skew parts far larger than the rest, and nodes whose own blocks are not positive definite: an
+    answer, or a sentence; no warning of overflows, no other error. A guess may do no work, or
+    negative one."""
     ended = 0
     for seed in (1, 6, 14, 25, 276):
         rng = np.random.default_rng(seed)

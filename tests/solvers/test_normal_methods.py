@@ -54,7 +54,8 @@ def test_200_random_problems_match_enumeration(method, kind):
 
 
 def test_enumeration_finds_a_constructed_solution():
-    """The reference itself: q = w - G r gives back r, grazing rows and rows out of reach included."""
+    """The reference itself: q = w - G r gives back r, grazing rows and rows out of reach
+    included."""
     rng = np.random.default_rng(3)
     G, r = spd(rng, 5), np.array([2.0, 0.0, 0.0, 1.0, -3.0])
     q = np.array([0.0, 0.0, 0.7, 0.0, 0.0]) - G @ r

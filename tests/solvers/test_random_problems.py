@@ -1,6 +1,8 @@
-"""Small random problems against the enumeration of all their states: every method finds a solution, or none is right.
+"""Small random problems against the enumeration of all their states: every method finds a solution,
+or none is right.
 
-Entries are small whole numbers, in units that differ from row to row, so that zeros, ties and parallel rows occur."""
+Entries are small whole numbers, in units that differ from row to row, so that zeros, ties and
+parallel rows occur."""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ st = pytest.importorskip("hypothesis.strategies")
 pytestmark = pytest.mark.serial
 NORMAL = (ActiveSet(), Hildreth(), Lemke())
 FRICTION = (FrictionNewton(), NSGS(), FixedPoint())
-SAME = 1e-7  # of the largest entry: methods stop at 1e-10 or below, and condition numbers are below 1e3
+# of the largest entry: methods stop at 1e-10 or below, and condition numbers are below 1e3
+SAME = 1e-7
 ZERO = 1e-9  # of the same: what enumeration takes for zero
 ENTRY = st.integers(-3, 3)
 
@@ -31,7 +34,8 @@ def operator(entries: list[int], rows: int) -> Array:
 
 
 def complementary(G: Array, q: Array, bilateral: Array) -> Array:
-    """The one solution of w = q + G r, 0 <= r, w >= 0, r w = 0 (bilateral: w = 0): all active sets are tried."""
+    """The one solution of w = q + G r, 0 <= r, w >= 0, r w = 0 (bilateral: w = 0): all active sets
+    are tried."""
     size = max(float(np.abs(q).max()), 1e-300)
     for states in product((False, True), repeat=len(q)):
         active = np.array(states) | bilateral
@@ -66,7 +70,8 @@ def test_every_normal_method_finds_the_solution(
 
 
 def rubbing(G: Array, q: Array, mu: float) -> list[Array]:
-    """All solutions r (m, 2) with friction in the plane: every point open, sticking, or sliding one way."""
+    """All solutions r (m, 2) with friction in the plane: every point open, sticking, or sliding one
+    way."""
     m, size, found = len(q), max(float(np.abs(q).max()), 1e-300), []
     for states in product(("open", "stick", -1.0, 1.0), repeat=m):
         # unknowns (r_n, r_t) of every point: two rows of equations each

@@ -1,4 +1,5 @@
-"""Friction that depends on the slip rate: against ordinary differential equations, at rest, and at every slow rate."""
+"""Friction that depends on the slip rate: against ordinary differential equations, at rest, and at
+every slow rate."""
 
 from __future__ import annotations
 
@@ -80,7 +81,8 @@ def started(t: float, speed: float) -> float:
 
 
 def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 10.0) -> Array:
-    """Position of 1 kg on the belt of ``started`` under DECAY: rides until k x = mu_s N, slips until its rate is 0."""
+    """Position of 1 kg on the belt of ``started`` under DECAY: rides until k x = mu_s N, slips
+    until its rate is 0."""
     t, x, found = 1.0, started(1.0, speed), np.array([started(t, speed) for t in times])
     while t < times[-1]:
         release = t + (0.6 * force / k - x) / speed
@@ -120,8 +122,9 @@ def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 1
 def test_stick_slip_on_a_belt(
     scheme: Any, fine: float, t_end: float, error: float, gain: float
 ) -> None:
-    """Rides on the belt to 0.06 m, slips back, is caught: two cycles and a half of the differential equation. Order 2
-    where the rate is that of the mean reaction; order 1, in the first cycle, with the impulses of Moreau and Jean."""
+    """Rides on the belt to 0.06 m, slips back, is caught: two cycles and a half of the differential
+    equation. Order 2 where the rate is that of the mean reaction; order 1, in the first cycle, with
+    the impulses of Moreau and Jean."""
     errors = []
     for dt in (4.0 * fine, fine):
         run = reports(belted(DECAY, lambda t: started(t, 0.05)), dt, t_end, scheme=scheme)
@@ -133,8 +136,8 @@ def test_stick_slip_on_a_belt(
 
 @pytest.mark.slow
 def test_oscillator_slides_to_rest() -> None:
-    """The friction oscillator of V2.7 with mu falling over v_c = 0.02 m/s: turning points of the differential equation,
-    and rest where the spring is weaker than mu_s N."""
+    """The friction oscillator of V2.7 with mu falling over v_c = 0.02 m/s: turning points of the
+    differential equation, and rest where the spring is weaker than mu_s N."""
     mu = ExponentialDecay(mu_s=0.9, mu_k=0.4, v_c=0.02)
     turns, x = [], 0.45e-3
     while 1.0e4 * abs(x) > 0.9:
@@ -163,7 +166,8 @@ def test_oscillator_slides_to_rest() -> None:
 
 @pytest.mark.slow
 def test_steady_sliding() -> None:
-    """mu = 0.2 + v damps: the mass comes to rest at x = mu(V) N/k, the belt slides on under mu(V) N."""
+    """mu = 0.2 + v damps: the mass comes to rest at x = mu(V) N/k, the belt slides on under mu(V)
+    N."""
     for scheme in (MIDPOINT, vc.MoreauJean(), vc.Newmark()):
         last = reports(belted(lambda v: 0.2 + v, lambda t: 0.2 * t), 0.05, 6.0, scheme=scheme)[-1]
         assert last.new.u[0] == pytest.approx(0.4 * 10.0 / 100.0, rel=1e-9)
@@ -193,8 +197,9 @@ LAWS = {
     ids=lambda value: value if isinstance(value, str) else type(value).__name__,
 )
 def test_slow_slip_stays_inside_the_cone(law: str, scheme: Any) -> None:
-    """A belt whose speed grows from 1e-6 to 1 m/s: |r_t| <= mu(|v|) r_n in every step, equal where it slips, with the
-    exact law at the rate of the step; mu_s where it sticks. Rates over five decades occur under growing friction."""
+    """A belt whose speed grows from 1e-6 to 1 m/s: |r_t| <= mu(|v|) r_n in every step, equal where
+    it slips, with the exact law at the rate of the step; mu_s where it sticks. Rates over five
+    decades occur under growing friction."""
     growth, mu = np.log(1e6) / 6.0, LAWS[law]
     run = reports(
         belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 4e-2, 6.0, scheme=scheme
@@ -235,7 +240,8 @@ def test_every_scheme_knows_its_rate(scheme: Any) -> None:
 
 
 def test_static_and_kinetic_coefficients() -> None:
-    """A pull that grows by 0.01 N a step: rest up to mu_s N, in motion mu_k N at once; the static stage rests too."""
+    """A pull that grows by 0.01 N a step: rest up to mu_s N, in motion mu_k N at once; the static
+    stage rests too."""
     problem = belted(StaticKinetic(0.6, 0.3), lambda t: 0.5 * t**2)
     run = reports(problem, 1e-3, 0.4, scheme=BACKWARD)
     friction = np.array([-r.result.r_t[0, 0] for r in run])
@@ -270,8 +276,8 @@ def rubbed() -> list[Report]:
     "method", [solvers.FrictionNewton(), solvers.FixedPoint(), solvers.GivenForces()], ids=repr
 )
 def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> None:
-    """A block that rubs along a wall with three points: certified with the exact law, the same with all methods; few
-    outer iterations, logged with every step."""
+    """A block that rubs along a wall with three points: certified with the exact law, the same with
+    all methods; few outer iterations, logged with every step."""
     law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
     run = reports(rubbing_block(law), 0.1, 9.0, scheme=BACKWARD, friction_method=method)
     assert np.allclose(run[-1].new.u, rubbed[-1].new.u, rtol=0.0, atol=1e-8)

@@ -1,4 +1,5 @@
-"""Which matrices are P-matrices: all minors by determinants, and what is told where they are too many."""
+"""Which matrices are P-matrices: all minors by determinants, and what is told where they are too
+many."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ pytestmark = pytest.mark.serial
 
 
 def test_p_matrices_by_their_minors():
-    """200 random matrices of up to 6 rows against all minors by determinants; large ones by the symmetric part or not
-    at all."""
+    """200 random matrices of up to 6 rows against all minors by determinants; large ones by the
+    symmetric part or not at all."""
     rng, seen = np.random.default_rng(2), set()
     for k in range(200):
         m = 1 + k % 6
@@ -33,8 +34,8 @@ def test_p_matrices_by_their_minors():
 
 
 def test_a_minor_that_rounding_hides_decides_nothing():
-    """All minors of triangular matrices with ones are 1, however large the rest is; one that is zero to rounding is
-    neither positive nor not, unless another is negative."""
+    """All minors of triangular matrices with ones are 1, however large the rest is; one that is
+    zero to rounding is neither positive nor not, unless another is negative."""
     huge = np.eye(3) + 1e16 * np.triu(np.ones((3, 3)), 1)
     assert p_matrix(huge).holds and p_matrix(huge.T).holds and p_matrix(huge[:2, :2]).holds
     for zero in (

@@ -1,4 +1,5 @@
-"""The volume route against brute force over all contact sets (design idea 4): every method, serial and parallel."""
+"""The volume route against brute force over all contact sets (design idea 4): every method, serial
+and parallel."""
 
 from __future__ import annotations
 
@@ -64,7 +65,8 @@ def solve(c: Case, method: Any, **settings: Any) -> Any:
 
 
 def agree(c: Case, result: Any, exact: Any) -> None:
-    """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the loop."""
+    """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the
+    loop."""
     found, bilateral = c.whole(result), c.step.surface.everywhere(c.step.surface.bilateral)
     assert np.max(np.abs(found.x - exact.x)) <= 1e-9 * np.max(np.abs(exact.x))
     assert np.max(np.abs(found.r_n - exact.r_n), initial=0.0) <= 1e-9 * np.max(
@@ -77,7 +79,8 @@ def agree(c: Case, result: Any, exact: Any) -> None:
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
 def test_agrees_with_brute_force(parallel: bool, method: Any, options: dict[str, Any]) -> None:
-    """V4.0: all routes to the step agree; partly active, with bilateral rows and deformable supports."""
+    """V4.0: all routes to the step agree; partly active, with bilateral rows and deformable
+    supports."""
     c = pushed_block(parallel=parallel, **options)
     exact = c.exact()
     assert 0 < np.sum(exact.active) < M
@@ -86,7 +89,8 @@ def test_agrees_with_brute_force(parallel: bool, method: Any, options: dict[str,
 
 @pytest.mark.two_ranks
 def test_springs_far_from_the_stiffness_of_the_body(parallel: bool) -> None:
-    """Springs 1e6 times stiffer and softer than the body: only the reduced method is up to these."""
+    """Springs 1e6 times stiffer and softer than the body: only the reduced method is up to
+    these."""
     c = pushed_block(parallel=parallel, seed=0, compliance=10.0 ** np.linspace(-6.0, 6.0, M))
     agree(c, solve(c, ReducedNewton()), c.exact())
 
@@ -176,7 +180,8 @@ def test_one_solver_many_steps(parallel: bool, method: Any) -> None:
 @pytest.mark.parametrize("force", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
 def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: float) -> None:
-    """V4.1 (6), P1, P18: the same case in other units of length and force gives the same numbers to 1e-9."""
+    """V4.1 (6), P1, P18: the same case in other units of length and force gives the same numbers to
+    1e-9."""
     options = OPTIONS["springs and rigid points"]
     exact = pushed_block(seed=4, **options).exact()
     scaled = {
@@ -203,7 +208,8 @@ def test_units_do_not_matter_when_nothing_gives_the_scale(
 
 @pytest.mark.two_ranks
 def test_a_start_below_the_tolerance_is_still_improved(parallel: bool, method: Any) -> None:
-    """A small residual is not a small error: what can be solved to round-off is, from a guess that is off by 1e-11."""
+    """A small residual is not a small error: what can be solved to round-off is, from a guess that
+    is off by 1e-11."""
     c = pushed_block(parallel=parallel)
     exact = c.exact()
     mine = replace(
@@ -225,7 +231,8 @@ def test_held_points_stay_exactly_on_the_bound(parallel: bool) -> None:
 
 @pytest.mark.two_ranks
 def test_a_wall_larger_than_brute_force(parallel: bool) -> None:
-    """All methods agree with each other on 1600 unknowns and 40 points, statically, where A is worst conditioned."""
+    """All methods agree with each other on 1600 unknowns and 40 points, statically, where A is
+    worst conditioned."""
     body = block(19, 40)
     b = np.zeros(body.size)
     b[body.contact] = np.sin(np.linspace(0.0, 3.0 * np.pi, 40))

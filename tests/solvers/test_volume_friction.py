@@ -1,5 +1,6 @@
-"""Friction on the volume route (SNES on displacements and tangential reactions) against closed forms and the condensed
-route, which shares nothing with it but A and b: plane and spatial, stick, slip and open points in one step."""
+"""Friction on the volume route (SNES on displacements and tangential reactions) against closed
+forms and the condensed route, which shares nothing with it but A and b: plane and spatial, stick,
+slip and open points in one step."""
 
 from __future__ import annotations
 
@@ -45,14 +46,16 @@ def solve(c: Case, solver: Any = VOLUME) -> StepResult:
     return result
 
 
-# Closed forms --------------------------------------------------------------------------------------------------------
+# Closed forms
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize(("push", "pull"), [(2.0, 0.5), (2.0, -3.0), (2.0, 3.0), (-1.0, 3.0)])
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
-    """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2; open: Coulomb none."""
+    """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2;
+    open: Coulomb none."""
     c = rubbing(
         case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0
     )
@@ -69,7 +72,8 @@ def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_slip_direction_in_space_by_hand(law: Any) -> None:
-    """A = diag(4, 1, 3), s = 1: r_t = (cos a, sin a), slip = (r·k) factor: the pull is r_t + K slip, K = diag(1, 3)."""
+    """A = diag(4, 1, 3), s = 1: r_t = (cos a, sin a), slip = (r·k) factor: the pull is r_t + K
+    slip, K = diag(1, 3)."""
     a, factor = 0.7, 2.5
     r_t = np.array([np.cos(a), np.sin(a)])
     slip = factor * r_t
@@ -89,7 +93,8 @@ def test_slip_direction_in_space_by_hand(law: Any) -> None:
     )
 
 
-# Random blocks -------------------------------------------------------------------------------------------------------
+# Random blocks
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
@@ -97,7 +102,8 @@ def test_slip_direction_in_space_by_hand(law: Any) -> None:
     "law", LAWS, ids=["coulomb", "coulomb field", "tresca", "tresca field", "slip rate"]
 )
 def test_agrees_with_the_condensed_route(parallel: bool, law: Any, options: dict[str, Any]) -> None:
-    """V4.0 with friction: x, r_n and r_t of both routes to 1e-9, in steps with open, sticking and slipping points."""
+    """V4.0 with friction: x, r_n and r_t of both routes to 1e-9, in steps with open, sticking and
+    slipping points."""
     seen = []
     for seed in range(6):
         c = random_case(law, seed=seed, parallel=parallel, **options)
@@ -130,7 +136,8 @@ def test_units_do_not_matter(parallel: bool, length: float, force: float) -> Non
 
 @pytest.mark.two_ranks
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
-    """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
+    """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless
+    steps mixed."""
     cases = [
         random_case(law, seed=seed, parallel=parallel)
         for seed in range(3)
@@ -145,7 +152,8 @@ def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
 
 
 def test_infinite_bounds_and_nothing(parallel: bool) -> None:
-    """Points without predicted contact (+inf) rub under Tresca's law only; no load at rest moves nothing."""
+    """Points without predicted contact (+inf) rub under Tresca's law only; no load at rest moves
+    nothing."""
     for law in (Coulomb(0.4), Tresca(0.2)):
         c = random_case(law, seed=3, parallel=parallel)
         c = c.bounded(np.where(np.arange(M) < 4, np.inf, c.step.surface.everywhere(c.step.bound)))
@@ -160,13 +168,15 @@ def test_infinite_bounds_and_nothing(parallel: bool) -> None:
 
 @pytest.mark.two_ranks
 def test_history_is_that_of_the_thresholds(parallel: bool) -> None:
-    """Coulomb: relative changes of the thresholds of every Tresca problem, decreasing to 1e-10; Tresca: none."""
+    """Coulomb: relative changes of the thresholds of every Tresca problem, decreasing to 1e-10;
+    Tresca: none."""
     history = solve(random_case(Coulomb(0.4), parallel=parallel)).history
     assert len(history) > 3 and history[0] == 1.0 and min(history) < 1e-7
     assert solve(random_case(Tresca(0.2), parallel=parallel)).history == ()
 
 
-# Spatial -------------------------------------------------------------------------------------------------------------
+# Spatial
+# -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -189,7 +199,8 @@ def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
     assert all(total > 0 for total in np.sum(seen, axis=0))
 
 
-# PETSc ---------------------------------------------------------------------------------------------------------------
+# PETSc
+# ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks

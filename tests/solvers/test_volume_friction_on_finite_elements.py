@@ -1,4 +1,5 @@
-"""Volume and condensed route step by step with friction on finite elements, any number of ranks (V4.0)."""
+"""Volume and condensed route step by step with friction on finite elements, any number of ranks
+(V4.0)."""
 
 from __future__ import annotations
 
@@ -75,7 +76,8 @@ def test_routes_agree_in_space(comm: Any, friction: FrictionLaw) -> None:
 
 
 def test_nodes_with_one_and_with_two_free_tangents(comm: Any) -> None:
-    """On rollers along z some points have one free tangent, and rub in an interval, the others in a disk."""
+    """On rollers along z some points have one free tangent, and rub in an interval, the others in a
+    disk."""
     mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2))
     system = assemble(
         mesh,

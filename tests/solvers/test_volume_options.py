@@ -1,4 +1,5 @@
-"""The volume route as PETSc users meet it: options, refusals, failures in words, and nothing left behind."""
+"""The volume route as PETSc users meet it: options, refusals, failures in words, and nothing left
+behind."""
 
 from __future__ import annotations
 
@@ -70,8 +71,8 @@ class Rubbing:
 
 @pytest.mark.two_ranks
 def test_friction_is_refused_with_the_methods_that_carry_it(pushed: Case) -> None:
-    """Bounds on displacements cannot express |r_t| <= limit, and there is no energy to minimise; nor is there slip in
-    one dimension."""
+    """Bounds on displacements cannot express |r_t| <= limit, and there is no energy to minimise;
+    nor is there slip in one dimension."""
     for method in METHODS:
         Volume(method=method).check(Rubbing(pushed, Frictionless()))
     for method in METHODS[1:]:
@@ -174,7 +175,8 @@ RIGHT = [
 def test_what_nothing_reads_is_refused(
     pushed: Case, method: Any, options: dict[str, Any], said: str
 ) -> None:
-    """By name and with the nearest one that PETSc has, once a step has been solved; the database is as before."""
+    """By name and with the nearest one that PETSc has, once a step has been solved; the database is
+    as before."""
     before = PETSc.Options().getAll()
     with pytest.raises(InputError) as caught:
         prepare(pushed, Volume(method=method, petsc_options=options)).solve(pushed.step)
@@ -183,7 +185,8 @@ def test_what_nothing_reads_is_refused(
 
 @pytest.mark.parametrize(("method", "options"), RIGHT)
 def test_what_is_read_late_is_taken(pushed: Case, method: Any, options: dict[str, Any]) -> None:
-    """Options of MUMPS, of blocks and of line searches are read when these are made, and stay right in later steps."""
+    """Options of MUMPS, of blocks and of line searches are read when these are made, and stay right
+    in later steps."""
     solver = prepare(pushed, Volume(method=method, petsc_options=options))
     for _ in range(2):
         assert kkt_residual(pushed.step, solver.solve(pushed.step)).worst <= 1e-9
@@ -204,7 +207,8 @@ def test_a_misspelt_option_of_the_command_line_is_a_warning(
 
 @pytest.mark.two_ranks
 def test_bounds_on_a_field_have_the_same_options(comm: Any) -> None:
-    """``vi.solve`` hands them to its method; one that is only for the first method it tries is not held against it."""
+    """``vi.solve`` hands them to its method; one that is only for the first method it tries is not
+    held against it."""
     pytest.importorskip("dolfinx")
     from own_forms import Known, space, square
     from ufl import dx, grad, inner
@@ -262,7 +266,8 @@ def test_petsc_objects_are_reachable(pushed: Case) -> None:
 
 @pytest.mark.two_ranks
 def test_option_layers(pushed: Case, database: Any) -> None:
-    """Defaults, then the settings, then the command line; ours are gone from the database after every call."""
+    """Defaults, then the settings, then the command line; ours are gone from the database after
+    every call."""
     before = database.getAll()
     assert prepare(pushed, Volume()).snes.getTolerances()[3] == 100
     assert prepare(pushed, Volume(petsc_options={"-snes_max_it": 7})).snes.getTolerances()[3] == 7
@@ -290,7 +295,8 @@ def test_monitor_option(capfd: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("key", ["snes_rtol", "snes_atol"])
 def test_the_users_tolerance_stops_earlier(pushed: Case, key: str) -> None:
-    """A tolerance given by the user counts relative to |b|; the certificate then says what it cost."""
+    """A tolerance given by the user counts relative to |b|; the certificate then says what it
+    cost."""
     prepared = prepare(pushed, Volume(method=SemismoothNewton(), petsc_options={key: 1e-3}))
     early = prepared.solve(pushed.step)
     full = prepare(pushed, Volume(method=SemismoothNewton())).solve(pushed.step)
@@ -310,7 +316,8 @@ def test_tao_tolerance_of_the_user(pushed: Case) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("method", [ReducedNewton(), SemismoothNewton(), TaoTron()])
 def test_iteration_limit_is_a_failure_in_words(pushed: Case, method: Any) -> None:
-    """The text has PETSc's reason, iterations, residual and advice; the same solver can go on afterwards."""
+    """The text has PETSc's reason, iterations, residual and advice; the same solver can go on
+    afterwards."""
     volume = Volume(method=method, petsc_options={"snes_max_it": 1, "tao_max_it": 1})
     prepared = prepare(pushed, volume)
     text = r"stopped after 1 iterations with relative residual \d.*DIVERGED_MAX_?ITS? \(the iteration limit was reached"
@@ -330,7 +337,8 @@ def test_nan_load_is_a_failure(pushed: Case, method: Any) -> None:
 
 @pytest.mark.serial
 def test_reasons_of_every_petsc_have_words() -> None:
-    """PETSc 3.25 renamed the reason of a residual that is not a number, and words its error 83 in its own way."""
+    """PETSc 3.25 renamed the reason of a residual that is not a number, and words its error 83 in
+    its own way."""
     old = type("Old", (), {"DIVERGED_FNORM_NAN": NOT_A_NUMBER})
     new = type("New", (), {"DIVERGED_FUNCTION_NANORINF": NOT_A_NUMBER})
     for reasons in (old, new, PETSc.SNES.ConvergedReason):
@@ -347,7 +355,8 @@ def test_reasons_of_every_petsc_have_words() -> None:
 
 @pytest.mark.serial
 def test_the_objective_keeps_its_digits_near_its_origin() -> None:
-    """A line search needs f(y) - f(origin), which is 1e-12 of f and less than f's round-off allows."""
+    """A line search needs f(y) - f(origin), which is 1e-12 of f and less than f's round-off
+    allows."""
     c = pushed_block()
     scaled = prepare(c, Volume(method=TaoTron()))._scaled
     y = np.linspace(0.5, 1.0, len(c.step.b))
@@ -380,7 +389,8 @@ def test_petsc_errors_are_failures_and_leave_a_usable_solver(pushed: Case, datab
 
 @pytest.mark.parametrize("method", [ReducedNewton(), SemismoothNewton(), TaoTron()])
 def test_a_body_that_flies_away_is_a_failure(method: Any) -> None:
-    """P11: a floating chain pulled off its wall has no equilibrium, and PETSc may report none of it as an error."""
+    """P11: a floating chain pulled off its wall has no equilibrium, and PETSc may report none of it
+    as an error."""
     n = 20
     stiffness = sp.diags(
         [-np.ones(n - 1), np.r_[1.0, 2.0 * np.ones(n - 2), 1.0], -np.ones(n - 1)], [-1, 0, 1]
@@ -402,7 +412,8 @@ def test_a_body_that_flies_away_is_a_failure(method: Any) -> None:
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("method", METHODS)
 def test_solvers_are_freed(pushed: Case, method: Any, closed: bool) -> None:
-    """Only PETSc objects outlive the last reference, so that their late destruction finds nothing else to free."""
+    """Only PETSc objects outlive the last reference, so that their late destruction finds nothing
+    else to free."""
     gc.disable()
     try:
         prepared = prepare(pushed, Volume(method=method))

@@ -55,7 +55,8 @@ def test_assembled_matrix_in_parallel(options: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("options", [{}, SPRINGS], ids=["rigid", "springs"])
 def test_error_measure_is_not_looser_than_the_certificate(options: dict[str, Any]) -> None:
-    """Whatever y PETSc stops at, the certificate of the loop is not larger than the error the solver judged by."""
+    """Whatever y PETSc stops at, the certificate of the loop is not larger than the error the
+    solver judged by."""
     pytest.importorskip("mpi4py")
     c = pushed_block(parallel=True, **options)
     prepared = Volume(method=ReducedNewton()).prepare(c.step.A, c.step.surface, c.step.scale)

@@ -51,7 +51,8 @@ def write(folder: Path, text: str, name: str = "case.toml") -> Path:
 
 
 def assert_same(one: Mapping[str, Any], other: Mapping[str, Any]) -> None:
-    """The same columns; to the last bit on one rank, to round-off on several (docs/reference/files.md)."""
+    """The same columns; to the last bit on one rank, to round-off on several
+    (docs/reference/files.md)."""
     assert set(one) == set(other)
     for name, values in one.items():
         if COMM.size == 1:
@@ -64,7 +65,8 @@ def assert_same(one: Mapping[str, Any], other: Mapping[str, Any]) -> None:
 
 
 def test_readmes_first_example_to_the_last_bit() -> None:
-    """demos/cases/wall.toml is the code of README, run for 60 of its 400 steps; dt is 1/560 s exactly."""
+    """demos/cases/wall.toml is the code of README, run for 60 of its 400 steps; dt is 1/560 s
+    exactly."""
     code = re.search(
         r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
     )
@@ -157,7 +159,8 @@ dt = 0.005
 
 @pytest.mark.slow
 def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None:
-    """Two materials, static stage, Coulomb, a processed record beside the file: the run lasts as long as the record."""
+    """Two materials, static stage, Coulomb, a processed record beside the file: the run lasts as
+    long as the record."""
     write(
         shared_tmp,
         "".join(f"{0.01 * k} {np.sin(30.0 * 0.01 * k)}\n" for k in range(11)),
@@ -203,7 +206,8 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
 
 @pytest.mark.serial
 def test_the_wall_with_other_values(shared_tmp: Path) -> None:
-    """The case that ships is the wall beside its demo, its probes too, with the convention of its reference numbers."""
+    """The case that ships is the wall beside its demo, its probes too, with the convention of its
+    reference numbers."""
     given = (
         "contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]",
         "system.section.thickness=0.3",
@@ -344,7 +348,8 @@ def test_weight_is_the_body_force_of_the_density(comm: Any) -> None:
         vc.with_weight(bare)
 
 
-MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sentence says after the file's name
+# what is replaced in demos/cases/wall.toml, by what, what the sentence says after the file's name
+MISTAKES = {
     "no TOML": ("[mesh]", "[mesh", ": Expected ']'"),
     "end of file": ("every = 10", "every =", ": Invalid value (at line 54"),
     "table twice": ("[impact]", "[solver]", ": Cannot declare ("),
@@ -414,7 +419,8 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
         ": the table [model] is unknown: ",
     ),
     "no mesh": (
-        '[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, 12]\n',
+        '[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, '
+        "12]\n",
         "",
         ": the table [mesh] is missing: give the mesh of the body",
     ),
@@ -532,7 +538,8 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
 @pytest.mark.serial
 def test_settings() -> None:
-    """KEY=VALUE on a copy: values of TOML, other words as text, lists counted from 1, new tables on the way."""
+    """KEY=VALUE on a copy: values of TOML, other words as text, lists counted from 1, new tables on
+    the way."""
     tables = {"run": {"dt": 1.0}, "excitation": [{"scale": 1.0}, {}]}
     made = with_settings(
         tables,
@@ -603,7 +610,8 @@ def test_short_options_are_settings() -> None:
 
 @pytest.mark.serial
 def test_what_follows_from_the_first_mode() -> None:
-    """Harmonic and time step by the body's lowest frequency; where it is not known yet, a sentence."""
+    """Harmonic and time step by the body's lowest frequency; where it is not known yet, a
+    sentence."""
     settings = [
         "excitation.1={type='FirstModeHarmonic', amplitude=2, ratio=0.25}",
         "fields=",
@@ -661,7 +669,8 @@ def test_the_command_runs_checks_and_restarts(
 
 @pytest.mark.serial
 def test_case_files_know_the_public_names() -> None:
-    """Laws, obstacles, excitations, schemes, solvers, their methods and recorders, but those that take functions."""
+    """Laws, obstacles, excitations, schemes, solvers, their methods and recorders, but those that
+    take functions."""
     known = {name.split(".")[0] for choices in words(ROOT).choices.values() for name in choices}
     wanted = {*laws.__all__, *schemes.__all__, *solvers.__all__, *meshes.__all__}
     wanted |= {

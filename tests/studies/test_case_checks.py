@@ -1,4 +1,5 @@
-"""S4.1, S4.7: tables [[check]] of case files, compared from the run folder alone, printed by ``vi-contact post``."""
+"""S4.1, S4.7: tables [[check]] of case files, compared from the run folder alone, printed by
+``vi-contact post``."""
 
 from __future__ import annotations
 
@@ -60,7 +61,8 @@ RANKINE = '\n[[check]]\ntype = "Rankine"\nheight = 1.0\nrho = 2000\npart = "stem
 
 
 def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A layer at rest between smooth walls: rho g H²/2 nu/(1-nu) exactly, on any mesh; the other does not apply."""
+    """A layer at rest between smooth walls: rho g H²/2 nu/(1-nu) exactly, on any mesh; the other
+    does not apply."""
     (tmp_path / "layer.toml").write_text(LAYER + RANKINE, encoding="utf-8")
     out = tmp_path / "out"
     read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=out, progress=False)

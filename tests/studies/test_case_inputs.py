@@ -1,4 +1,5 @@
-"""What a case file and its command refuse: missing meshes, misspelt groups and demands, absurd tables, empty paths."""
+"""What a case file and its command refuse: missing meshes, misspelt groups and demands, absurd
+tables, empty paths."""
 
 from __future__ import annotations
 
@@ -160,7 +161,8 @@ def test_settings_are_read_as_carefully(
 def test_a_boundary_saved_without_its_body(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A .geo with Physical Curves and no Physical Surface leaves a mesh of lines, whose groups are of cells."""
+    """A .geo with Physical Curves and no Physical Surface leaves a mesh of lines, whose groups are
+    of cells."""
     with session() as gmsh:
         geo = gmsh.model.geo
         line = geo.addLine(geo.addPoint(0.0, 0.0, 0.0, 0.5), geo.addPoint(1.0, 0.0, 0.0, 0.5))
@@ -170,7 +172,8 @@ def test_a_boundary_saved_without_its_body(
         gmsh.write(str(folder / "meshes" / "block.msh"))
     sentence = said(capsys, ["run", case(folder), "--check"])
     assert (
-        "a cell group: give the name of a boundary group, or, if it bounds the body, the mesh has no 2D cells: "
+        "a cell group: give the name of a boundary group, or, if it bounds the body, the mesh has "
+        "no 2D cells: "
         "add a Physical Surface in Gmsh" in sentence
     )
 
@@ -204,7 +207,8 @@ def test_run_refuses_no_steps(capsys: pytest.CaptureFixture[str]) -> None:
     assert "--steps 0: give at least one step" in said(capsys, ["run", "wall", "--steps", "0"])
 
 
-# Incremental dynamic analysis ---------------------------------------------------------------------------------------
+# Incremental dynamic analysis
+# ---------------------------------------------------------------------------------------
 
 
 def test_a_misspelt_demand_is_told_before_the_first_run(folder: Path, tmp_path: Path) -> None:
@@ -264,7 +268,8 @@ def test_rows_and_studies_that_are_damaged(folder: Path, tmp_path: Path, text: s
         run_ida(study, tmp_path / "ida", say=lambda line: None)
 
 
-# Memory --------------------------------------------------------------------------------------------------------------
+# Memory
+# --------------------------------------------------------------------------------------------------------------
 
 
 class Petsc(RuntimeError):

@@ -22,7 +22,8 @@ ROOT = Path(__file__).resolve().parents[2]
 def test_all_paths_are_those_of_the_case_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Meshes, scripts, sources of cut and refined meshes, records, run folders: beside the case, from anywhere."""
+    """Meshes, scripts, sources of cut and refined meshes, records, run folders: beside the case,
+    from anywhere."""
     monkeypatch.chdir("/")
     folder = tmp_path.resolve()
     path = folder / "case.toml"
@@ -60,7 +61,8 @@ def test_all_paths_are_those_of_the_case_file(
 
 
 def test_the_dam_of_the_guide_stands_on_its_joint(tmp_path: Path) -> None:
-    """C1.1, the case and script of docs/guide/studies.md: V = gamma H²/2, N = weight less uplift, to 1e-9."""
+    """C1.1, the case and script of docs/guide/studies.md: V = gamma H²/2, N = weight less uplift,
+    to 1e-9."""
     text = (ROOT / "docs" / "guide" / "studies.md").read_text(encoding="utf-8")
     case, script = (
         re.findall(rf"^```{kind}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[-1]
@@ -80,16 +82,20 @@ def test_the_dam_of_the_guide_stands_on_its_joint(tmp_path: Path) -> None:
 
 
 def test_scripts_in_cases_are_refined(tmp_path: Path) -> None:
-    """``refine`` of a GeoFile: the same groups on four times the cells; a wrong number is told with its table."""
+    """``refine`` of a GeoFile: the same groups on four times the cells; a wrong number is told with
+    its table."""
     (tmp_path / "square.geo").write_text(
-        "Point(1) = {0, 0, 0, 1}; Point(2) = {3, 0, 0, 1}; Point(3) = {3, 1, 0, 1}; Point(4) = {0, 1, 0, 1};\n"
-        "For i In {1:4}\nLine(i) = {i, i < 4 ? i + 1 : 1};\nEndFor\nCurve Loop(1) = {1:4}; Plane Surface(1) = {1};\n"
+        "Point(1) = {0, 0, 0, 1}; Point(2) = {3, 0, 0, 1}; Point(3) = {3, 1, 0, 1}; Point(4) = {0, "
+        "1, 0, 1};\n"
+        "For i In {1:4}\nLine(i) = {i, i < 4 ? i + 1 : 1};\nEndFor\nCurve Loop(1) = {1:4}; Plane "
+        "Surface(1) = {1};\n"
         'Physical Curve("base") = {1}; Physical Surface("body") = {1};\n',
         encoding="utf-8",
     )
     path = tmp_path / "case.toml"
     path.write_text(
-        '[mesh]\ntype = "GeoFile"\npath = "square.geo"\ntime_limit = "1000 s"\n[material.c]\nE = 1\nnu = 0\nrho = 1\n'
+        '[mesh]\ntype = "GeoFile"\npath = "square.geo"\ntime_limit = "1000 s"\n[material.c]\nE = '
+        "1\nnu = 0\nrho = 1\n"
         "[system]\nclamped = 'base'\n[run]\ndt = 1\n",
         encoding="utf-8",
     )

@@ -1,4 +1,5 @@
-"""[[stage]] tables: gravity, other supports, motions, each from where the one before has left the body."""
+"""[[stage]] tables: gravity, other supports, motions, each from where the one before has left the
+body."""
 
 from __future__ import annotations
 
@@ -73,7 +74,8 @@ def house(**supports: Any) -> Any:
 
 
 def test_the_case_of_the_guide_is_the_same_in_python(shared_tmp: Path) -> None:
-    """static_equilibrium, release, simulate, and simulate again with another wave; every stage has a folder."""
+    """static_equilibrium, release, simulate, and simulate again with another wave; every stage has
+    a folder."""
     found = case(shared_tmp).run(COMM, out=shared_tmp / "run", progress=False)
     mesh, tags = house.mesh = fem.build_mesh(
         TwoBlocks(  # type: ignore[attr-defined]
@@ -136,8 +138,8 @@ system = {clamped = ["lower_bottom", "upper_top"]}
 @pytest.mark.serial
 @pytest.mark.parametrize("extra", [pytest.param(False, marks=pytest.mark.serial), True])
 def test_nothing_moves_without_motion(shared_tmp: Path, extra: bool) -> None:
-    """V8.9: gravity, perhaps a prop on the roof that then holds it where it is, then the compliant base for a second
-    without motion: still to 1e-11 of the settlement."""
+    """V8.9: gravity, perhaps a prop on the roof that then holds it where it is, then the compliant
+    base for a second without motion: still to 1e-11 of the settlement."""
     text = STILL
     if extra:
         head, tail = STILL.split('[[stage]]\nname = "shock"')
@@ -152,8 +154,9 @@ def test_nothing_moves_without_motion(shared_tmp: Path, extra: bool) -> None:
 
 
 def test_an_added_support_holds_the_body_where_it_is(shared_tmp: Path) -> None:
-    """The prop: what it holds stays off its own place by the settlement, in the field output too, and carries nothing;
-    then a push on the wall: the prop takes a share of it, which its release is refused for."""
+    """The prop: what it holds stays off its own place by the settlement, in the field output too,
+    and carries nothing; then a push on the wall: the prop takes a share of it, which its release is
+    refused for."""
     head, _ = STILL.split('[[stage]]\nname = "shock"')
     loaded = PROPPED.replace("propped", "loaded").replace(
         '"upper_top"]', '"upper_top"], loads = [{facets = "upper_left", value = [5.0e3, 0.0]}]'
@@ -194,8 +197,8 @@ def test_a_support_that_carries_load_is_not_forgotten(shared_tmp: Path) -> None:
 
 @pytest.mark.serial  # the stages above go from one to the next on two ranks
 def test_after_the_shock_the_house_rests_where_it_has_slid(shared_tmp: Path) -> None:
-    """A static stage after the motion, on the same dashpots: the slip stays but for the 3 % by which points slide on as
-    the swinging load leaves them; the house carries its weight."""
+    """A static stage after the motion, on the same dashpots: the slip stays but for the 3 % by
+    which points slide on as the swinging load leaves them; the house carries its weight."""
     old, new = 'name = "aftershock"\ntype = "dynamic"', 'name = "rest"\ntype = "static"'
     text = HOUSE.split("excitation = [{")[0].replace(old, new)
     settings = [one for one in QUICK if "stage" not in one]
@@ -217,7 +220,8 @@ class PowerFailure(Exception):
 def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ended in the shock, or in the aftershock: what --restart makes is the straight run. A new run keeps nothing."""
+    """Ended in the shock, or in the aftershock: what --restart makes is the straight run. A new run
+    keeps nothing."""
     stopped = case(
         tmp_path, HOUSE, "run.checkpoint_every=1", "run.t_end=0.04", "stage.3.run.t_end=0.02"
     )
@@ -256,8 +260,8 @@ def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
 
 @pytest.mark.serial
 def test_a_stage_follows_from_the_end_of_the_one_before(tmp_path: Path) -> None:
-    """A restart keeps the aftershock while the shock before it stays what it was, and makes it anew after a longer one;
-    a stage of another name is refused, and replaced by a new run."""
+    """A restart keeps the aftershock while the shock before it stays what it was, and makes it anew
+    after a longer one; a stage of another name is refused, and replaced by a new run."""
     settings = [
         "run.t_end=0.04",
         "excitation.1.frequency=20",
@@ -300,8 +304,9 @@ def test_a_stage_follows_from_the_end_of_the_one_before(tmp_path: Path) -> None:
 def test_many_records_share_the_static_stages(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What ida starts finds what single runs find, and solves one static stage for all: on a compliant base, which is
-    assembled for each, and in the frame of the ground, where all share one body."""
+    """What ida starts finds what single runs find, and solves one static stage for all: on a
+    compliant base, which is assembled for each, and in the frame of the ground, where all share one
+    body."""
     found = []
     solve = static.Equilibria.after
 
@@ -341,7 +346,8 @@ def test_many_records_share_the_static_stages(
 
 @pytest.mark.serial
 def test_short_options_and_records_are_not_lost(tmp_path: Path) -> None:
-    """They change the tables of the case; where the last stage has its own they would do nothing, and are refused."""
+    """They change the tables of the case; where the last stage has its own they would do nothing,
+    and are refused."""
     head = HOUSE.split('[[stage]]\nname = "aftershock"')[0]
     assert ShortOptions(dt=0.001, scale=2.0).settings(case(tmp_path, head).tables) == [
         "run.dt=0.001",
@@ -357,7 +363,8 @@ def test_short_options_and_records_are_not_lost(tmp_path: Path) -> None:
 
 
 STAGE = '[[stage]]\nname = "gravity"\n'
-MISTAKES = {  # what is replaced in the guide's case, by what, what the sentence says after the file's name
+# what is replaced in the guide's case, by what, what the sentence says after the file's name
+MISTAKES = {
     "key": (
         STAGE,
         STAGE + "sistem = 1\n",
@@ -416,7 +423,8 @@ MISTAKES = {  # what is replaced in the guide's case, by what, what the sentence
     "within": (
         '{clamped = "lower_bottom"}',
         "{clampt = 1}",
-        ": [[stage]] 1 'gravity': [system] has the unknown key 'clampt' for assemble: did you mean clamped",
+        ": [[stage]] 1 'gravity': [system] has the unknown key 'clampt' for assemble: did you mean "
+        "clamped",
     ),
     "group": (
         '{clamped = "lower_bottom"}',
@@ -438,12 +446,14 @@ def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
 
 
 def test_another_friction_comes_with_a_static_stage(shared_tmp: Path) -> None:
-    """As the refusal of another one in a motion says: under the new law the house slips to rest, and stays there."""
+    """As the refusal of another one in a motion says: under the new law the house slips to rest,
+    and stays there."""
     law = 'system = {clamped = "lower_bottom"}\nfriction = {type = "Coulomb", mu = 0.01}\n'
     text = (
         HOUSE.split('[[stage]]\nname = "shock"')[0]
         + f'[[stage]]\nname = "wet"\ntype = "static"\n{law}'
-        f'[[stage]]\nname = "still"\ntype = "dynamic"\n{law}excitation = []\nrun = {{dt = 0.001, t_end = 0.02}}\n'
+        f'[[stage]]\nname = "still"\ntype = "dynamic"\n{law}excitation = []\nrun = {{dt = 0.001, '
+        f"t_end = 0.02}}\n"
     )
     found = case(shared_tmp, text).run(COMM, out=shared_tmp / "run", progress=False).history
     dry = vc.read_run(shared_tmp / "run" / "stages" / "1_gravity").history

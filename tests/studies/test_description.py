@@ -1,4 +1,5 @@
-"""What ``run --check`` tells of a model: exact masses and periods, on any number of ranks; and what it refuses."""
+"""What ``run --check`` tells of a model: exact masses and periods, on any number of ranks; and what
+it refuses."""
 
 from __future__ import annotations
 
@@ -67,7 +68,8 @@ def described(path: Path, comm: Any = COMM, *settings: str) -> dict[str, Any]:
 
 
 def axial(n: int, height: float, cells: int) -> float:
-    """The n-th period of a column of linear elements with consistent mass, clamped at its foot: closed form."""
+    """The n-th period of a column of linear elements with consistent mass, clamped at its foot:
+    closed form."""
     h, c = height / cells, np.sqrt(E / RHO)
     kh = (2 * n - 1) * np.pi / (2.0 * height) * h
     return float(2.0 * np.pi / np.sqrt(6.0 * c**2 / h**2 * (1.0 - np.cos(kh)) / (2.0 + np.cos(kh))))
@@ -75,8 +77,9 @@ def axial(n: int, height: float, cells: int) -> float:
 
 @pytest.mark.serial
 def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
-    """V11.1: masses, sizes, wave lengths; periods of axial waves in both blocks as one where they touch, in the lower
-    one with a gap. Held sideways they have no other modes as low; what rubs sticks, what slides is free to."""
+    """V11.1: masses, sizes, wave lengths; periods of axial waves in both blocks as one where they
+    touch, in the lower one with a gap. Held sideways they have no other modes as low; what rubs
+    sticks, what slides is free to."""
     sides = ("lower_left", "lower_right", "upper_left", "upper_right")
     held = ",".join(f"{{facets='{one}', components=[0]}}" for one in sides)
     free, path = described(written(shared_tmp)), shared_tmp / "blocks.toml"
@@ -134,7 +137,8 @@ def test_shear_in_the_plane_is_that_of_the_axes_there(
 ) -> None:
     """The other two moduli carry no wave in the plane, however soft."""
     timber = (
-        '{type = "Orthotropic", E1 = 1e10, E2 = 1e9, E3 = 1e9, nu12 = 0.0, nu13 = 0.0, nu23 = 0.0, G12 = 5e8, '
+        '{type = "Orthotropic", E1 = 1e10, E2 = 1e9, E3 = 1e9, nu12 = 0.0, nu13 = 0.0, nu23 = 0.0, '
+        "G12 = 5e8, "
         f"G13 = 1e8, G23 = 2e8, rho = 500.0, axes = {axes}}}"
     )
     model = described(written(shared_tmp), COMM, "system.dashpots=", f"material.upper={timber}")
@@ -174,7 +178,8 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore:Glyph 27")
 def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """model.json is what its history was computed with: a check of the case as it is now leaves it."""
+    """model.json is what its history was computed with: a check of the case as it is now leaves
+    it."""
     text = BLOCKS.replace("Two blocks that carry", "Two \\u001b[2J blocks that carry")
     path, out = str(written(tmp_path, text)), tmp_path / "out"
     assert main(["run", path, "--out", str(out), "--quiet"]) == 0
@@ -223,7 +228,8 @@ def test_the_page_shows_what_the_command_tells(
 @pytest.mark.serial
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
-    """Lines of groups that hold a body are thick and in the legend; boxes in space; dots where they may touch."""
+    """Lines of groups that hold a body are thick and in the legend; boxes in space; dots where they
+    may touch."""
     text = BLOCKS
     if d == 3:
         text = text.replace("[0.25, 2.0]", "[0.25, 2.0, 1.0]").replace("[1, 8]", "[1, 8, 2]")
@@ -289,7 +295,8 @@ SECOND = (
         ),
         (
             "dashpots",
-            'loads = [{type = "Pressure", facets = "upper_top", value = "9810*(35 - z)"}]\ndashpots',
+            'loads = [{type = "Pressure", facets = "upper_top", value = "9810*(35 - '
+            'z)"}]\ndashpots',
             "[system] '9810*(35 - z)' has z, and a model of dimension 2 has only x, y",
         ),
     ],
@@ -312,7 +319,8 @@ def test_check_ends_with_what_is_wrong(
     ids=["record", "excitation"],
 )
 def test_motions_of_a_compliant_base_are_records(tmp_path: Path, motion: str) -> None:
-    """Told once, however many boundaries it comes through, and looked at as those of excitations are."""
+    """Told once, however many boundaries it comes through, and looked at as those of excitations
+    are."""
     base = (
         'facets = "lower_bottom", normal = 0.5, motion = {direction = [0.0, 1.0], motion = '
         + motion
@@ -334,7 +342,8 @@ def test_motions_of_a_compliant_base_are_records(tmp_path: Path, motion: str) ->
 
 @pytest.mark.serial
 def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
-    """Edges too long for the record's energy, and steps longer than a twentieth of the first period."""
+    """Edges too long for the record's energy, and steps longer than a twentieth of the first
+    period."""
     soft = described(written(tmp_path, BLOCKS.replace("E = 1.8e9", "E = 1.8e4")))
     assert [one.split()[0] for one in soft["warnings"]] == ["'lower'", "'upper'"]
     assert (
@@ -376,11 +385,13 @@ FINER = RAFT.replace("divisions = [13, 4]", "divisions = [40, 8]")
 
 
 def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
-    """14 nodes on the soil: 6 points, one that is partly covered, and 7 beside the raft, of which one is clamped."""
+    """14 nodes on the soil: 6 points, one that is partly covered, and 7 beside the raft, of which
+    one is clamped."""
     model = describe(read_case(written(shared_tmp, EXCHANGED)), COMM)
     (contact,) = model["contact"]
     assert contact["nodes"] == (
-        "6 points of 14 nodes; 7 nodes in front of nothing (left out), at (0, 6), (1.53846, 6), (3.07692, 6) and 4 "
+        "6 points of 14 nodes; 7 nodes in front of nothing (left out), at (0, 6), (1.53846, 6), "
+        "(3.07692, 6) and 4 "
         "more places; 1 node partly covered (carried by their neighbours), at (15.3846, 6)"
     )
     assert f"  base: {contact['nodes']}" in in_words(model)
@@ -400,7 +411,8 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
 def test_a_softer_side_2_with_longer_edges_is_told(
     shared_tmp: Path, text: str, warns: bool, caplog: Any
 ) -> None:
-    """By the check and, as points are open at rest, by the static stage; both remedies close all of them."""
+    """By the check and, as points are open at rest, by the static stage; both remedies close all of
+    them."""
     case = read_case(written(shared_tmp, text))
     model = describe(case, COMM)
     sides = model["contact"][0]["sides"]
@@ -424,7 +436,8 @@ def test_a_softer_side_2_with_longer_edges_is_told(
 
 
 def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> None:
-    """The lower block carries the upper one: apart, the clamped one swings as it does alone, quicker than both."""
+    """The lower block carries the upper one: apart, the clamped one swings as it does alone,
+    quicker than both."""
     sides = ", ".join(
         f'{{facets = "{block}_{side}", components = [0]}}'
         for block in ("lower", "upper")

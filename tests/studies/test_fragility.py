@@ -1,4 +1,5 @@
-"""Fragility curves against closed forms and a search over a grid, sets of records, Sa(T1), and a study that goes on."""
+"""Fragility curves against closed forms and a search over a grid, sets of records, Sa(T1), and a
+study that goes on."""
 
 from __future__ import annotations
 
@@ -30,8 +31,9 @@ INF = math.inf
 
 @pytest.mark.parametrize(("count", "width"), [(5, 1e-4), (20, 1e-4), (100, 1e-5)])
 def test_narrow_brackets_are_known_capacities(count: int, width: float) -> None:
-    """Of known capacities theta is the geometric mean, beta the deviation of the logarithms over n, and the standard
-    errors of ln theta and ln beta are beta/sqrt(n) and 1/sqrt(2n), without correlation; in any unit."""
+    """Of known capacities theta is the geometric mean, beta the deviation of the logarithms over n,
+    and the standard errors of ln theta and ln beta are beta/sqrt(n) and 1/sqrt(2n), without
+    correlation; in any unit."""
     capacity = np.exp(np.random.default_rng(count).normal(0.3, 0.4, count))
     mean, beta = np.log(capacity).mean(), np.log(capacity).std()
     for unit in (1.0, 1e-6, 1e9):
@@ -58,8 +60,9 @@ def likelihood(brackets: np.ndarray, theta: np.ndarray, beta: np.ndarray) -> np.
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_coarse_levels_against_a_search(seed: int) -> None:
-    """Capacities known between four levels only, some below the lowest and some above the highest: no place of a grid
-    is better, and the best one is a cell away. The curvature there is that of differences of the definition."""
+    """Capacities known between four levels only, some below the lowest and some above the highest:
+    no place of a grid is better, and the best one is a cell away. The curvature there is that of
+    differences of the definition."""
     levels = np.array([0.0, 0.8, 1.2, 1.8, 2.7, INF])
     capacity = np.exp(np.random.default_rng(seed).normal(0.4, 0.6, 30))
     place = np.searchsorted(levels, capacity)
@@ -131,8 +134,8 @@ def row(record: str, level: float | None, demand: float | None, status: str = "f
 
 
 def test_where_records_pass() -> None:
-    """The first crossing counts, in any order of rows; beyond a failed run nothing is known, nor of a run whose demand
-    is no number; a record without a known run is left out."""
+    """The first crossing counts, in any order of rows; beyond a failed run nothing is known, nor of
+    a run whose demand is no number; a record without a known run is left out."""
     rows = [
         row("a", 3.0, 1.0),
         row("a", 1.0, 0.1),
@@ -173,7 +176,8 @@ def test_where_records_pass() -> None:
 
 
 def test_sets_of_records(tmp_path: Path) -> None:
-    """A folder without what is no record, a list with places relative to it, and files as they are."""
+    """A folder without what is no record, a list with places relative to it, and files as they
+    are."""
     records = tmp_path / "records"
     (records / "more").mkdir(parents=True)
     for name in ("b.at2", "A.AT2", "read.me", ".hidden.at2"):
@@ -217,8 +221,8 @@ def motions(tmp_path: Path) -> list[str]:
 
 
 def test_the_first_period_of_the_model(motions: list[str]) -> None:
-    """sa:T1 is sa:T with the body's own first period where nothing touches; a case whose motion is made of a seed, and
-    has no file, gives its place to a record."""
+    """sa:T1 is sa:T with the body's own first period where nothing touches; a case whose motion is
+    made of a seed, and has no file, gives its place to a record."""
     case = read_case(
         WALL,
         [
@@ -240,8 +244,9 @@ def test_the_first_period_of_the_model(motions: list[str]) -> None:
 def test_a_study_ends_in_curves_and_goes_on(
     tmp_path: Path, motions: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Runs are replaced by u = c PGA with a c of each record, so that capacities are known: the table has the curve of
-    their brackets. Levels between those that are there run alone, and limits that tell nothing are said."""
+    """Runs are replaced by u = c PGA with a c of each record, so that capacities are known: the
+    table has the curve of their brackets. Levels between those that are there run alone, and limits
+    that tell nothing are said."""
     made: list[str] = []
 
     def executed(runs: Sequence[OneRun], *_: object) -> Iterator[Row]:

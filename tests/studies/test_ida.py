@@ -1,4 +1,5 @@
-"""Incremental dynamic analysis: the example of docs/guide/studies.md, its table, going on after a stop, failed runs."""
+"""Incremental dynamic analysis: the example of docs/guide/studies.md, its table, going on after a
+stop, failed runs."""
 
 from __future__ import annotations
 
@@ -52,7 +53,8 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder in which the whole example of docs/guide/studies.md has run in a shell, and what it printed."""
+    """The folder in which the whole example of docs/guide/studies.md has run in a shell, and what
+    it printed."""
     folder = tmp_path_factory.mktemp("ida")
     case, (make, read) = blocks("toml")[0], blocks("python")
     commands = [one for one in blocks("sh") if "schema" not in one]
@@ -150,7 +152,8 @@ def test_the_example_gives_a_tidy_table(example: tuple[Path, str]) -> None:
 
 
 def test_finished_runs_are_kept(study: Path) -> None:
-    """Nothing runs again; the table is the same to the byte, also from rows that a killed study had not written."""
+    """Nothing runs again; the table is the same to the byte, also from rows that a killed study had
+    not written."""
     before = (study / "ida.csv").read_bytes()
     (study / "runs" / "motion_1_x2.0" / "row.json").unlink()
     rows, said = again(study)
@@ -159,7 +162,8 @@ def test_finished_runs_are_kept(study: Path) -> None:
 
 
 def test_a_failed_run_is_a_row_and_a_status(study: Path, tmp_path: Path, capsys: Any) -> None:
-    """The command ends with 1 and says so, with the reason of the first failed run; the others keep their rows."""
+    """The command ends with 1 and says so, with the reason of the first failed run; the others keep
+    their rows."""
     (tmp_path / "bad.txt").write_text("0 1\n0.1 x\n")
     asked = [
         "ida",
@@ -203,8 +207,8 @@ def test_other_demands_and_measures_need_no_runs(study: Path) -> None:
 
 @pytest.mark.slow
 def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path: Path) -> None:
-    """A run with a checkpoint at half its way and no row continues there; a record that is none has a row that says so,
-    and the others go on. The row of a failed run is tried again."""
+    """A run with a checkpoint at half its way and no row continues there; a record that is none has
+    a row that says so, and the others go on. The row of a failed run is tried again."""
     folder = study / "runs" / "motion_1_x1.0"
     expected = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
     for path in folder.iterdir():
@@ -245,7 +249,8 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
 
 
 def test_parts_levels_and_runs_that_die(study: Path) -> None:
-    """--part takes every n-th run; levels scale every record to the intensity; a process that dies is a row."""
+    """--part takes every n-th run; levels scale every record to the intensity; a process that dies
+    is a row."""
     asked = {"scales": (), "levels": (2.0, 4.0), "intensity": "arias"}
     rows, said = again(study, part=(2, 3), launch=("false",), **asked)
     assert said[0] == "4 runs, 1 of them here, 0 finished already"
@@ -262,7 +267,8 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
 
 
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and leave no row."""
+    """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and
+    leave no row."""
     monkeypatch.setattr("vi_contact.studies.ida.processes.PATIENCE", 1.0)
     case, shaking, going = (
         read_case("wall.toml"),
@@ -285,7 +291,8 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> None:
-    """Runs that share a process share the body, and none of their recorders: the ledger of each is its own."""
+    """Runs that share a process share the body, and none of their recorders: the ledger of each is
+    its own."""
     shaking = Shaking("motion_1", (Path("motion_1.at2").resolve(),))
     case = read_case(
         located("wall"),
@@ -323,7 +330,8 @@ def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> Non
 def test_what_a_process_that_died_has_left_runs_alone(
     study: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The first process ends one of three runs and dies; each of the others gets its own, and one of these dies too."""
+    """The first process ends one of three runs and dies; each of the others gets its own, and one
+    of these dies too."""
     case = read_case("wall.toml")
     runs = [
         OneRun(case, Shaking(f"m{k}", (Path("motion_1.at2"),)), 1.0, study / "runs" / f"m{k}")
@@ -355,7 +363,8 @@ def test_what_a_process_that_died_has_left_runs_alone(
 def test_a_wall_time_ends_a_study(
     study: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    """Every run gets what is left; one that ends with status 75 leaves no row, and without time left none is begun."""
+    """Every run gets what is left; one that ends with status 75 leaves no row, and without time
+    left none is begun."""
     monkeypatch.setattr("vi_contact.run.wall_time.age", lambda: 100.0)
     run = OneRun(
         read_case("wall.toml"),
@@ -443,7 +452,8 @@ def test_what_has_no_record_to_replace(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_two_motions_and_their_settings(tmp_path: Path) -> None:
-    """Horizontal and vertical record, as text or as table, each with its own scale times the factor."""
+    """Horizontal and vertical record, as text or as table, each with its own scale times the
+    factor."""
     case = read_case(ROOT / "demos" / "cases" / "channel.toml", ["excitation.2.scale=0.5"])
     (one,) = IDA(case, [("h.at2", "v.at2")], ["contact_uplift"], scales=(2.0,)).shakings
     h, v = (Path(name).resolve() for name in ("h.at2", "v.at2"))
@@ -482,7 +492,8 @@ def test_measures() -> None:
 
 
 def test_fractiles_of_straight_curves() -> None:
-    """EDP = c IM with c = 1, 2, 3: median 2 IM, fractiles linear between the records (numpy's quantile): 1.32, 2.68."""
+    """EDP = c IM with c = 1, 2, 3: median 2 IM, fractiles linear between the records (numpy's
+    quantile): 1.32, 2.68."""
     curves = {
         str(c): (np.array([3.0, 1.0, 2.0 + c]), c * np.array([3.0, 1.0, 2.0 + c]))
         for c in (1, 2, 3)
@@ -496,7 +507,8 @@ def test_fractiles_of_straight_curves() -> None:
 
 
 def test_the_picture_of_many_records(tmp_path: Path) -> None:
-    """Without names where records are many, with crosses for failed runs, also when there is nothing to scale."""
+    """Without names where records are many, with crosses for failed runs, also when there is
+    nothing to scale."""
     curves = {str(k): (np.arange(3.0), k * np.arange(3.0)) for k in range(8)}
     panels = [
         DemandPanel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),

@@ -1,4 +1,5 @@
-"""Classes of others in case files: of allowed packages, of the protocol asked for, and nothing else is imported."""
+"""Classes of others in case files: of allowed packages, of the protocol asked for, and nothing else
+is imported."""
 
 from __future__ import annotations
 
@@ -172,7 +173,8 @@ def test_a_case_file_alone_imports_nothing(
         == 1
     )
     assert (
-        "[friction] has the type 'pack:Law' of the package 'pack', and a case file imports nothing by itself: "
+        "[friction] has the type 'pack:Law' of the package 'pack', and a case file imports nothing "
+        "by itself: "
         "give --allow pack if you trust it" in capsys.readouterr().err
     )
     assert not imported() and not (folder / "harm").exists()
@@ -181,7 +183,8 @@ def test_a_case_file_alone_imports_nothing(
 def test_classes_of_allowed_packages(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """By the module that defines it or the package that hands it on; keys without type hints come as they are."""
+    """By the module that defines it or the package that hands it on; keys without type hints come
+    as they are."""
     for name in ("pack.laws:Law", "pack:Law", "pack.laws:Static", "pack.laws:Compiled"):
         for allow in (("pack",), ("other", "pack.laws", "pack")):
             case = read_case(
@@ -241,7 +244,8 @@ def test_installed_packages_register_an_entry_point(folder: Path) -> None:
     [
         (
             "packet:Law",
-            "of the package 'packet', and a case file imports nothing by itself: give --allow packet",
+            "of the package 'packet', and a case file imports nothing by itself: give --allow "
+            "packet",
         ),
         ("harmful:Law", "give --allow harmful"),
         ("os:system", "give --allow os"),
@@ -291,7 +295,8 @@ def test_installed_packages_register_an_entry_point(folder: Path) -> None:
         ("pack.laws:Number", "which has no method at, as FrictionLaw must"),
         (
             "pack.laws:Hinted",
-            "whose arguments cannot be read (name 'Nowhere' is not defined): correct the type hints",
+            "whose arguments cannot be read (name 'Nowhere' is not defined): correct the type "
+            "hints",
         ),
     ],
     ids=range(40),

@@ -1,5 +1,6 @@
-"""The cases that ``vi-contact new`` writes, with large cells and 200 steps of their motion: equilibrium under gravity
-and water in closed form, one number of each beside a formula, and motions that certificate and ledger vouch for."""
+"""The cases that ``vi-contact new`` writes, with large cells and 200 steps of their motion:
+equilibrium under gravity and water in closed form, one number of each beside a formula, and motions
+that certificate and ledger vouch for."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ from vi_contact.studies.cases.stages import leading
 
 pytestmark = pytest.mark.serial
 LARGE = "mesh.refine=0"  # the quick size that each case names
-EXACT = 1e-9  # of the weight: sums of forces and moments of linear equations that are solved to round-off
+# of the weight: sums of forces and moments of linear equations that are solved to round-off
+EXACT = 1e-9
 
 
 def settings(name: str) -> list[str]:
@@ -41,7 +43,8 @@ def settings(name: str) -> list[str]:
 
 
 def run(name: str, out: Path, *more: str) -> Any:
-    """The history of the quick size; certificate, ledger and what friction may carry hold in every step."""
+    """The history of the quick size; certificate, ledger and what friction may carry hold in every
+    step."""
     found = read_case(STARTERS / f"{name}.toml", [*settings(name), *more]).run(
         MPI.COMM_SELF, out=out, progress=False
     )
@@ -89,8 +92,9 @@ def test_from_new_to_report_in_four_commands(
 
 
 def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) -> None:
-    """At rest the faces together carry the wall's weight and no shear, the rock carries all, and the thrust on the stem
-    lies between Rankine's of a dense sand and K0 of the elastic soil; shaken, the wall is pushed away from its fill."""
+    """At rest the faces together carry the wall's weight and no shear, the rock carries all, and
+    the thrust on the stem lies between Rankine's of a dense sand and K0 of the elastic soil;
+    shaken, the wall is pushed away from its fill."""
     history = run("wall", tmp_path)
     wall, fill = 2500.0 * G * (0.5 * 5.4 + 4.0 * 0.6), 1900.0 * G * (18.5 * 6.0 - 2.5 * 0.6)
     whole = wall + fill + 2000.0 * G * 30.0 * 6.0
@@ -126,15 +130,16 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
 
 
 def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
-    """What a study computes once for all records, without a folder for the fields that the case writes."""
+    """What a study computes once for all records, without a folder for the fields that the case
+    writes."""
     reached, parts, state = leading(read_case(STARTERS / "wall.toml", [LARGE]), MPI.COMM_SELF)
     assert reached is not None and reached.number == 1 and parts.steady and state is not None
     assert state.r_n.max() > 0.0
 
 
 def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> None:
-    """N = W - U, T = -H and their eccentricity, in closed form; the factor of safety mu N/|T| falls below one for a
-    while under the motion, and the dam is then further downstream."""
+    """N = W - U, T = -H and their eccentricity, in closed form; the factor of safety mu N/|T| falls
+    below one for a while under the motion, and the dam is then further downstream."""
     history = run("dam", tmp_path, "excitation.1.scale=3.0")
     weight, arm = 700.0 * 2400.0 * G, (200.0 * 2.5 + 500.0 * (5.0 + 25.0 / 3.0)) / 700.0
     head = 1000.0 * G * 36.0
@@ -152,8 +157,9 @@ def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> Non
 
 
 def test_pier_rocks_within_the_moment_that_overturns_it(tmp_path: Path) -> None:
-    """Its weight on the raft; N never acts beyond the edge, so that |M| <= N B/2, as the raft lifts off; clamped at its
-    foot and with stiff raft and deck it has the frequency of a beam with shear, consistent mass and a rigid deck."""
+    """Its weight on the raft; N never acts beyond the edge, so that |M| <= N B/2, as the raft lifts
+    off; clamped at its foot and with stiff raft and deck it has the frequency of a beam with shear,
+    consistent mass and a rigid deck."""
     history = run("pier", tmp_path, "excitation.1.scale=3.0")
     weight = (2500.0 * (7.0 * 1.5 + 2.0 * 9.0) + 6000.0 * 6.0 * 1.5) * G
     assert (
@@ -178,7 +184,8 @@ def test_pier_rocks_within_the_moment_that_overturns_it(tmp_path: Path) -> None:
 
 
 def beam_with_deck() -> float:
-    """The lowest frequency [Hz] of the pier, clamped at its foot, in deflection and rotation of its top."""
+    """The lowest frequency [Hz] of the pier, clamped at its foot, in deflection and rotation of its
+    top."""
     length, width, stiff, shear = 9.0, 2.0, 3e10 / (1.0 - 0.2**2), 3e10 / 2.4
     bending, deck = stiff * width**3 / 12.0, 6000.0 * 6.0 * 1.5
     flexibility = (
@@ -213,8 +220,9 @@ system = {prescribed = [{facets = "left_side", components = [1]}, {facets = "rig
 
 
 def test_culvert_racks_with_the_ground(tmp_path: Path) -> None:
-    """Under 0.1 g sideways, without time, the free field shears by rho a z/G, and the box by less: its frame is stiffer
-    than the soil. Shaken, it carries its weight all the while it accelerates with the ground."""
+    """Under 0.1 g sideways, without time, the free field shears by rho a z/G, and the box by less:
+    its frame is stiffer than the soil. Shaken, it carries its weight all the while it accelerates
+    with the ground."""
     history = run("culvert", tmp_path / "run")
     weight = 2500.0 * G * (6.0 * 4.0 - 5.0 * 3.0)
     assert history["contact_force_y"][0] + history["friction_force_y"][0] == pytest.approx(

@@ -1,4 +1,5 @@
-"""Values with units, and expressions, in case files: SI values, and one sentence for what does not fit."""
+"""Values with units, and expressions, in case files: SI values, and one sentence for what does not
+fit."""
 
 from __future__ import annotations
 
@@ -192,7 +193,8 @@ steps = 3
 
 
 def test_expressions_are_the_functions_of_the_interface(tmp_path_factory: Any) -> None:
-    """C1.3: mesh, material, loads, gap and initial values, on any ranks, against the same functions in Python."""
+    """C1.3: mesh, material, loads, gap and initial values, on any ranks, against the same functions
+    in Python."""
     folder = Path(COMM.bcast(str(tmp_path_factory.mktemp("case")) if COMM.rank == 0 else ""))
     path = folder / "block.toml"
     if COMM.rank == 0:

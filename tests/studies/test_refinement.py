@@ -1,4 +1,5 @@
-"""``report --refine``: the case again with h/2 and with dt/2, whose peaks stand beside those of the run."""
+"""``report --refine``: the case again with h/2 and with dt/2, whose peaks stand beside those of the
+run."""
 
 from __future__ import annotations
 
@@ -65,8 +66,9 @@ def written(folder: Path) -> Path:
 def test_both_columns_and_their_difference(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Twice the elements along each side, twice the steps, of the same duration; the table has their numbers; nothing
-    that is there is computed again; another case is. Paths stay relative to the case that was run (V11.3)."""
+    """Twice the elements along each side, twice the steps, of the same duration; the table has
+    their numbers; nothing that is there is computed again; another case is. Paths stay relative to
+    the case that was run (V11.3)."""
     case, out = written(tmp_path), tmp_path / "out" / "run"
     assert main(["run", str(case), "--out", str(out), "--quiet"]) == 0
     assert base_folder(out / "case.toml") == tmp_path

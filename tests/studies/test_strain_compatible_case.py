@@ -1,4 +1,5 @@
-"""Case files with [strain_compatible]: the calls of the Python interface, one run folder for each run (V8.8)."""
+"""Case files with [strain_compatible]: the calls of the Python interface, one run folder for each
+run (V8.8)."""
 
 from __future__ import annotations
 
@@ -122,7 +123,8 @@ def by_hand() -> Any:
 
 
 def test_a_case_is_the_calls_of_python(tmp_path):
-    """The last run is DIR, those before it DIR/iterations/1, 2, …; a second time they are replaced."""
+    """The last run is DIR, those before it DIR/iterations/1, 2, …; a second time they are
+    replaced."""
     expected, out = by_hand(), tmp_path / "out"
     for _ in range(2):
         found = read_case(written(tmp_path)).run(COMM, out=out, progress=False)
@@ -208,8 +210,8 @@ def test_what_is_refused(tmp_path, old, new, words):
     ],
 )
 def test_a_folder_without_compatible_soil_looks_unfinished(tmp_path, old, new, words):
-    """It is refused; the last run stands with the others, and the folder holds no summary; a later run is not
-    disturbed."""
+    """It is refused; the last run stands with the others, and the folder holds no summary; a later
+    run is not disturbed."""
     out = tmp_path / "out"
     with pytest.raises(ViContactError, match=words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, out=out, progress=False)

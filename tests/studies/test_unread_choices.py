@@ -1,5 +1,5 @@
-"""Choices without effect: each is refused in one sentence with its table and a remedy that works, and every key of the
-laws and materials of case files changes the model, or is refused."""
+"""Choices without effect: each is refused in one sentence with its table and a remedy that works,
+and every key of the laws and materials of case files changes the model, or is refused."""
 
 from __future__ import annotations
 
@@ -74,11 +74,13 @@ def added(table: str, line: str, text: str = CASE) -> str:
     return text.replace(f"[{table}]\n", f"[{table}]\n{line}\n", 1)
 
 
-# name -> (a case, what its sentence says after the file's name, the same case with the remedy of the sentence)
+# name -> (a case, what its sentence says after the file's name, the same case with the remedy of
+# the sentence)
 VAIN: dict[str, tuple[str, str, str]] = {
     "law without ratios": (
         added("system", 'damping = {type = "DampingRatio", frequency = 5.0}'),
-        ": [system.damping] DampingRatio damps by the ratios of the materials, and none has one: give [material.lower] "
+        ": [system.damping] DampingRatio damps by the ratios of the materials, and none has one: "
+        "give [material.lower] "
         "xi = 0.05, or another type of damping",
         added(
             "system",
@@ -88,7 +90,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "ratios without law": (
         added("material.upper", 'xi = "3 %"'),
-        ': [material.upper] has xi, which no damping reads here: give [system] damping = {type = "DampingRatio", '
+        ": [material.upper] has xi, which no damping reads here: give [system] damping = {type = "
+        '"DampingRatio", '
         "frequency = …} with a frequency in Hz, or leave xi out",
         added(
             "material.upper",
@@ -107,12 +110,14 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "law of zeros": (
         added("system", 'damping = {type = "Rayleigh", alpha = 0.0, beta = 0.0}'),
-        ": [system] assemble: Rayleigh(alpha=0.0, beta=0.0) damps nothing, as its coefficients are zero",
+        ": [system] assemble: Rayleigh(alpha=0.0, beta=0.0) damps nothing, as its coefficients are "
+        "zero",
         CASE,
     ),
     "material of nothing": (
         added("system", 'material = [["lower", "lower"], ["upper", "lower"]]'),
-        ": [material.upper] is of nothing, as [system] does not name it: give its cell group in [system] material",
+        ": [material.upper] is of nothing, as [system] does not name it: give its cell group in "
+        "[system] material",
         CASE,
     ),
     "material of no group": (
@@ -147,7 +152,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "method with friction": (
         CASE + RUBS + '[solver]\ntype = "Condensed"\nmethod = {type = "Hildreth"}\n',
-        ": [solver] method is for contact without friction, and [friction] is given: give friction_method in its place",
+        ": [solver] method is for contact without friction, and [friction] is given: give "
+        "friction_method in its place",
         CASE + RUBS + '[solver]\ntype = "Condensed"\nfriction_method = {type = "NSGS"}\n',
     ),
     "method without friction": (
@@ -167,7 +173,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "the same solver again": (
         CASE + '[solver]\ntype = "Condensed"\n[[escalation]]\ntype = "Condensed"\n',
-        ": [[escalation]] names Condensed with the same keys as the solver before it, which has failed by then",
+        ": [[escalation]] names Condensed with the same keys as the solver before it, which has "
+        "failed by then",
         CASE + '[solver]\ntype = "Condensed"\n[[escalation]]\ntype = "Volume"\n',
     ),
     "options of another solver": (
@@ -178,7 +185,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
     "weight and body force": (
         CASE + WEIGHS + "[gravity]\n",
         ": [gravity] with_weight: the system has this weight already among its constant "
-        "loads, as a BodyForce or from an earlier with_weight, and would weigh twice as much; leave one of the two out",
+        "loads, as a BodyForce or from an earlier with_weight, and would weigh twice as much; "
+        "leave one of the two out",
         CASE + "[gravity]\n",
     ),
     "weight of nothing": (
@@ -200,7 +208,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "weight of a recorder": (
         CASE + REACTIONS,
-        ": [[record]] Reactions has gravity, and the body has no weight: give [gravity], or leave it out",
+        ": [[record]] Reactions has gravity, and the body has no weight: give [gravity], or leave "
+        "it out",
         CASE + "[gravity]\n" + REACTIONS,
     ),
     "halved without contact": (
@@ -226,7 +235,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "velocity before rest": (
         added("system", "initial_velocity = [0.0, 1.0]") + "[gravity]\n",
-        ": [system] initial_velocity is lost, as [gravity] lets the body begin at rest, in equilibrium",
+        ": [system] initial_velocity is lost, as [gravity] lets the body begin at rest, in "
+        "equilibrium",
         added("system", "initial_velocity = [0.0, 1.0]"),
     ),
     "base without motion": (
@@ -296,7 +306,8 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-@pytest.mark.serial  # most are told when the file is read; those of Python below are found on several ranks
+# most are told when the file is read; those of Python below are found on several ranks
+@pytest.mark.serial
 @pytest.mark.parametrize("name", VAIN)
 def test_a_choice_in_vain_is_refused(shared_tmp: Path, name: str) -> None:
     """In a sentence with table and remedy; the case with the remedy runs."""
@@ -323,7 +334,8 @@ def test_the_case_itself_runs(tmp_path: Path) -> None:
 def test_settings_may_leave_laws_of_the_file_behind(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """``--set contact=`` asks for the body without contact; a law that is set beside it is in vain."""
+    """``--set contact=`` asks for the body without contact; a law that is set beside it is in
+    vain."""
     held = CASE.replace(
         'clamped = "lower_bottom"', 'clamped = ["lower_bottom", "upper_top"]'
     )  # or it would fly
@@ -356,7 +368,8 @@ def test_settings_may_leave_laws_of_the_file_behind(
 
 
 def test_motions_of_static_stages_are_told(shared_tmp: Path) -> None:
-    """The weight alone is looked at before the motion is added: a warning of ``run --check``, and no refusal."""
+    """The weight alone is looked at before the motion is added: a warning of ``run --check``, and
+    no refusal."""
     text = CASE + RUBS + SHAKES + "[gravity]\n" + STATIC
     model = describe(read_case(written(shared_tmp, text)), COMM)
     (said,) = [one for one in model["warnings"] if "static" in one]
@@ -365,7 +378,8 @@ def test_motions_of_static_stages_are_told(shared_tmp: Path) -> None:
     )
 
 
-# The same in Python ---------------------------------------------------------------------------------------------------
+# The same in Python
+# ---------------------------------------------------------------------------------------------------
 MATERIAL = vc.LinearElastic(E=1e8, nu=0.2, rho=2000.0)
 
 
@@ -469,8 +483,9 @@ def test_weights_that_add_up_are_taken() -> None:
     )  # 1.5 and 0.5 times the weight, less at a side
 
 
-# Every key of the laws changes the model ------------------------------------------------------------------------------
-# A block that flies at another one and slides on it: small, and every law that it may have does something.
+# Every key of the laws changes the model
+# ------------------------------------------------------------------------------ A block that flies
+# at another one and slides on it: small, and every law that it may have does something.
 FLIGHT: dict[str, Any] = {
     "mesh": {
         "type": "TwoBlocks",
@@ -944,7 +959,8 @@ def differ(one: dict[str, Any], other: dict[str, Any]) -> bool:
     "number", range(len(KEYS)), ids=[f"{table} {word}".strip() for table, word, *_ in KEYS]
 )
 def test_every_key_changes_the_model(shared_tmp: Path, number: int) -> None:
-    """One key after the other has another value: what is computed is another, or the case is refused."""
+    """One key after the other has another value: what is computed is another, or the case is
+    refused."""
     table, word, keys, others, more = KEYS[number]
     base = FLIGHT
     for where, value in more.items():
@@ -967,7 +983,8 @@ def test_every_key_changes_the_model(shared_tmp: Path, number: int) -> None:
 
 @pytest.mark.serial
 def test_no_key_is_forgotten() -> None:
-    """Each key of each type of these kinds stands in the list above, or there is a reason why not."""
+    """Each key of each type of these kinds stands in the list above, or there is a reason why
+    not."""
     tried = {f"{word}.{key}" for _, word, _, others, _ in KEYS for key in others}
     listed = {getattr(kind, "__name__", ""): words for kind, words in choices().items()}
     missing = [

@@ -1,4 +1,5 @@
-"""Every material may belong to a cell group, with damping of its own, and every recorder of the package has a word."""
+"""Every material may belong to a cell group, with damping of its own, and every recorder of the
+package has a word."""
 
 from __future__ import annotations
 
@@ -107,8 +108,8 @@ def build(damping: Any, xi: float) -> Any:
 
 @pytest.mark.parametrize("words", DAMPINGS)
 def test_materials_and_damping_by_cell_group(shared_tmp: Path, words: str) -> None:
-    """M, C and K of a case are those of the same pairs of cells and materials in Python, whatever the damping; a ratio
-    belongs to the material of its group, and the others have none."""
+    """M, C and K of a case are those of the same pairs of cells and materials in Python, whatever
+    the damping; a ratio belongs to the material of its group, and the others have none."""
     file = shared_tmp / "groups.toml"
     if COMM.rank == 0:
         case = CASE.replace(

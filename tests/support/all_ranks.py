@@ -13,7 +13,8 @@ ARRAYS = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "no
 
 
 class Seen:
-    """A surface whose arrays and values are those of all conditions, by their numbers. Every use is collective."""
+    """A surface whose arrays and values are those of all conditions, by their numbers. Every use is
+    collective."""
 
     def __init__(self, surface: ContactSurface) -> None:
         self._surface = surface

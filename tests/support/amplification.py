@@ -13,7 +13,8 @@ from vi_contact.schemes.generalised_alpha import AlphaStep
 
 
 def amplification(scheme: AlphaStep, frequency: float, damping: float = 0.0) -> np.ndarray:
-    """3 x 3 amplification of (u, v, a) of u'' + 2 xi w u' + w² u = 0, dt = 1: one step from each unit vector."""
+    """3 x 3 amplification of (u, v, a) of u'' + 2 xi w u' + w² u = 0, dt = 1: one step from each
+    unit vector."""
     problem = uncoupled(3, frequency=frequency, damping=damping)
     u, v, a = np.eye(3)
     state = replace(initial_state(problem), u=u, v=v)

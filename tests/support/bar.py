@@ -1,7 +1,9 @@
-"""A bar of P1 elements whose foot may touch a wall: exact solutions (V1.1–V1.3) without finite element packages.
+"""A bar of P1 elements whose foot may touch a wall: exact solutions (V1.1–V1.3) without finite
+element packages.
 
-Node i sits at x = i L/n; the foot x = 0 may touch a wall below it, so its contact direction is -1 and the change of
-basis is not the identity. u is positive upwards, area 1. The top x = L is free, or clamped and then not an unknown.
+Node i sits at x = i L/n; the foot x = 0 may touch a wall below it, so its contact direction is -1
+and the change of basis is not the identity. u is positive upwards, area 1. The top x = L is free,
+or clamped and then not an unknown.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from vi_contact.solvers.condensed import Condensed
 def bar_matrices(
     n: int, *, length: float, E: float, rho: float, lumped: bool = False
 ) -> tuple[Any, Any]:
-    """(M, K) of n + 1 nodes: rho h/6 tridiag(1, 4, 1) or its row sums, E/h tridiag(-1, 2, -1), halved at the ends."""
+    """(M, K) of n + 1 nodes: rho h/6 tridiag(1, 4, 1) or its row sums, E/h tridiag(-1, 2, -1),
+    halved at the ends."""
     h = length / n
     ends = np.full(n + 1, 2.0)
     ends[[0, -1]] = 1.0
@@ -50,8 +53,8 @@ def bar(
     lumped: bool = False,
     **problem: Any,
 ) -> ContactProblem:
-    """The bar over its wall, by default that of V1.1; C = damping * K [s]; consistent mass unless told
-    otherwise; other keywords go to ContactProblem."""
+    """The bar over its wall, by default that of V1.1; C = damping * K [s]; consistent mass unless
+    told otherwise; other keywords go to ContactProblem."""
     M, K = bar_matrices(n, length=length, E=E, rho=rho, lumped=lumped)
     x = np.linspace(0.0, length, n + 1)
     system = vc.system_from_arrays(
@@ -69,7 +72,8 @@ def bar(
 
 
 def thrown(n: int = 100, **more: Any) -> ContactProblem:
-    """V1.1: initial height 5 m, initial velocity -10 m/s; contact from t = 1/2 to 7/6 under the pressure 300."""
+    """V1.1: initial height 5 m, initial velocity -10 m/s; contact from t = 1/2 to 7/6 under the
+    pressure 300."""
     return bar(n, gap=5.0, v0=lambda x: np.full_like(x, -10.0), **more)
 
 

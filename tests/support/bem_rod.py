@@ -15,7 +15,8 @@ from vi_contact.bem import (
 def rod(
     blocks: EnergeticBlocks, load, *, symmetric: bool = True, rho: float = 1.0
 ) -> BoundaryProblem:
-    """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1, length 1."""
+    """The square between rollers on a fixed base, pulled at its top by load(t): a rod with c = 1,
+    length 1."""
     mesh = blocks.mesh
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[1] = mesh.nodes_of(mesh.labels == 0)

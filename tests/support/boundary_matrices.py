@@ -1,4 +1,5 @@
-"""Matrices V, K, D of a mesh for the material of ``plane_waves`` (density 1): at a frequency, or in time up to t."""
+"""Matrices V, K, D of a mesh for the material of ``plane_waves`` (density 1): at a frequency, or in
+time up to t."""
 
 from __future__ import annotations
 

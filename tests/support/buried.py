@@ -21,7 +21,8 @@ GAMMA = 1e-3
 
 @dataclass(frozen=True)
 class Rings:
-    """A quarter of a lining, inner to outer radius, in soil up to the radius far; divisions along and across."""
+    """A quarter of a lining, inner to outer radius, in soil up to the radius far; divisions along
+    and across."""
 
     inner: float
     outer: float
@@ -46,7 +47,8 @@ class Rings:
 
 
 def graded(start: float, end: float, first: float, divisions: int) -> np.ndarray:
-    """Coordinates from start to end whose intervals grow by a constant factor from the length ``first``."""
+    """Coordinates from start to end whose intervals grow by a constant factor from the length
+    ``first``."""
     powers = np.arange(divisions)
     factor = brentq(lambda q: first * np.sum(q**powers) - (end - start), 1.0, 3.0)
     return np.concatenate([[start], start + first * np.cumsum(factor**powers)[:-1], [end]])
@@ -54,7 +56,8 @@ def graded(start: float, end: float, first: float, divisions: int) -> np.ndarray
 
 @dataclass(frozen=True)
 class LinedBox:
-    """A quarter of a box, width x height between centre lines, in a square of soil; ``slip``: two bodies."""
+    """A quarter of a box, width x height between centre lines, in a square of soil; ``slip``: two
+    bodies."""
 
     width: float
     height: float
@@ -130,7 +133,8 @@ class LinedBox:
         add_arrays(gmsh, self.arrays())
 
     def contact_points(self, name: str) -> list[tuple[float, float]]:
-        """Nodes of the interface but the one on the axis, which antisymmetry holds along the normal."""
+        """Nodes of the interface but the one on the axis, which antisymmetry holds along the
+        normal."""
         x, y = self.outside
         if name == "right":
             return [(x, float(v)) for v in self.lines(1) if 0.0 < v < y + 1e-9]
@@ -138,7 +142,8 @@ class LinedBox:
 
 
 def racking(box: LinedBox, flexibility: float, *, nu: float = 0.3) -> float:
-    """gamma_frame/gamma_soil of a box of this flexibility ratio, tied to the soil or bilateral without friction."""
+    """gamma_frame/gamma_soil of a box of this flexibility ratio, tied to the soil or bilateral
+    without friction."""
     soil = LinearElastic(E=1e8, nu=nu, rho=1900.0)
     bending = box.thickness**3 / 12.0
     unit = flexible(soil.shear_modulus, box.width, box.height, bending, bending, bending)

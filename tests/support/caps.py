@@ -1,10 +1,12 @@
-"""Two caps of spheres in contact, or one on a plane, cut out of the bodies where the closed form of the half-space says
-how they move: boxes that reach 4 a from the contact, whose far sides move as they would in whole spheres.
+"""Two caps of spheres in contact, or one on a plane, cut out of the bodies where the closed form of
+the half-space says how they move: boxes that reach 4 a from the contact, whose far sides move as
+they would in whole spheres.
 
-So nothing is left of the shape of the bodies far away but the closed form, and force against approach can be measured:
-both bodies are moved, and the force is what the contact answers. The sides in contact are spheres: nodes lie on them,
-their gap comes from the mesh. a/R is small, as the half-space asks. Meshes are finest in the contact, cells of a/n; a
-finer n divides every cell, near and far, so that errors have an order.
+So nothing is left of the shape of the bodies far away but the closed form, and force against
+approach can be measured: both bodies are moved, and the force is what the contact answers. The
+sides in contact are spheres: nodes lie on them, their gap comes from the mesh. a/R is small, as the
+half-space asks. Meshes are finest in the contact, cells of a/n; a finer n divides every cell, near
+and far, so that errors have an order.
 """
 
 from __future__ import annotations
@@ -49,7 +51,8 @@ Motion = Callable[[Array, float], Array]
 
 @dataclass(frozen=True)
 class Cap:
-    """One body: radius [m], a plane when infinite; cells across a; ``turn`` [rad] of its mesh about the axis."""
+    """One body: radius [m], a plane when infinite; cells across a; ``turn`` [rad] of its mesh about
+    the axis."""
 
     radius: float
     material: LinearElastic
@@ -72,8 +75,8 @@ class Cap:
 
 
 def stretched(cells: float, even: float) -> Array:
-    """Nodes on [0, REACH]: cells of about 1/cells as far as ``even``, then growing. Their places are those of one
-    smooth function, so that twice the cells halve each."""
+    """Nodes on [0, REACH]: cells of about 1/cells as far as ``even``, then growing. Their places
+    are those of one smooth function, so that twice the cells halve each."""
     length = even + np.log1p(GROWTH * (REACH - even)) / GROWTH
     xi = np.linspace(0.0, length, 1 + round(cells * length))
     return np.asarray(np.minimum(xi, even) + np.expm1(GROWTH * np.maximum(xi - even, 0.0)) / GROWTH)
@@ -81,7 +84,8 @@ def stretched(cells: float, even: float) -> Array:
 
 @dataclass(frozen=True)
 class CapMesh:
-    """One or two caps, "upper" at y > 0 and "lower", with groups "upper_foot", "upper_far", "upper_x", "upper_z", …
+    """One or two caps, "upper" at y > 0 and "lower", with groups "upper_foot", "upper_far",
+    "upper_x", "upper_z", …
 
     ``whole``: axes, of x and z, that run to both sides; the others are planes of symmetry.
     """
@@ -146,8 +150,9 @@ class CapMesh:
 
 @dataclass(frozen=True)
 class Contact:
-    """All conditions: places (m, 3), areas, nodal forces r_n (m,) and friction along the axes (m, 3) [N], of the whole
-    contact: planes of symmetry are paid for in ``share``, the part of it that was modelled."""
+    """All conditions: places (m, 3), areas, nodal forces r_n (m,) and friction along the axes (m,
+    3) [N], of the whole contact: planes of symmetry are paid for in ``share``, the part of it that
+    was modelled."""
 
     points: Array
     weights: Array
@@ -190,9 +195,9 @@ class Contact:
 
 @dataclass(frozen=True)
 class Caps:
-    """The problem. ``a``: radius of contact [m], at t ``pressed``(t) times that; ``whole``: see CapMesh; ``motions``:
-    of the far sides of each body beside those of the pressure, (points (k, 3), t) -> (k, 3), both with the depth in
-    the body in the place of y."""
+    """The problem. ``a``: radius of contact [m], at t ``pressed``(t) times that; ``whole``: see
+    CapMesh; ``motions``: of the far sides of each body beside those of the pressure, (points (k,
+    3), t) -> (k, 3), both with the depth in the body in the place of y."""
 
     caps: Sequence[Cap]
     a: float

@@ -1,8 +1,10 @@
-"""A spring-mass chain with walls at its ends: the smallest contact problem, for tests without finite elements.
+"""A spring-mass chain with walls at its ends: the smallest contact problem, for tests without
+finite elements.
 
-Masses sit at X = 1, 2, …, n [m]; spring i joins mass i - 1 to mass i, spring 1 joins mass 1 to the ground (clamped)
-or is absent (floating). The wall on the right bounds u_n <= gap; the wall on the left bounds -u_1 <= left_gap, so that
-its contact direction is -1 and the change of basis is not the identity. It runs on one process (SerialAlgebra).
+Masses sit at X = 1, 2, …, n [m]; spring i joins mass i - 1 to mass i, spring 1 joins mass 1 to the
+ground (clamped) or is absent (floating). The wall on the right bounds u_n <= gap; the wall on the
+left bounds -u_1 <= left_gap, so that its contact direction is -1 and the change of basis is not the
+identity. It runs on one process (SerialAlgebra).
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ def chain_system(
 ) -> SemiDiscreteSystem:
     """n masses [kg] and springs [N/m], C = damping * K [s], a constant force [N] on the last mass.
 
-    ``consistent``: mass/6 times tridiag(1, 4, 1), which component resets of velocities see (V9.6); lumped by default.
+    ``consistent``: mass/6 times tridiag(1, 4, 1), which component resets of velocities see (V9.6);
+    lumped by default.
     """
     k = np.full(n, 2.0)
     k[-1] = 1.0
@@ -56,7 +59,8 @@ def chain_system(
 def chain_surface(
     n: int, *, gap: float = 0.0, left_gap: float | None = None, weight: float = 0.5
 ) -> ContactSurface:
-    """The wall on the right of mass n and, when ``left_gap`` is given, the wall on the left of mass 1 (condition 1)."""
+    """The wall on the right of mass n and, when ``left_gap`` is given, the wall on the left of mass
+    1 (condition 1)."""
     ends = [n - 1] if left_gap is None else [n - 1, 0]
     direction = np.ones(n)
     if left_gap is not None:

@@ -1,7 +1,8 @@
 """The buried channel of V4.2 once more, by a program of its own: nothing of vi_contact is used.
 
-Bilinear squares on plain arrays, absolute displacements of both bodies, gaps as rows of a matrix G (G u = opening),
-u1 = A⁻¹(b + Gᵀ p) with the reactions p >= 0 of a non-negative least squares problem (Lawson and Hanson). SI units.
+Bilinear squares on plain arrays, absolute displacements of both bodies, gaps as rows of a matrix G
+(G u = opening), u1 = A⁻¹(b + Gᵀ p) with the reactions p >= 0 of a non-negative least squares
+problem (Lawson and Hanson). SI units.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ def square(E: float, nu: float, rho: float) -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Matrices on the free unknowns; x, y: place -> unknown of a body's node; opening rows G; M r and weight."""
+    """Matrices on the free unknowns; x, y: place -> unknown of a body's node; opening rows G; M r
+    and weight."""
 
     K: Any
     M: Any
@@ -101,7 +103,8 @@ def openings(number: dict[tuple[str, float, float], int], size: int) -> Any:
 
 
 def at_rest() -> Any:
-    """u under the channel's weight: rows of G with negative reactions are let go, those with openings < 0 closed."""
+    """u under the channel's weight: rows of G with negative reactions are let go, those with
+    openings < 0 closed."""
     b = bodies()
     closed, size = np.ones(len(b.G), dtype=bool), float(abs(b.K).max())
     for _ in range(50):
@@ -118,7 +121,8 @@ def at_rest() -> Any:
 
 
 def run(steps: int, *, amplitude: float = 2.0, dt: float = 1.0 / 80.0) -> tuple[Any, Any]:
-    """(openings (steps + 1, 23), u_x and u_y of the channel's bottom corners (steps + 1, 4)) from rest on."""
+    """(openings (steps + 1, 23), u_x and u_y of the channel's bottom corners (steps + 1, 4)) from
+    rest on."""
     b = bodies()
     A = splu((b.K + 4.0 / dt**2 * b.M).tocsc())
     mass = splu(b.M.tocsc())

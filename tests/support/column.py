@@ -1,8 +1,10 @@
-"""A column of P1 elements with two displacement components at every node, standing on a base with friction.
+"""A column of P1 elements with two displacement components at every node, standing on a base with
+friction.
 
-Node i sits at height y = i H/n; its unknowns are u_x (2 i) and u_y (2 i + 1), which shear and pressure waves move
-independently. The base y = 0 may touch the half-space below, so the contact direction is -y and the basis turns the
-sign of u_y there. Cross section 1 m². Without finite element packages: V1.5, V1.6, V2.7 on one process.
+Node i sits at height y = i H/n; its unknowns are u_x (2 i) and u_y (2 i + 1), which shear and
+pressure waves move independently. The base y = 0 may touch the half-space below, so the contact
+direction is -y and the basis turns the sign of u_y there. Cross section 1 m². Without finite
+element packages: V1.5, V1.6, V2.7 on one process.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ def two_component_system(
     u0: Any = (0.0, 0.0),
     v0: Any = (0.0, 0.0),
 ) -> SemiDiscreteSystem:
-    """Matrices (n, n) of both components into one system; nodal load, u0 and v0 uniform over the nodes."""
+    """Matrices (n, n) of both components into one system; nodal load, u0 and v0 uniform over the
+    nodes."""
     n = len(heights)
     x, y = sp.csr_matrix([[1.0, 0.0], [0.0, 0.0]]), sp.csr_matrix([[0.0, 0.0], [0.0, 1.0]])
     every = [np.tile(np.asarray(one, dtype=float), n) for one in (load, u0, v0)]
@@ -63,7 +66,8 @@ def column(
     held: bool = False,
     **problem: Any,
 ) -> ContactProblem:
-    """The column with the uniform initial velocity v0 (x, y); other keywords go to ContactProblem."""
+    """The column with the uniform initial velocity v0 (x, y); other keywords go to
+    ContactProblem."""
     M, K_x = bar_matrices(n, length=height, E=material.shear_modulus, rho=material.rho)
     _, K_y = bar_matrices(n, length=height, E=material.rho * material.c_p**2, rho=material.rho)
     system = two_component_system(M, K_x, K_y, np.linspace(0.0, height, n + 1), v0=v0)

@@ -1,9 +1,11 @@
-"""Build the Poincaré-Steklov operator of convolution quadrature, for boundary value problems and contact compliance.
+"""Build the Poincaré-Steklov operator of convolution quadrature, for boundary value problems and
+contact compliance.
 
-At each frequency s the body is a matrix S(s), nodal displacements to nodal forces, in the symmetric form
-(M/2 + K)ᵀ V⁻¹ (M/2 + K) - D or the unsymmetric Mᵀ V⁻¹ (M/2 + K). Every answer is a set of small dense systems, one per
-frequency, and a Fourier transform; nothing is marched. Answers are objects of the energetic route, so that contact does
-not see the difference: forces are means over steps, displacements are at the ends of steps.
+At each frequency s the body is a matrix S(s), nodal displacements to nodal forces, in the symmetric
+form (M/2 + K)ᵀ V⁻¹ (M/2 + K) - D or the unsymmetric Mᵀ V⁻¹ (M/2 + K). Every answer is a set of
+small dense systems, one per frequency, and a Fourier transform; nothing is marched. Answers are
+objects of the energetic route, so that contact does not see the difference: forces are means over
+steps, displacements are at the ends of steps.
 """
 
 from dataclasses import dataclass
@@ -24,14 +26,18 @@ from vi_contact.laws.materials import LinearElastic
 
 # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
 ORDERS = Orders(far=6, near=8, touching=32, close=16)
-PANEL = 1.5  # width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up to 4
+# width of the panels of the radial table, in c_S dt: functions there are exp(-s r/c_S), |s| dt up
+# to 4
+PANEL = 1.5
 
 
 @dataclass(frozen=True, eq=False)
 class ConvolutionOperator:
-    """Hold S of a body at the frequencies of a convolution quadrature, of the material's own density.
+    """Hold S of a body at the frequencies of a convolution quadrature, of the material's own
+    density.
 
-    steklov: (L, 2, 2n, 2n) S(s); to_traction: (L, 2, 4n, 2n) V⁻¹ (M/2 + K); L = steps/2 + 1: convolution_operator(...).
+    steklov: (L, 2, 2n, 2n) S(s); to_traction: (L, 2, 4n, 2n) V⁻¹ (M/2 + K); L = steps/2 + 1:
+    convolution_operator(...).
     """
 
     mesh: BoundaryMesh
@@ -45,7 +51,8 @@ class ConvolutionOperator:
         return self.frequencies.dt
 
     def load_shape(self, dimensions: int) -> tuple[int, ...]:
-        """Return the shape of the nodal forces of a problem; in four dimensions the second is that of the stages."""
+        """Return the shape of the nodal forces of a problem; in four dimensions the second is that
+        of the stages."""
         stages = (2,) if dimensions == 4 else ()
         return self.frequencies.steps, *stages, 2, len(self.mesh)
 
@@ -83,7 +90,8 @@ class ConvolutionOperator:
     def _displacement_modes(
         self, impulses: NDArray, free: Mask, prescribed: Array | None
     ) -> NDArray:
-        """Return (L, 2, 2n) displacements at the frequencies; prescribed ones move evenly during each step."""
+        """Return (L, 2, 2n) displacements at the frequencies; prescribed ones move evenly during
+        each step."""
         table, u = self.frequencies, np.zeros_like(impulses)
         load = impulses * table.s[..., None]
         if prescribed is not None:
@@ -107,7 +115,8 @@ def convolution_operator(
 ) -> ConvolutionOperator:
     """Assemble S for `steps` time steps of dt [s] by Radau IIA: 192 steps n² bytes.
 
-    Raises InputError for a time step too small (c_P dt/h < 0.05) or too large (> 8) for the mesh, or for no step.
+    Raises InputError for a time step too small (c_P dt/h < 0.05) or too large (> 8) for the mesh,
+    or for no step.
     """
     check_body(mesh, material, orders)
     flag("convolution_operator", "symmetric", symmetric)

@@ -1,4 +1,5 @@
-"""Meshes with curved cells: grids that get mid-points, all of whose nodes are then moved by a smooth map."""
+"""Meshes with curved cells: grids that get mid-points, all of whose nodes are then moved by a
+smooth map."""
 
 from __future__ import annotations
 
@@ -13,13 +14,16 @@ from vi_contact.meshes.extract import MeshArrays, arrays_from_script
 
 
 def wavy(x: Array) -> Array:
-    """Bend the inside of a block of height 1.5 and length 2 (and depth 1.2), but none of its sides."""
+    """Bend the inside of a block of height 1.5 and length 2 (and depth 1.2), but none of its
+    sides."""
     lengths = np.array([2.0, 1.5, 1.2])[: x.shape[1]]
     bump = np.prod(np.sin(np.pi * x / lengths), axis=1)
     return x + 0.12 * bump[:, None] * np.array([1.0, -0.7, 0.5])[: x.shape[1]]
 
 
-MIDDLES = {  # Gmsh's number of a type of second order, and the vertices whose means its further nodes are, in its order
+# Gmsh's number of a type of second order, and the vertices whose means its further nodes are, in
+# its order
+MIDDLES = {
     "interval": (8, [(0, 1)]),
     "triangle": (9, [(0, 1), (1, 2), (2, 0)]),
     "quadrilateral": (10, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)]),
@@ -53,8 +57,8 @@ MIDDLES = {  # Gmsh's number of a type of second order, and the vertices whose m
 
 @dataclass(frozen=True)
 class Curved:
-    """A mesh of grids, or arrays, with mid-points, all of whose nodes are moved by a smooth map: cells with curved
-    sides."""
+    """A mesh of grids, or arrays, with mid-points, all of whose nodes are moved by a smooth map:
+    cells with curved sides."""
 
     mesh: Any
     move: Any = wavy

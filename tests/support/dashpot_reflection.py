@@ -20,22 +20,26 @@ def dashpot_reflection(
     normal: float = 1.0,
     tangential: float = 1.0,
 ) -> tuple[float, float]:
-    """Return (|A_P|, |A_S|) of the waves reflected by dashpots, for one of amplitude 1 that arrives at ``angle`` [rad].
+    """Return (|A_P|, |A_S|) of the waves reflected by dashpots, for one of amplitude 1 that arrives
+    at ``angle`` [rad].
 
-    angle: from the normal of the boundary, 0 to pi/2; wave: "P" or "S"; normal, tangential: factors of rho c_P and
-    rho c_S. Amplitudes of displacement. InputError for another wave or angle.
+    angle: from the normal of the boundary, 0 to pi/2; wave: "P" or "S"; normal, tangential: factors
+    of rho c_P and rho c_S. Amplitudes of displacement. InputError for another wave or angle.
 
-    Boundary y = 0, body y < 0, factor exp(i w (t - p x)) with slowness p along the boundary. P waves have displacement
-    (p, ±eta_p) c_P, S waves (±eta_s, -p) c_S with the vertical slownesses eta (+ travels towards the boundary).
+    Boundary y = 0, body y < 0, factor exp(i w (t - p x)) with slowness p along the boundary. P
+    waves have displacement (p, ±eta_p) c_P, S waves (±eta_s, -p) c_S with the vertical slownesses
+    eta (+ travels towards the boundary).
     """
     if wave not in ("P", "S") or not 0.0 <= angle < 0.5 * math.pi:
         raise InputError(
-            f"dashpot reflection of wave {wave!r} at {angle!r} rad: give 'P' or 'S' and 0 <= angle < pi/2"
+            f"dashpot reflection of wave {wave!r} at {angle!r} rad: give 'P' or 'S' and 0 <= angle "
+            "< pi/2"
         )
     c_p, c_s, rho = material.c_p, material.c_s, material.rho
     p = math.sin(angle) / (c_p if wave == "P" else c_s)
     eta_p, eta_s = (complex(np.emath.sqrt(1.0 / c**2 - p**2)) for c in (c_p, c_s))
-    # evanescent waves decay into the body: exp(-i w eta_y y) with y < 0, reflected ones go with the other sign
+    # evanescent waves decay into the body: exp(-i w eta_y y) with y < 0, reflected ones go with the
+    # other sign
     eta_p, eta_s = (complex(eta.real, -abs(eta.imag)) for eta in (eta_p, eta_s))
 
     def residual(u: tuple[complex, complex], eta: complex) -> Array:
@@ -64,7 +68,8 @@ def dashpot_energy(
     normal: float = 1.0,
     tangential: float = 1.0,
 ) -> float:
-    """Return reflected over incident energy flux at right angles to the boundary; see ``dashpot_reflection``."""
+    """Return reflected over incident energy flux at right angles to the boundary; see
+    ``dashpot_reflection``."""
     amplitudes = dashpot_reflection(
         material, angle, wave=wave, normal=normal, tangential=tangential
     )

@@ -1,4 +1,5 @@
-"""A small run in the plane that plot, film and report draw: a wall that is shaken on its ground, with frames."""
+"""A small run in the plane that plot, film and report draw: a wall that is shaken on its ground,
+with frames."""
 
 from __future__ import annotations
 

@@ -19,8 +19,9 @@ from vi_contact.core.verify import energies, energy_balance
 class Course:
     """Energies E include the potential of the constant load [J].
 
-    rise: largest increase of E in a step; first, last: E at the ends; defect: of the ledger, summed over the run;
-    largest: the largest ½ vᵀMv + ½ uᵀKu; min_gap [m]; contact, algorithmic, friction: smallest loss in a step.
+    rise: largest increase of E in a step; first, last: E at the ends; defect: of the ledger, summed
+    over the run; largest: the largest ½ vᵀMv + ½ uᵀKu; min_gap [m]; contact, algorithmic, friction:
+    smallest loss in a step.
     """
 
     rise: float
@@ -60,9 +61,11 @@ def course(
 
 
 def rounded(problem: ContactProblem, way: float) -> float:
-    """[J] What round-off leaves in the ledger of a body that has moved by ``way`` [m] as a whole: eps Σ K_ii way².
+    """[J] What round-off leaves in the ledger of a body that has moved by ``way`` [m] as a whole:
+    eps Σ K_ii way².
 
-    The motion strains nothing, but K u is then a sum of products of this size that cancel, and each of them is rounded.
+    The motion strains nothing, but K u is then a sum of products of this size that cancel, and each
+    of them is rounded.
     """
     system = problem.equations
     diagonal = np.abs(system.K.diagonal())

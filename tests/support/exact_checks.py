@@ -12,7 +12,8 @@ Field = Callable[[Array, Array], Array]
 
 
 def wave_defect(u: Field, *, length: float, c: float, until: float, force: float = 0.0) -> float:
-    """Largest |u(x, t+k) + u(x, t-k) - u(x+ck, t) - u(x-ck, t) - force k²|, over random parallelograms in the bar.
+    """Largest |u(x, t+k) + u(x, t-k) - u(x+ck, t) - u(x-ck, t) - force k²|, over random
+    parallelograms in the bar.
 
     Zero for solutions of u_tt = c² u_xx + force, also across fronts.
     """
@@ -28,7 +29,8 @@ def wave_defect(u: Field, *, length: float, c: float, until: float, force: float
 def derivative_defect(
     u: Field, rate: Field, *, x: Array, t: Array, h: tuple[float, float]
 ) -> float:
-    """Largest difference of `rate` and the central difference of u with the step (dx, dt) = h; one of them is 0.
+    """Largest difference of `rate` and the central difference of u with the step (dx, dt) = h; one
+    of them is 0.
 
     Points where the rate jumps within the step are left out, but most of the (x, t) must remain.
     """
@@ -51,7 +53,8 @@ def energies(
     t: Array,
     g: float = 0.0,
 ) -> Array:
-    """Kinetic, strain and weight energy at the times t by the midpoint rule on 20000 cells; u = 0 is the zero level."""
+    """Kinetic, strain and weight energy at the times t by the midpoint rule on 20000 cells; u = 0
+    is the zero level."""
     x = (np.arange(20000) + 0.5)[:, np.newaxis] * length / 20000
     return length * (
         0.5 * rho * v(x, t) ** 2 + 0.5 * E * strain(x, t) ** 2 + rho * g * u(x, t)

@@ -1,8 +1,9 @@
-"""Solve columns (or layers of any extent) on a rigid base with friction: u(y, t) are exact plane waves.
+"""Solve columns (or layers of any extent) on a rigid base with friction: u(y, t) are exact plane
+waves.
 
-y in [0, height], base at y = 0, free top. Pressure waves (u_n, upwards) travel with c_P, shear waves (u_t) with c_S and
-ignore each other but for the friction of the base. Tractions, impulses and energies are per unit of base area.
-Methods take arrays y and t >= 0 whose shapes broadcast.
+y in [0, height], base at y = 0, free top. Pressure waves (u_n, upwards) travel with c_P, shear
+waves (u_t) with c_S and ignore each other but for the friction of the base. Tractions, impulses and
+energies are per unit of base area. Methods take arrays y and t >= 0 whose shapes broadcast.
 """
 
 from __future__ import annotations
@@ -22,18 +23,20 @@ History = Callable[[Array], Array]
 
 
 def reflected(history: History, delay: Array, t: Array, *, crossing: float) -> Array:
-    """Return the waves that a load at the foot of a uniform bar or layer sends to its free top and back:
+    """Return the waves that a load at the foot of a uniform bar or layer sends to its free top and
+    back:
 
         sum over k >= 0 of P(t - 2kT - x/c) + P(t - 2(k+1)T + x/c),   P(t) = integral of p from 0 to t.
 
-    With z the impedance rho c, T = length / c and p(t) the traction on the foot x = 0 (zero for t < 0), the motion is
-    that of the rigid free body plus q(x, t) / z, where q is this sum (d'Alembert; every k is one more reflection):
+    With z the impedance rho c, T = length / c and p(t) the traction on the foot x = 0 (zero for t <
+    0), the motion is that of the rigid free body plus q(x, t) / z, where q is this sum (d'Alembert;
+    every k is one more reflection):
 
         q_tt = c² q_xx,   q_x(length, t) = 0,   c q_x(0, t) = -p(t).
 
-    With p instead of P the sum is q_t.
-    history: P [Pa s] or p [Pa], must vanish for negative times; delay = x/c [s]; t [s], of shapes that broadcast;
-    crossing T [s]. Returns the unit of history, in the broadcast shape.
+    With p instead of P the sum is q_t. history: P [Pa s] or p [Pa], must vanish for negative times;
+    delay = x/c [s]; t [s], of shapes that broadcast; crossing T [s]. Returns the unit of history,
+    in the broadcast shape.
     """
     total = np.zeros(np.broadcast(delay, t).shape)
     for k in range(int(np.max(t, initial=0.0) / (2.0 * crossing)) + 1):
@@ -43,11 +46,13 @@ def reflected(history: History, delay: Array, t: Array, *, crossing: float) -> A
 
 @dataclass(frozen=True)
 class ObliqueImpact:
-    """Describe a column that strikes the base at t = 0 with u_n' = -speed_n, u_t' = speed_t, Coulomb friction mu.
+    """Describe a column that strikes the base at t = 0 with u_n' = -speed_n, u_t' = speed_t,
+    Coulomb friction mu.
 
-    It stays for 2 height/c_P under p = rho c_P speed_n. If mu c_P speed_n < c_S speed_t the base slips throughout with
-    v_b = speed_t - mu (c_P/c_S) speed_n under the traction mu p, else it sticks under rho c_S speed_t: the shear wave
-    returns only after the contact, as c_S < c_P. height [m]; speeds [m/s]; mu >= 0. InputError for other values.
+    It stays for 2 height/c_P under p = rho c_P speed_n. If mu c_P speed_n < c_S speed_t the base
+    slips throughout with v_b = speed_t - mu (c_P/c_S) speed_n under the traction mu p, else it
+    sticks under rho c_S speed_t: the shear wave returns only after the contact, as c_S < c_P.
+    height [m]; speeds [m/s]; mu >= 0. InputError for other values.
     """
 
     height: float
@@ -83,7 +88,8 @@ class ObliqueImpact:
 
     @property
     def impulses(self) -> tuple[float, float]:
-        """Return the normal (upwards) and tangential (along speed_t) impulse of the base on the column [Pa s]."""
+        """Return the normal (upwards) and tangential (along speed_t) impulse of the base on the
+        column [Pa s]."""
         return self.pressure * self.duration, -self.traction * self.duration
 
     @property
@@ -119,12 +125,14 @@ class ObliqueImpact:
 
 @dataclass(frozen=True)
 class ShearColumn:
-    """Describe a column that slides on its base from u_t' = speed until it sticks, threshold tau_y (Tresca).
+    """Describe a column that slides on its base from u_t' = speed until it sticks, threshold tau_y
+    (Tresca).
 
-    With c = c_S, T = height/c and delta = tau_y/(rho c), in the n-th round trip, 2nT < t < 2(n+1)T, the base slips with
-    speed - (2n+1) delta under the traction tau_y as long as this is positive. Then it sticks for good: the traction is
-    then rho c (speed - 2n delta) in absolute value and changes sign with every round trip. height [m], speed [m/s],
-    tau_y [Pa]. Raises InputError unless all are finite and positive.
+    With c = c_S, T = height/c and delta = tau_y/(rho c), in the n-th round trip, 2nT < t < 2(n+1)T,
+    the base slips with speed - (2n+1) delta under the traction tau_y as long as this is positive.
+    Then it sticks for good: the traction is then rho c (speed - 2n delta) in absolute value and
+    changes sign with every round trip. height [m], speed [m/s], tau_y [Pa]. Raises InputError
+    unless all are finite and positive.
     """
 
     height: float
@@ -173,7 +181,8 @@ class ShearColumn:
 
     @property
     def energy(self) -> float:
-        """Return the kinetic and strain energy left once the base sticks [J/m²]: ½ rho height (speed - 2n delta)²."""
+        """Return the kinetic and strain energy left once the base sticks [J/m²]: ½ rho height
+        (speed - 2n delta)²."""
         left = self.speed - 2.0 * len(self.slip_speeds) * self.delta
         return 0.5 * self.material.rho * self.height * left**2
 

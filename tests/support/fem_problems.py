@@ -1,8 +1,8 @@
 """Finite element problems that several tests share, small enough for any number of ranks.
 
-Everything here takes the communicator, so that a test can solve the same problem on all ranks together (COMM_WORLD)
-and on each rank alone (COMM_SELF) and compare. Fields and matrices come back in the numbering of the mesh's input,
-equal on all ranks.
+Everything here takes the communicator, so that a test can solve the same problem on all ranks
+together (COMM_WORLD) and on each rank alone (COMM_SELF) and compare. Fields and matrices come back
+in the numbering of the mesh's input, equal on all ranks.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ def spread(comm: Any, ids: Array, values: Array) -> Array:
 
 
 def dense(comm: Any, system: SemiDiscreteSystem, matrix: Any) -> Array:
-    """A matrix of a system as a dense array over its free unknowns in ascending ids, on every rank."""
+    """A matrix of a system as a dense array over its free unknowns in ascending ids, on every
+    rank."""
     mat = as_petsc(matrix).mat
     first, last = mat.getOwnershipRange()
     rows = np.array(
@@ -100,7 +101,8 @@ def dense(comm: Any, system: SemiDiscreteSystem, matrix: Any) -> Array:
 def field(
     system: SemiDiscreteSystem, u: Array, t: float = 0.0, derivative: int = 0
 ) -> tuple[Array, Array]:
-    """(points, values), each (nodes, d), of a Cartesian vector of free unknowns, all nodes in input numbering."""
+    """(points, values), each (nodes, d), of a Cartesian vector of free unknowns, all nodes in input
+    numbering."""
     space = system.space
     count = int(total(space.comm, len(space.nodes)))
     points, values = np.zeros((count, space.dimension)), np.zeros((count, space.dimension))
@@ -117,7 +119,8 @@ def turned(vectors: Any, angle: float) -> Array:
 
 @dataclass(frozen=True)
 class Run:
-    """Histories of a march: u (steps, nodes, d), r_n and active (steps, m), iterations and certificates (steps,)."""
+    """Histories of a march: u (steps, nodes, d), r_n and active (steps, m), iterations and
+    certificates (steps,)."""
 
     u: Array
     r_n: Array
@@ -137,7 +140,8 @@ def run(
     state: State | None = None,
     nodes: Array | None = None,
 ) -> Run:
-    """March, keeping Cartesian displacements of nodes (all by default), reactions and contact sets of every step."""
+    """March, keeping Cartesian displacements of nodes (all by default), reactions and contact sets
+    of every step."""
     system = problem.system
     if nodes is None:
         nodes = np.arange(len(field(system, system.u0)[0]))
@@ -171,10 +175,12 @@ def shaken_wall(
     springs: float | None = None,
     gap: float = 0.0,
 ) -> ContactProblem:
-    """The wall of seed 000, coarser, turned by ``angle`` and written in a length unit of which a metre has ``metre``.
+    """The wall of seed 000, coarser, turned by ``angle`` and written in a length unit of which a
+    metre has ``metre``.
 
-    ``contacts``: heights [m] of the contact points, the whole side when None; ``springs``: foundation modulus [Pa/m].
-    Seconds and kilograms stay: a stress E in Pa = kg/(m s²) becomes E/metre, a density rho/metre³.
+    ``contacts``: heights [m] of the contact points, the whole side when None; ``springs``:
+    foundation modulus [Pa/m]. Seconds and kilograms stay: a stress E in Pa = kg/(m s²) becomes
+    E/metre, a density rho/metre³.
     """
     lengths = (6.0 * metre, 9.0 * metre)
     mesh, tags = block(comm, lengths=lengths, divisions=divisions, simplices=simplices, angle=angle)
@@ -204,7 +210,8 @@ def thrown_box(
     angle: float = 0.0,
     divisions: tuple[int, ...] = (3, 2, 3),
 ) -> ContactProblem:
-    """A soft box in three dimensions, thrown obliquely onto a plane that may be inclined about the z axis."""
+    """A soft box in three dimensions, thrown obliquely onto a plane that may be inclined about the
+    z axis."""
     material = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
     mesh, tags = block(
         comm, lengths=(1.5, 1.0, 1.2), divisions=divisions, simplices=simplices, angle=angle
@@ -226,7 +233,8 @@ BOX_DT = 1.0e-3
 
 
 def held_by(tags: Any, name: str, motion: Callable[[Array], Array], *components: int) -> Prescribed:
-    """A displacement constant in time on a named boundary, in all components or in the given ones."""
+    """A displacement constant in time on a named boundary, in all components or in the given
+    ones."""
     return Prescribed(
         tags[name], displacement=lambda x, t: motion(x), components=components or None
     )
@@ -235,10 +243,12 @@ def held_by(tags: Any, name: str, motion: Callable[[Array], Array], *components:
 def signorini_field(
     points: Array, *, x0: float = 1.0 / 7.0, shear: float = 0.4, nu: float = 0.3, a: float = 1.0
 ) -> Array:
-    """Displacement (k, 2) of V2.2: plane strain, body y > 0, contact on y = 0 for x < x0, open for x > x0.
+    """Displacement (k, 2) of V2.2: plane strain, body y > 0, contact on y = 0 for x < x0, open for
+    x > x0.
 
-    With p + iq = √z, z = x - x0 + iy: Z = ia√z, Z~ = (2/3) ia z√z, 2 mu u_x = ½(kappa - 1) Re Z~ - y Im Z and
-    2 mu u_y = ½(kappa + 1) Im Z~ - y Re Z. Half angles instead of a complex power, so that u_y = 0 exactly in contact.
+    With p + iq = √z, z = x - x0 + iy: Z = ia√z, Z~ = (2/3) ia z√z, 2 mu u_x = ½(kappa - 1) Re Z~ -
+    y Im Z and 2 mu u_y = ½(kappa + 1) Im Z~ - y Re Z. Half angles instead of a complex power, so
+    that u_y = 0 exactly in contact.
     """
     x, y = points[:, 0] - x0, points[:, 1]
     r = np.hypot(x, y)
@@ -262,7 +272,8 @@ def plane_strain(shear: float, nu: float, rho: float) -> LinearElastic:
 
 @dataclass(frozen=True)
 class Errors:
-    """Of a Q1 field on a rectangle against a smooth one: L2, H1 seminorm, energy norm relative to the exact field's."""
+    """Of a Q1 field on a rectangle against a smooth one: L2, H1 seminorm, energy norm relative to
+    the exact field's."""
 
     l2: float
     h1: float
@@ -279,10 +290,11 @@ def field_errors(
     shear: float,
     simplices: bool = False,
 ) -> Errors:
-    """Gauss quadrature over an evenly divided rectangle of Q1 or P1 cells, nodes in BlockMesh's order (x fastest).
+    """Gauss quadrature over an evenly divided rectangle of Q1 or P1 cells, nodes in BlockMesh's
+    order (x fastest).
 
-    Written without the finite element library on purpose. Gradients of ``exact`` by central differences of 1e-6 cells,
-    which costs 1e-10 of the gradient.
+    Written without the finite element library on purpose. Gradients of ``exact`` by central
+    differences of 1e-6 cells, which costs 1e-10 of the gradient.
     """
     nx, ny = divisions
     grid = values.reshape(ny + 1, nx + 1, 2)
@@ -307,7 +319,8 @@ def field_errors(
 
 
 def _quadrature(simplices: bool, order: int = 6) -> list[tuple[float, float, float]]:
-    """(a, b, weight) on the unit square; with simplices on its triangles below and above the diagonal a = b."""
+    """(a, b, weight) on the unit square; with simplices on its triangles below and above the
+    diagonal a = b."""
     s, w = np.polynomial.legendre.leggauss(order)
     line = list(zip(0.5 * (s + 1.0), 0.5 * w, strict=True))
     if not simplices:

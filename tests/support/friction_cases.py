@@ -1,4 +1,5 @@
-"""Steps with friction on the blocks of ``volume_cases`` and on random bodies in space, for routes to agree on."""
+"""Steps with friction on the blocks of ``volume_cases`` and on random bodies in space, for routes
+to agree on."""
 
 from __future__ import annotations
 
@@ -58,7 +59,8 @@ def random_case(
 def spatial(
     law: Any, seed: int, *, parallel: bool = False, m: int = 6, alone: float = 1.0
 ) -> tuple[Case, Array]:
-    """m points of three unknowns each on a random elastic body; the less they stand ``alone``, the more they couple."""
+    """m points of three unknowns each on a random elastic body; the less they stand ``alone``, the
+    more they couple."""
     rng = np.random.default_rng(seed)
     n = 3 * m
     root = rng.normal(size=(n, n))

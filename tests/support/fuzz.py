@@ -1,8 +1,8 @@
 """The seeds of every fuzz test, and the inputs that were once found to fail.
 
-A fuzz test makes its inputs from a seed. The suite takes seed 0, so that it finds the same in every run;
-``bash tests/fuzz.sh --seed N`` takes others. An input that fails there is written into the folder ``fixed`` beside
-the test, and every later run of the suite begins with it:
+A fuzz test makes its inputs from a seed. The suite takes seed 0, so that it finds the same in every
+run; ``bash tests/fuzz.sh --seed N`` takes others. An input that fails there is written into the
+folder ``fixed`` beside the test, and every later run of the suite begins with it:
 
     FUZZ = Fuzz("records", __file__)                  # its fixed inputs are in <folder of the test>/fixed/records
 
@@ -15,8 +15,8 @@ A property test of hypothesis takes the same seed, and finds the smallest input 
     @FUZZ.property(values=st.lists(st.floats(-1.0, 1.0)), examples=100)
     def test_sums(values: list[float]) -> None: ...
 
-An input is made of what JSON holds, and of bytes. On several ranks all ranks make the same inputs; take ``each``
-there, as the search of hypothesis for a smaller input is not collective.
+An input is made of what JSON holds, and of bytes. On several ranks all ranks make the same inputs;
+take ``each`` there, as the search of hypothesis for a smaller input is not collective.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class Fuzz:
         self.folder = Path(file).resolve().parent / "fixed" / re.sub(r"\W+", "_", name)
 
     def dice(self, number: int) -> random.Random:
-        """Return the dice of one input: others for every test, seed and number, the same on every machine and rank."""
+        """Return the dice of one input: others for every test, seed and number, the same on every
+        machine and rank."""
         return random.Random(f"{self.name} {SEED} {number}")
 
     def fixed(self) -> list[tuple[str, Any]]:
@@ -60,7 +61,8 @@ class Fuzz:
     def each(
         self, count: int, make: Callable[[random.Random], T], check: Callable[[T], object]
     ) -> None:
-        """Check the fixed inputs and so many new ones. The first that fails is kept, and named in the failure."""
+        """Check the fixed inputs and so many new ones. The first that fails is kept, and named in
+        the failure."""
         for label, value in self.fixed():
             with self.keeping(label, value, new=False):
                 check(value)
@@ -71,7 +73,8 @@ class Fuzz:
 
     @contextmanager
     def keeping(self, label: str, value: Any, *, new: bool = True) -> Iterator[None]:
-        """Name the input in whatever is raised inside, and write it into the folder of fixed inputs if asked to."""
+        """Name the input in whatever is raised inside, and write it into the folder of fixed inputs
+        if asked to."""
         try:
             yield
         except Exception as error:  # of any kind: it is raised again, with the name of the input
@@ -85,10 +88,12 @@ class Fuzz:
     def property(
         self, *, examples: int = 100, **strategies: Any
     ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-        """Make a property test of hypothesis: arguments by name -> strategy. Skipped where hypothesis is missing.
+        """Make a property test of hypothesis: arguments by name -> strategy. Skipped where
+        hypothesis is missing.
 
-        With seed 0 its examples are those that follow from the test alone (derandomize); else those of the seed. The
-        fixed inputs come first. Fixtures are not available inside, apart from those that last for the session."""
+        With seed 0 its examples are those that follow from the test alone (derandomize); else those
+        of the seed. The fixed inputs come first. Fixtures are not available inside, apart from
+        those that last for the session."""
         hypothesis = pytest.importorskip("hypothesis")
 
         def made(test: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,4 +1,5 @@
-"""Blocks whose cells grow away from a contact, pressed by their far side: half-plane problems on a finite mesh."""
+"""Blocks whose cells grow away from a contact, pressed by their far side: half-plane problems on a
+finite mesh."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def even_then_growing(h: float, even: float, length: float, *, growth: float = 1
 
 @dataclass(frozen=True)
 class Pressed:
-    """Contact nodes from the axis outwards: x [m], weights, nodal forces [N/m], of one half of the body."""
+    """Contact nodes from the axis outwards: x [m], weights, nodal forces [N/m], of one half of the
+    body."""
 
     x: Array
     weights: Array
@@ -59,9 +61,11 @@ def pressed_half(
     force: float,
     simplices: bool = False,
 ) -> Pressed:
-    """One half (x > 0) of a plane strain body between its obstacle (below) and a uniform pressure on its top.
+    """One half (x > 0) of a plane strain body between its obstacle (below) and a uniform pressure
+    on its top.
 
-    ``force`` [N/m] on the whole body. Rollers on the plane of symmetry only: contact alone carries the vertical load.
+    ``force`` [N/m] on the whole body. Rollers on the plane of symmetry only: contact alone carries
+    the vertical load.
     """
 
     def placed(points: Array) -> Array:

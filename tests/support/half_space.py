@@ -1,13 +1,16 @@
-"""Closed forms of spheres in contact, and the displacements that they leave in the bodies, far from the contact too.
+"""Closed forms of spheres in contact, and the displacements that they leave in the bodies, far from
+the contact too.
 
-Two bodies touch on a disk of radius a under the pressure of Hertz, p = p0 √(1 - r²/a²), p0 = 3 P/(2 π a²). Each is an
-elastic half-space; "body" below is one of two equal ones, which move by opposite amounts. Johnson, Contact Mechanics
-(1985), sections 3.2, 3.6, 3.9, 4.2, 7.2 and 7.4, where the originals are found: Cattaneo, Sul contatto di due corpi
-elastici (Rend. Accad. Lincei 27, 1938); Mindlin, Compliance of elastic bodies in contact (J. Appl. Mech. 16, 1949);
-Lubkin, The torsion of elastic spheres in contact (J. Appl. Mech. 18, 1951); Mindlin and Deresiewicz, Elastic spheres in
+Two bodies touch on a disk of radius a under the pressure of Hertz, p = p0 √(1 - r²/a²), p0 = 3 P/(2
+π a²). Each is an elastic half-space; "body" below is one of two equal ones, which move by opposite
+amounts. Johnson, Contact Mechanics (1985), sections 3.2, 3.6, 3.9, 4.2, 7.2 and 7.4, where the
+originals are found: Cattaneo, Sul contatto di due corpi elastici (Rend. Accad. Lincei 27, 1938);
+Mindlin, Compliance of elastic bodies in contact (J. Appl. Mech. 16, 1949); Lubkin, The torsion of
+elastic spheres in contact (J. Appl. Mech. 18, 1951); Mindlin and Deresiewicz, Elastic spheres in
 contact under varying oblique forces (J. Appl. Mech. 20, 1953).
 
-Coordinates of a body: depth y >= 0, surface y = 0, axis x = z = 0. Lengths [m], forces [N], moduli [Pa].
+Coordinates of a body: depth y >= 0, surface y = 0, axis x = z = 0. Lengths [m], forces [N], moduli
+[Pa].
 """
 
 from __future__ import annotations
@@ -31,8 +34,9 @@ def gauss(low: float, high: float, *, order: int = 24) -> tuple[Array, Array]:
 
 
 def under_point_loads(points: Array, places: Array, forces: Array, *, G: float, nu: float) -> Array:
-    """Displacements (k, 3) of a half-space under forces (m, 3) at places (m, 2) of its surface (x, z): Boussinesq and
-    Cerruti, Johnson (3.18) and (3.75). Axes x, y (depth), z, all forces along them.
+    """Displacements (k, 3) of a half-space under forces (m, 3) at places (m, 2) of its surface (x,
+    z): Boussinesq and Cerruti, Johnson (3.18) and (3.75). Axes x, y (depth), z, all forces along
+    them.
     """
     local = 1.0 - 2.0 * nu
     x, z = points[:, None, 0] - places[:, 0], points[:, None, 2] - places[:, 1]
@@ -51,7 +55,8 @@ def under_point_loads(points: Array, places: Array, forces: Array, *, G: float, 
 
 
 def under_hertz(points: Array, a: float, force: Array, *, G: float, nu: float) -> Array:
-    """Displacements (k, 3) far from tractions f √(1 - r²/a²), whose resultant is ``force`` (3,): 8 x 16 point loads."""
+    """Displacements (k, 3) far from tractions f √(1 - r²/a²), whose resultant is ``force`` (3,): 8
+    x 16 point loads."""
     theta, weight = gauss(0.0, 0.5 * np.pi, order=8)
     angle = 2.0 * np.pi * np.arange(16) / 16
     share = np.repeat(3.0 * np.cos(theta) ** 2 * np.sin(theta) * weight, 16) / 16
@@ -68,7 +73,8 @@ class Mindlin:
         q = μ p0 [√(1 - r²/a²) - (c/a) √(1 - r²/c²)],   c = a (1 - Q/(μ P))^(1/3),   no slip on r < c
         shift of a body: 3 μ P (2 - ν)/(16 G a) [1 - (1 - Q/(μ P))^(2/3)]
 
-    All slip is along Q: exact for ν = 0, where a shear traction along x moves the surface along x only.
+    All slip is along Q: exact for ν = 0, where a shear traction along x moves the surface along x
+    only.
     """
 
     force: float
@@ -93,7 +99,8 @@ class Mindlin:
         return np.asarray(self.mu * p0 * (whole - c / self.a * core))
 
     def field(self, points: Array, share: float) -> Array:
-        """Displacements (k, 3) of a body far from the tractions q along x; the body's own shift is not in them."""
+        """Displacements (k, 3) of a body far from the tractions q along x; the body's own shift is
+        not in them."""
         push = np.array([self.mu * self.force, 0.0, 0.0])
         given = {"G": self.G, "nu": self.nu}
         left = (1.0 - share) * under_hertz(points, self.stick(share), push, **given)
@@ -109,13 +116,15 @@ class Lubkin:
         v(r) = (1/r) ∫_0^min(r,a) t φ(t)/√(r² - t²) dt,   τ(r) = -G d/dr ∫_r^a φ(t)/√(t² - r²) dt,
         T = 4 π G ∫_0^a t φ(t) dt
 
-    Without slip v = β r, φ = (4 β/π) t, τ = 4 G β r/(π √(a² - r²)), T = (16/3) G a³ β: τ is infinite at the edge, and
-    slip begins there at once. With slip on c < r < a, where τ = μ p, Abel's inversion gives, with k² = 1 - t²/a²,
+    Without slip v = β r, φ = (4 β/π) t, τ = 4 G β r/(π √(a² - r²)), T = (16/3) G a³ β: τ is
+    infinite at the edge, and slip begins there at once. With slip on c < r < a, where τ = μ p,
+    Abel's inversion gives, with k² = 1 - t²/a²,
 
         φ = (4 β/π) t for t < c,   φ = (2/π)(μ p0/G) t [K(k) - E(k)] beyond
 
-    and τ is finite at c where φ is continuous: β = (μ p0/2 G) [K(k) - E(k)] at k² = 1 - c²/a². β is the twist of one
-    body; the twist of one on the other is 2 β. Sliding everywhere: T = 3 π μ P a/16.
+    and τ is finite at c where φ is continuous: β = (μ p0/2 G) [K(k) - E(k)] at k² = 1 - c²/a². β is
+    the twist of one body; the twist of one on the other is 2 β. Sliding everywhere: T = 3 π μ P
+    a/16.
     """
 
     force: float
@@ -157,8 +166,8 @@ class Lubkin:
         return 4.0 * np.pi * self.G * float(self.over(lambda t: t, c))
 
     def traction(self, r: Array, c: float) -> Array:
-        """τ [Pa] at each radius: -(G/r) ∫_r^a φ'(t) t/√(t² - r²) dt, for φ(a) = 0 and φ' = (2 μ p0/π G) (K - 2 E)
-        beyond c."""
+        """τ [Pa] at each radius: -(G/r) ∫_r^a φ'(t) t/√(t² - r²) dt, for φ(a) = 0 and φ' = (2 μ
+        p0/π G) (K - 2 E) beyond c."""
         return np.array(
             [
                 self._stress(one, c)
@@ -177,7 +186,8 @@ class Lubkin:
         return -(4.0 * self.G * self.twist(c) / np.pi * low + beyond) / r
 
     def field(self, points: Array, c: float) -> Array:
-        """Displacements (k, 3) of a body far from τ of the radius of stick c, along (z, 0, -x)/r, without the twist."""
+        """Displacements (k, 3) of a body far from τ of the radius of stick c, along (z, 0, -x)/r,
+        without the twist."""
         return _round(points, self.over(lambda t: _disks(points, t), c))
 
     def stuck_field(self, points: Array, twist: float) -> Array:

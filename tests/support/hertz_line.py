@@ -1,8 +1,9 @@
-"""Solve Hertz contact of cylinders, and a flat rigid punch on a half-space, in plane strain (Johnson 1985, ch. 2, 4).
+"""Solve Hertz contact of cylinders, and a flat rigid punch on a half-space, in plane strain
+(Johnson 1985, ch. 2, 4).
 
-E* and R are those of ``demos.exact.hertz``. Pressures are positive in compression; under the punch they are
-infinite at the edge, where they grow with the power -1/2 of the distance. Lengths [m], pressures and moduli [Pa],
-forces [N/m], or any consistent units.
+E* and R are those of ``demos.exact.hertz``. Pressures are positive in compression; under the punch
+they are infinite at the edge, where they grow with the power -1/2 of the distance. Lengths [m],
+pressures and moduli [Pa], forces [N/m], or any consistent units.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ class HertzLine:
 
         a = sqrt(4 P R/(pi E*)),   p0 = 2 P/(pi a) = sqrt(P E*/(pi R)),   p = p0 sqrt(1 - x²/a²)
 
-    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R [m]. Raises
-    InputError unless all are finite and positive.
+    The approach of half-planes is not defined (logarithmic). force [N/m], modulus E* [Pa], radius R
+    [m]. Raises InputError unless all are finite and positive.
     """
 
     force: float
@@ -53,7 +54,8 @@ class HertzLine:
 
 @dataclass(frozen=True)
 class StripPunch:
-    """Describe a long punch of width 2a under `force` P per unit of length: p = P/(pi sqrt(a² - x²)).
+    """Describe a long punch of width 2a under `force` P per unit of length: p = P/(pi sqrt(a² -
+    x²)).
 
     half_width a [m], force [N/m]. Raises InputError unless both are finite and positive.
     """
@@ -65,7 +67,8 @@ class StripPunch:
         attributes(self, positive=("half_width", "force"))
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at its edge."""
+        """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at
+        its edge."""
         square = self.half_width**2 - np.asarray(x, dtype=float) ** 2
         with np.errstate(divide="ignore"):
             root = 1.0 / np.sqrt(np.maximum(square, 0.0))

@@ -35,7 +35,8 @@ def problem(
 
 
 def inertia(problem: ContactProblem) -> np.ndarray:
-    """RᵀMR of the rigid motions about the origin, in 1D of translation and uniform stretch, with M of the equations."""
+    """RᵀMR of the rigid motions about the origin, in 1D of translation and uniform stretch, with M
+    of the equations."""
     system = problem.equations
     x, d = system.space.coordinates, problem.system.influence.shape[1]
     plain = problem.system.influence

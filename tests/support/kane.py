@@ -7,8 +7,8 @@ from oscillator import dense
 
 
 def kane(problem, u, v, dt: float):
-    """(u, v, r) after a step of Kane's rule: trapezoidal elastic forces, contact force at the new time; one contact on
-    the last unknown."""
+    """(u, v, r) after a step of Kane's rule: trapezoidal elastic forces, contact force at the new
+    time; one contact on the last unknown."""
     M, _, K = dense(problem)
     gap, f = problem.surface.gap0[0], problem.system.load.constant
     A = np.linalg.inv(M + dt**2 / 4.0 * K)

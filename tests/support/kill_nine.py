@@ -1,4 +1,5 @@
-"""Kills a run of several ranks at random instants, restarts it, and compares the end with the straight run.
+"""Kills a run of several ranks at random instants, restarts it, and compares the end with the
+straight run.
 
 python3 tests/support/kill_nine.py [KILLS] [RANKS]      # 20 on 3 ranks; needs mpirun
 """
@@ -31,7 +32,8 @@ PATIENCE = 500.0  # s: Python, DOLFINx and the forms are loaded, or compiled, be
 
 
 def started(folder: Path, steps: int, ranks: int) -> subprocess.Popen[bytes]:
-    """The run under mpirun, from its checkpoint where there is one; in an environment without what MPI put there."""
+    """The run under mpirun, from its checkpoint where there is one; in an environment without what
+    MPI put there."""
     mpi = ("OMPI_COMM", "OMPI_UNIVERSE", "PMIX_", "PMI_", "OMPI_MCA_ess", "OMPI_MCA_orte")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(mpi)}
     environment["PYTHONPATH"] = os.pathsep.join(
@@ -57,7 +59,8 @@ def lines(folder: Path) -> int:
 
 
 def killed(folder: Path, ranks: int, dice: random.Random) -> int:
-    """Lets the run go on for a while and kills one of its ranks; the whole lines that it has left."""
+    """Lets the run go on for a while and kills one of its ranks; the whole lines that it has
+    left."""
     before = lines(folder)
     process = started(folder, 10**6, ranks)
     deadline = time.monotonic() + PATIENCE
@@ -71,8 +74,8 @@ def killed(folder: Path, ranks: int, dice: random.Random) -> int:
 
 
 def check(folder: Path, kills: int, ranks: int, seed: int = 0) -> tuple[int, float]:
-    """(rows, largest relative difference of a history from that of the straight run) after so many kills; rows that a
-    kill left are not fewer in the end than they were."""
+    """(rows, largest relative difference of a history from that of the straight run) after so many
+    kills; rows that a kill left are not fewer in the end than they were."""
     from marched_chain import run_wall
     from mpi4py import MPI
 
@@ -102,5 +105,6 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch:
         done, difference = check(Path(scratch), *numbers)
     print(
-        f"{numbers[0]} kills of a run on {numbers[1]} ranks: {done} steps, histories within {difference:.1e}"
+        f"{numbers[0]} kills of a run on {numbers[1]} ranks: {done} steps, histories within "
+        f"{difference:.1e}"
     )

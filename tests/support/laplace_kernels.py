@@ -1,10 +1,12 @@
-"""Evaluate radial functions of the fundamental solution of plane strain in the Laplace domain, density 1.
+"""Evaluate radial functions of the fundamental solution of plane strain in the Laplace domain,
+density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S,
 
     G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,        r̂ = (x - y)/r.
 
-Convolution quadrature is built on them; the kernels of the time domain (bem.TimeKernels) are tested against them.
+Convolution quadrature is built on them; the kernels of the time domain (bem.TimeKernels) are tested
+against them.
 """
 
 from dataclasses import dataclass
@@ -25,7 +27,8 @@ SMALL = 0.7  # below this the Bessel function minus its pole is summed as a powe
 
 @dataclass(frozen=True)
 class LaplaceKernels:
-    """Evaluate kernels at one complex frequency s [1/s], Re s > 0; call with distances r [m] > 0."""
+    """Evaluate kernels at one complex frequency s [1/s], Re s > 0; call with distances r [m] >
+    0."""
 
     s: complex
     c_p: float
@@ -60,7 +63,8 @@ class LaplaceKernels:
 
 
 def kappa(z: NDArray) -> NDArray:
-    """Return K1(z)/z - 1/z², what of K1(z)/z stays logarithmic at z = 0; by its power series where |z| < 0.7."""
+    """Return K1(z)/z - 1/z², what of K1(z)/z stays logarithmic at z = 0; by its power series where
+    |z| < 0.7."""
     z = np.asarray(z, complex)
     small = np.abs(z) < SMALL
     safe = np.where(small, 1.0, z)

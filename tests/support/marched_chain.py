@@ -1,4 +1,5 @@
-"""Run small problems as tests of checkpoints, restarts and signals want them, and compare what they left."""
+"""Run small problems as tests of checkpoints, restarts and signals want them, and compare what they
+left."""
 
 from __future__ import annotations
 
@@ -53,7 +54,8 @@ def run(
 
 
 def difference(one: State, other: State) -> float:
-    """Largest relative difference of u, v, reactions and memory; infinite when time, step or contact set differ."""
+    """Largest relative difference of u, v, reactions and memory; infinite when time, step or
+    contact set differ."""
     if (one.t, one.k) != (other.t, other.k) or not np.array_equal(one.active, other.active):
         return float("inf")
     pairs = [(one.u, other.u), (one.v, other.v), (one.r_n, other.r_n)]
@@ -67,7 +69,8 @@ def difference(one: State, other: State) -> float:
 
 
 def round_off(comm: Any) -> float:
-    """Bound on ``difference``: 0 on one rank. On two ranks 7e-15 was seen, once in a hundred runs, cause unknown."""
+    """Bound on ``difference``: 0 on one rank. On two ranks 7e-15 was seen, once in a hundred runs,
+    cause unknown."""
     return 0.0 if comm.size == 1 else 1e-12
 
 

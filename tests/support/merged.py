@@ -1,4 +1,5 @@
-"""Meshes in which chosen nodes at one place are made one, as when bodies are drawn between the same points."""
+"""Meshes in which chosen nodes at one place are made one, as when bodies are drawn between the same
+points."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +11,8 @@ from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_of
 
 @dataclass(frozen=True)
 class Merged:
-    """Describe the mesh of a script with the nodes at one place made one where ``where(x)`` is true of it."""
+    """Describe the mesh of a script with the nodes at one place made one where ``where(x)`` is true
+    of it."""
 
     source: Any
     where: Any

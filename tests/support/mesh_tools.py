@@ -1,4 +1,5 @@
-"""For tests of meshes: sizes by assembly, files written by hand, the one sentence all ranks are refused with."""
+"""For tests of meshes: sizes by assembly, files written by hand, the one sentence all ranks are
+refused with."""
 
 import pytest
 
@@ -54,7 +55,8 @@ def refusal(comm, act):
 def msh(nodes, elements, names=()):
     """A file of Gmsh's format 2.2.
 
-    Nodes: tag -> point; elements: (type, physical group, entity, node tags); names of groups: (dim, number, name).
+    Nodes: tag -> point; elements: (type, physical group, entity, node tags); names of groups: (dim,
+    number, name).
     """
 
     def section(title, lines):

@@ -1,7 +1,9 @@
-"""Misuses of the Python interface: every argument of every constructor and entry point, given what it is not.
+"""Misuses of the Python interface: every argument of every constructor and entry point, given what
+it is not.
 
-``MISUSES``: name -> a call that has to raise InputError. A new class is covered by one line of ``VALUES`` or ``CALLS``:
-its arguments as they should be, then for each argument the kind of values that are wrong there.
+``MISUSES``: name -> a call that has to raise InputError. A new class is covered by one line of
+``VALUES`` or ``CALLS``: its arguments as they should be, then for each argument the kind of values
+that are wrong there.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from vi_contact.solvers.volume.route import Volume
 Wrong = Mapping[str, Any]
 HUGE = 10**5000  # more digits than Python prints
 
-# Kinds of wrong values ----------------------------------------------------------------------------------------------
+# Kinds of wrong values
+# ----------------------------------------------------------------------------------------------
 
 NUMBER: Wrong = {
     "text": "0.3",
@@ -93,7 +96,8 @@ def but(kind: Wrong, *allowed: str) -> Wrong:
     return {name: value for name, value in kind.items() if name not in allowed}
 
 
-# What the calls share -----------------------------------------------------------------------------------------------
+# What the calls share
+# -----------------------------------------------------------------------------------------------
 
 COLUMNS = {"t": ("s", "time"), "u": ("m", "displacement")}
 HISTORY = {"t": np.arange(64) * 0.01, "u": np.ones(64), "a_x_top": np.sin(np.arange(64.0))}
@@ -102,8 +106,8 @@ STEEL = vc.LinearElastic(E=2.1e11, nu=0.3, rho=7850.0)
 
 @cache
 def body() -> SimpleNamespace:
-    """A block of 4 x 4 elements, standing on its bottom, touching with its right side, with its mesh and groups; its
-    twin; and other systems of one mesh."""
+    """A block of 4 x 4 elements, standing on its bottom, touching with its right side, with its
+    mesh and groups; its twin; and other systems of one mesh."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(4, 4)), MPI.COMM_SELF)
     twin, theirs = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(4, 4)), MPI.COMM_SELF)
     system = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
@@ -143,7 +147,8 @@ def groups(*, cells: bool = False) -> Wrong:
     }
 
 
-# Tables -------------------------------------------------------------------------------------------------------------
+# Tables
+# -------------------------------------------------------------------------------------------------------------
 
 Table = list[tuple[Callable[..., Any], dict[str, Any], dict[str, Wrong]]]
 METHOD = but(NEEDED, "list")
@@ -911,7 +916,8 @@ def calls(table: Table) -> Iterator[tuple[str, Callable[[], object]]]:
 
 
 def rights(table: Table) -> Iterator[tuple[str, Callable[[], object]]]:
-    """(name, call with the right arguments) of a table; the block has no two sides that could touch, and no file."""
+    """(name, call with the right arguments) of a table; the block has no two sides that could
+    touch, and no file."""
     for rank, (make, right, _) in enumerate(table):
         if make not in (fem.contact_pair, fem.read_mesh):
             yield f"{rank} {getattr(make, '__qualname__', make)}", partial(make, **right)

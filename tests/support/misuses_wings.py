@@ -1,6 +1,8 @@
-"""Misuses of boundary elements, beam and boundary layer, in the form of misuses_core: right arguments, wrong values.
+"""Misuses of boundary elements, beam and boundary layer, in the form of misuses_core: right
+arguments, wrong values.
 
-``MISUSES``: name -> a call that has to raise InputError; ``RIGHT``: (name, call) of what they were made of.
+``MISUSES``: name -> a call that has to raise InputError; ``RIGHT``: (name, call) of what they were
+made of.
 """
 
 from __future__ import annotations

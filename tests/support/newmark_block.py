@@ -2,7 +2,8 @@
 
     u'' = -a(t) - mu g sgn(u')   while it slides,   u' = 0 stays while |a| <= mu g
 
-u [m] is the displacement of the block relative to the base, a [m/s²] the horizontal acceleration of the base.
+u [m] is the displacement of the block relative to the base, a [m/s²] the horizontal acceleration of
+the base.
 """
 
 import math
@@ -19,7 +20,8 @@ from vi_contact.core.errors import InputError
 
 @dataclass(frozen=True)
 class SlidingBlock:
-    """Hold mu >= 0 of a level base, and gravity g [m/s²]. Raises InputError for values out of range."""
+    """Hold mu >= 0 of a level base, and gravity g [m/s²]. Raises InputError for values out of
+    range."""
 
     mu: float
     gravity: float = 9.81
@@ -33,7 +35,8 @@ class SlidingBlock:
         return self.mu * self.gravity
 
     def slip(self, acceleration: float, duration: float) -> float:
-        """Return the final |u| [m] of a rectangular pulse a for t1: ½ a t1² (a/(mu g) - 1), 0 if |a| <= mu g.
+        """Return the final |u| [m] of a rectangular pulse a for t1: ½ a t1² (a/(mu g) - 1), 0 if
+        |a| <= mu g.
 
         acceleration a [m/s²], duration t1 [s]. Infinite without friction.
         """
@@ -43,10 +46,12 @@ class SlidingBlock:
         return 0.5 * a * duration**2 * (a / self.onset_acceleration - 1.0) if self.mu else math.inf
 
     def history(self, times: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array]:
-        """Return (u, u') at `times`, from rest, for an acceleration that is linear between them; exact to round-off.
+        """Return (u, u') at `times`, from rest, for an acceleration that is linear between them;
+        exact to round-off.
 
-        times [s], not decreasing, a time given twice is a jump; acceleration [m/s²]; all of shape (n,). Raises
-        InputError when the shapes differ, a number is not finite or the times decrease.
+        times [s], not decreasing, a time given twice is a jump; acceleration [m/s²]; all of shape
+        (n,). Raises InputError when the shapes differ, a number is not finite or the times
+        decrease.
         """
         t = array("SlidingBlock", "times", times, (None,), unit="s")
         a = array("SlidingBlock", "acceleration", acceleration, t.shape, unit="m/s²")
@@ -60,7 +65,8 @@ class SlidingBlock:
     def _interval(
         self, u: float, v: float, a: float, a_end: float, length: float
     ) -> tuple[float, float]:
-        """Return (u, u') after an interval [s] in which the acceleration goes linearly from a to a_end."""
+        """Return (u, u') after an interval [s] in which the acceleration goes linearly from a to
+        a_end."""
         slope = (a_end - a) / length if length > 0.0 else 0.0
         while length > 0.0:
             sign = math.copysign(1.0, v) if v else self._onset(a, slope)
@@ -82,7 +88,8 @@ class SlidingBlock:
         return u, v
 
     def _onset(self, a: float, slope: float) -> float:
-        """Return the direction in which a block at rest starts to slide: 1, -1, or 0 if it sticks."""
+        """Return the direction in which a block at rest starts to slide: 1, -1, or 0 if it
+        sticks."""
         side = math.copysign(1.0, a)  # of ±0 too, for a block without friction
         slides = abs(a) > self.onset_acceleration or (
             abs(a) == self.onset_acceleration and side * slope > 0.0

@@ -56,8 +56,8 @@ def dense(problem: ContactProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def exact(
     problem: ContactProblem, t: float, excitation: Harmonic | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(u, v) at time t under the constant load and a harmonic base motion: matrix exponential of the first-order system
-    of (u, v, 1, sin, cos)."""
+    """(u, v) at time t under the constant load and a harmonic base motion: matrix exponential of
+    the first-order system of (u, v, 1, sin, cos)."""
     M, C, K = dense(problem)
     n = len(M)
     inverse = np.linalg.inv(M)
@@ -86,7 +86,8 @@ def last_state(problem: ContactProblem, scheme: Any, *, dt: float, steps: int) -
 def observed_order(
     scheme: Any, *, damping: float = 0.02, t_end: float = 2.0, steps: int = 200
 ) -> float:
-    """log2 of the error ratio in (u, v) from ``steps`` steps to twice as many, with damping, load and base motion."""
+    """log2 of the error ratio in (u, v) from ``steps`` steps to twice as many, with damping, load
+    and base motion."""
     problem = oscillators(damping=damping, constant=4.0, excitation=SHAKEN)
     u, v = exact(problem, t_end, SHAKEN)
     errors = []
@@ -100,7 +101,8 @@ def observed_order(
 
 
 def amplification(scheme: Any, *, frequency: float, damping: float, dt: float = 1.0) -> np.ndarray:
-    """2 x 2 amplification of (u, v) by a one-step scheme, of u'' + 2 xi w u' + w² u = 0; dt = 1, w = ``frequency``."""
+    """2 x 2 amplification of (u, v) by a one-step scheme, of u'' + 2 xi w u' + w² u = 0; dt = 1, w
+    = ``frequency``."""
     u0, v0 = np.eye(2)
     state = last_state(
         uncoupled(2, frequency=frequency, damping=damping, u0=u0, v0=v0), scheme, dt=dt, steps=1

@@ -1,8 +1,9 @@
-"""Problems between bounds whose answers are known: a function of the space that lies on its bounds where it is pressed.
+"""Problems between bounds whose answers are known: a function of the space that lies on its bounds
+where it is pressed.
 
-With F(u; v) = N(u; v) - N(u*; v) + ∫ (p_lower - p_upper) v, where u* = lower on the cells with p_lower > 0 and u* =
-upper on those with p_upper > 0, u* is the answer to the last digit, whatever N and the mesh are: F(u*) are the
-pressures, and they are zero where the bounds are not reached.
+With F(u; v) = N(u; v) - N(u*; v) + ∫ (p_lower - p_upper) v, where u* = lower on the cells with
+p_lower > 0 and u* = upper on those with p_upper > 0, u* is the answer to the last digit, whatever N
+and the mesh are: F(u*) are the pressures, and they are zero where the bounds are not reached.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ def wavy(x: Any) -> Any:
 
 
 class Known:
-    """A problem with the answer ``exact``. ``tiny``: every length of u, ``force``: every F, in other units."""
+    """A problem with the answer ``exact``. ``tiny``: every length of u, ``force``: every F, in
+    other units."""
 
     def __init__(self, V: Any, N: Form, *, tiny: float = 1.0, force: float = 1.0) -> None:
         self.V, on, width = V, V.mesh, V.dofmap.index_map_bs
@@ -91,7 +93,8 @@ class Known:
         return np.array(vector.array_r)
 
     def check(self, result: Any, *, error: float, weak: float = 0.0) -> None:
-        """The answer, the active sets and the multipliers are the known ones; ``weak``: pushes that may be missed."""
+        """The answer, the active sets and the multipliers are the known ones; ``weak``: pushes that
+        may be missed."""
         n, size = len(self.push[0]), float(np.max(np.abs(self.exact.x.array)))
         largest = self.V.mesh.comm.allreduce(
             max(np.max(one, initial=0.0) for one in self.push), op=_max()

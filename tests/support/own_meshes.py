@@ -18,7 +18,8 @@ OWN = {
 
 
 def own_mesh(comm: Any, cell: str, ghosts: str = "shared_facet", times: int = 1) -> Any:
-    """A block with a corner at the origin, made by DOLFINx; ``times`` as many cells along each edge."""
+    """A block with a corner at the origin, made by DOLFINx; ``times`` as many cells along each
+    edge."""
     lengths, divisions = OWN[cell]
     mode, counts = getattr(GhostMode, ghosts), [times * n for n in divisions]
     if cell == "interval":
@@ -34,7 +35,8 @@ def at(axis: int, value: float) -> Any:
 
 
 def tags_where(mesh: Any, dim: int, **values: Any) -> Any:
-    """MeshTags with the value 7 where the first marker holds, 8 where the second does, and so on."""
+    """MeshTags with the value 7 where the first marker holds, 8 where the second does, and so
+    on."""
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, mesh.topology.dim)
     found = [dolfinx.mesh.locate_entities(mesh, dim, marker) for marker in values.values()]

@@ -1,5 +1,5 @@
-"""Pictures of few pixels, drawn once: matplotlib arranges a picture by drawing it a second time, labels and titles by
-measuring every number on the axes, and pixels take time.
+"""Pictures of few pixels, drawn once: matplotlib arranges a picture by drawing it a second time,
+labels and titles by measuring every number on the axes, and pixels take time.
 
 How they are arranged is seen in tests/plots, which draws them as users do, and in docs/figures.
 """
@@ -16,8 +16,8 @@ DPI = 50
 
 @contextmanager
 def plain_pictures() -> Iterator[None]:
-    """Let figures have no layout engine, labels and titles stay where they begin, and files have 50 dots per inch
-    and all of the canvas."""
+    """Let figures have no layout engine, labels and titles stay where they begin, and files have 50
+    dots per inch and all of the canvas."""
     try:
         from matplotlib.axes import Axes
         from matplotlib.axis import Axis

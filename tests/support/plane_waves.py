@@ -1,4 +1,5 @@
-"""Plane waves in the material c_P = 1, c_S = 1/2, rho = 1, with their tractions, for tests of the boundary elements."""
+"""Plane waves in the material c_P = 1, c_S = 1/2, rho = 1, with their tractions, for tests of the
+boundary elements."""
 
 from __future__ import annotations
 

@@ -1,11 +1,13 @@
-"""A point that slides on an inclined plane with friction, thrown across the slope: path and times in closed form.
+"""A point that slides on an inclined plane with friction, thrown across the slope: path and times
+in closed form.
 
     v' = g sin(a) e - mu g cos(a) v/|v|
 
-With e down the slope, s = g sin(a), k = mu/tan(a) and v turned by phi from e, tau = tan(phi/2), the speed and the angle
-obey |v|' = s cos(phi) - k s, phi' = -s sin(phi)/|v|, so that along the path |v| = ½ C tau^(k-1) (1 + tau²) with a
-constant C, the initial speed when tau starts at 1 (right across). Time and place are integrals of powers of tau. The
-point comes to rest, down the slope in the end, if k > 1; else its speed grows for ever.
+With e down the slope, s = g sin(a), k = mu/tan(a) and v turned by phi from e, tau = tan(phi/2), the
+speed and the angle obey |v|' = s cos(phi) - k s, phi' = -s sin(phi)/|v|, so that along the path |v|
+= ½ C tau^(k-1) (1 + tau²) with a constant C, the initial speed when tau starts at 1 (right across).
+Time and place are integrals of powers of tau. The point comes to rest, down the slope in the end,
+if k > 1; else its speed grows for ever.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from vi_contact.core.algebra import Array
 
 @dataclass(frozen=True)
 class PointOnSlope:
-    """mu, the tangent of the slope, neither equal to it nor to half of it, and the speed of the throw [m/s]."""
+    """mu, the tangent of the slope, neither equal to it nor to half of it, and the speed of the
+    throw [m/s]."""
 
     mu: float
     slope: float

@@ -1,13 +1,15 @@
-"""Assemble Galerkin matrices for many complex frequencies: radial functions interpolated, geometry integrated once.
+"""Assemble Galerkin matrices for many complex frequencies: radial functions interpolated, geometry
+integrated once.
 
-On each panel of distances a function f(r) is the polynomial through its values at Chebyshev points r_q, so every
-integral of the Galerkin layer is a fixed sum over the points:
+On each panel of distances a function f(r) is the polynomial through its values at Chebyshev points
+r_q, so every integral of the Galerkin layer is a fixed sum over the points:
 
     ∫∫ f(r) a(x, y) phi_i(x) phi_j(y) = sum_q [∫∫ L_q(r) a(x, y) phi_i phi_j] f(r_q).
 
-The brackets are sparse matrices that depend on the mesh alone. A frequency then costs some hundred Bessel functions
-and one sparse product. Panels are dyadic towards r = 0, where the functions are logarithmic (the pole -1/(2 pi r²) of
-Phi_S'/r is integrated on its own), and of equal width further out, where they are like exp(-s r/c_S).
+The brackets are sparse matrices that depend on the mesh alone. A frequency then costs some hundred
+Bessel functions and one sparse product. Panels are dyadic towards r = 0, where the functions are
+logarithmic (the pole -1/(2 pi r²) of Phi_S'/r is integrated on its own), and of equal width further
+out, where they are like exp(-s r/c_S).
 """
 
 from collections.abc import Callable, Sequence
@@ -30,9 +32,11 @@ INNERMOST = 1e-9  # end of the dyadic panels, relative to the shortest element
 
 
 class RadialTable(Galerkin):
-    """Integrate kernels without fronts, interpolated on panels of distance no wider than `width` [m].
+    """Integrate kernels without fronts, interpolated on panels of distance no wider than `width`
+    [m].
 
-    `assemble(LaplaceKernels(s, c_p, c_s))` as before, with all three operators. Memory: 10 kB per pair of elements.
+    `assemble(LaplaceKernels(s, c_p, c_s))` as before, with all three operators. Memory: 10 kB per
+    pair of elements.
     """
 
     def __init__(
@@ -67,7 +71,8 @@ class RadialTable(Galerkin):
         return csr_matrix((weights.ravel(), columns.ravel(), rows), shape=(len(r), len(self.nodes)))
 
     def _integrated(self) -> tuple[list[csr_matrix], Array]:
-        """Return (4 pairs, nodes) for factors 1, d_x²/r², d_x d_y/r², d_y²/r², d_x, d_y; the pole's two integrals."""
+        """Return (4 pairs, nodes) for factors 1, d_x²/r², d_x d_y/r², d_y²/r², d_x, d_y; the pole's
+        two integrals."""
         blocks: list[list[csr_matrix]] = [[] for _ in range(6)]
         poles, order = [], []
         for points in point_sets(self.pairs, (), self.orders):
@@ -118,6 +123,7 @@ class RadialTable(Galerkin):
 
 
 def _product(matrix: csr_matrix, columns: list[NDArray]) -> NDArray:
-    """Multiply a real matrix by k complex columns, without a complex copy of the matrix: (k, rows)."""
+    """Multiply a real matrix by k complex columns, without a complex copy of the matrix: (k,
+    rows)."""
     values = np.ascontiguousarray(np.stack(columns, axis=1), complex)
     return np.asarray(matrix @ values.view(float)).view(complex).T

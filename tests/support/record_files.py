@@ -1,4 +1,5 @@
-"""Record files of the formats of networks and tools, written here for the tests of their readers."""
+"""Record files of the formats of networks and tools, written here for the tests of their
+readers."""
 
 import numpy as np
 
@@ -24,7 +25,8 @@ def csmip(
     width=10,
     decimals=3,
 ):
-    """One channel: 25 text lines (shortened), 100 integers, 100 reals, then acceleration, velocity, displacement."""
+    """One channel: 25 text lines (shortened), 100 integers, 100 reals, then acceleration, velocity,
+    displacement."""
     text = f"""Corrected accelerogram   58000-L1000-14000.10       Chan  {channel}:  {name}         from
 Uncorrected Accelerogram Data             Processed: 08/24/14, CGS
 Rcrd of Sun Aug 24, 2014 03:20:33.0 PDT
@@ -67,7 +69,8 @@ def cosmos(
     end="End-of-data for Chan  1 acceleration\n",
     quantity="acceleration",
 ):
-    """Thirteen text lines (shortened), 100 integers, 100 reals of which number 34 is the step, comments, samples."""
+    """Thirteen text lines (shortened), 100 integers, 100 reals of which number 34 is the step,
+    comments, samples."""
     text = f"""{first}   (Format v01.20 with 7 text lines)
 Record of  Fort Example, CA Earthquake of Sun May 05, 2019 06:47 UTC
 Statn No: 02-001795 Code:NP-1795   USGS  SF FS 25 Bayview

@@ -1,7 +1,9 @@
-"""Write records of every format from a grid of cells, so that a test can change the grid and know the right answer.
+"""Write records of every format from a grid of cells, so that a test can change the grid and know
+the right answer.
 
-A layout knows its header, the width of its cells, how many stand on a row, and what a reader can check: a count that
-the header states, times beside the samples, cells that are cut by column. All numbers are made here."""
+A layout knows its header, the width of its cells, how many stand on a row, and what a reader can
+check: a count that the header states, times beside the samples, cells that are cut by column. All
+numbers are made here."""
 
 from __future__ import annotations
 
@@ -117,8 +119,10 @@ def at2_head(count: int) -> str:
 
 def begin_head(count: int) -> str:
     return (
-        f"Made motion, north south\n{count} points at equal spacing of 0.02 sec\nPoints are listed in the format of "
-        "8F10.3, i.e., 8 points across in\na row with 3 decimal places\nThe units are (g)\n*** Begin data ***\n"
+        f"Made motion, north south\n{count} points at equal spacing of 0.02 sec\nPoints are listed "
+        "in the format of "
+        "8F10.3, i.e., 8 points across in\na row with 3 decimal places\nThe units are (g)\n*** "
+        "Begin data ***\n"
         f"NPTS= {count:6d}, DT= .02000 SEC\n"
     )
 
@@ -140,7 +144,8 @@ def geonet(
     after: bool = True,
     count: int | None = None,
 ) -> str:
-    """One component: 16 lines of text, 4 of integers, 6 of reals; then accelerations, velocities and displacements."""
+    """One component: 16 lines of text, 4 of integers, 6 of reals; then accelerations, velocities
+    and displacements."""
     n = len(values) if count is None else count
     text = geonet_head(n, name=name, first=first, after=after)
     text += "".join(
@@ -409,7 +414,8 @@ LAYOUTS = {
         Layout(
             "heading",
             lambda n: (
-                f"Time Increment (s) : 0.02\nNumber of Data : {n}\nAccelaration time series in m/s/s\n"
+                f"Time Increment (s) : 0.02\nNumber of Data : {n}\nAccelaration time series in "
+                "m/s/s\n"
             ),
             lambda value: f" {value:.5f}",
             5,

@@ -1,4 +1,5 @@
-"""Ground truth for small complementarity problems: brute force over all sets, and seeded problems."""
+"""Ground truth for small complementarity problems: brute force over all sets, and seeded
+problems."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from vi_contact.solvers.normal.lcp import (
 class LCP:
     """The problem w = q + G r, 0 <= r ⊥ w >= 0 (w = 0 in bilateral rows); G an array.
 
-    Raises InputError for shapes that do not match, a NaN or -inf in q, and an infinite q in a bilateral row.
+    Raises InputError for shapes that do not match, a NaN or -inf in q, and an infinite q in a
+    bilateral row.
     """
 
     G: Array
@@ -40,9 +42,9 @@ class LCP:
     def residual(self, r: Array) -> float:
         """How far r (m,) is from solving it, dimensionless and the same in all units.
 
-        max |min(r_i/d_i, w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, divided by the violation of
-        r = 0 (by max |q_i d_i| when r = 0 is the solution, by max |r_i/d_i| when q = 0). 1 is what r = 0 scores, 0 is
-        exact.
+        max |min(r_i/d_i, w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, divided
+        by the violation of r = 0 (by max |q_i d_i| when r = 0 is the solution, by max |r_i/d_i|
+        when q = 0). 1 is what r = 0 scores, 0 is exact.
         """
         d = self._scale
         q, bilateral = self.q * d, self.bilateral
@@ -67,7 +69,8 @@ def solve(method: Any, problem: LCP, *, guess: Array | Mask | None = None) -> LC
 
 
 def enumerate_lcp(G: Array, q: Array, bilateral: Mask) -> Array:
-    """The r (m,), m <= 12, of the active set whose signs fit best: no tolerance, no method shared with the package.
+    """The r (m,), m <= 12, of the active set whose signs fit best: no tolerance, no method shared
+    with the package.
 
     Works on rows scaled to unit diagonal; rows with q = +inf are left out.
     """
@@ -92,7 +95,8 @@ def spd(rng: np.random.Generator, m: int) -> Array:
 
 
 def from_solution(rng: np.random.Generator, m: int, *, contact: float, grazing: float) -> LCP:
-    """A problem whose solution has about these shares of rows in contact (r > 0) and grazing (r = w = 0)."""
+    """A problem whose solution has about these shares of rows in contact (r > 0) and grazing (r = w
+    = 0)."""
     G, side = spd(rng, m), rng.random(m)
     r = np.where(side < contact, rng.random(m) + 0.1, 0.0)
     w = np.where(side >= contact + grazing, rng.random(m) + 0.1, 0.0)

@@ -1,4 +1,5 @@
-"""Find what only reports for browsers need: jinja2 and plotly, also where ``install/report.sh`` puts them; Chromium."""
+"""Find what only reports for browsers need: jinja2 and plotly, also where ``install/report.sh``
+puts them; Chromium."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ def report_packages() -> None:
 
 
 def browser() -> str:
-    """Return the command of a headless browser; skip the module that calls this where there is none."""
+    """Return the command of a headless browser; skip the module that calls this where there is
+    none."""
     found = next(
         filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
     )

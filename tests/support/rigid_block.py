@@ -1,16 +1,18 @@
-"""A rigid block that rocks on the four corners of its base, in space, by small rotations: its equations, solved exactly
-from event to event.
+"""A rigid block that rocks on the four corners of its base, in space, by small rotations: its
+equations, solved exactly from event to event.
 
-Unknowns q = (w, theta_x, theta_z): lift of the middle of the base, and turns about horizontal axes through it. The base
-does not slide and does not spin, so that a corner (x, z) is at the height w + theta_z x - theta_x z >= 0, and
+Unknowns q = (w, theta_x, theta_z): lift of the middle of the base, and turns about horizontal axes
+through it. The base does not slide and does not spin, so that a corner (x, z) is at the height w +
+theta_z x - theta_x z >= 0, and
 
     M q'' = (-g, g h theta_x, g h theta_z) + Bᵀ r,    0 <= r  ⊥  B q >= 0
     M = diag(1, (c² + 4 h²)/3, (a² + 4 h²)/3)
 
-for a uniform block of 2a x 2h x 2c and of mass one. g h theta is the second-order effect of the weight, as geometric
-stiffness has it: on an edge this is the slender block of ``demos.problems.rocking_block``. Impacts are inelastic: the
-velocity after one is the nearest, in the norm of M, at which no closed corner goes on down. From one edge or corner to
-the next that is the conservation of angular momentum about the new one (Housner, Bull. Seism. Soc. Am. 53, 1963).
+for a uniform block of 2a x 2h x 2c and of mass one. g h theta is the second-order effect of the
+weight, as geometric stiffness has it: on an edge this is the slender block of
+``demos.problems.rocking_block``. Impacts are inelastic: the velocity after one is the nearest, in
+the norm of M, at which no closed corner goes on down. From one edge or corner to the next that is
+the conservation of angular momentum about the new one (Housner, Bull. Seism. Soc. Am. 53, 1963).
 """
 
 from __future__ import annotations
@@ -82,7 +84,8 @@ class RigidBlock:
         return np.array([-self.B[corner, 1:] @ (theta_x, theta_z), theta_x, theta_z])
 
     def projected(self, x: Array, closed: Mask) -> tuple[Array, Array]:
-        """(the vector nearest to x at which no closed corner goes down, impulses of all corners)."""
+        """(the vector nearest to x at which no closed corner goes down, impulses of all
+        corners)."""
         for count in range(4):  # three corners hold all of q
             for chosen in combinations(np.flatnonzero(closed), count):
                 B, push = self.B[list(chosen)], np.zeros(4)
@@ -100,7 +103,8 @@ class RigidBlock:
         return np.asarray(self.projected(self.force(q) / self.mass, at_rest)[1] > 0.0)
 
     def moved(self, q: Array, v: Array, pivots: Mask, t: float) -> tuple[Array, Array]:
-        """(q, v) after a time t on these pivots, q = N y:  (Nᵀ M N) y'' = Nᵀ force(N y), by a matrix exponential."""
+        """(q, v) after a time t on these pivots, q = N y:  (Nᵀ M N) y'' = Nᵀ force(N y), by a
+        matrix exponential."""
         N = np.linalg.svd(self.B[pivots])[2][pivots.sum() :].T if pivots.any() else np.eye(3)
         k, inverse = N.shape[1], np.linalg.inv(N.T * self.mass @ N)
         A = np.zeros((2 * k + 1, 2 * k + 1))
@@ -116,7 +120,8 @@ class RigidBlock:
         return np.asarray(np.linalg.solve(B / self.mass @ B.T, -B @ (self.force(q) / self.mass)))
 
     def phases(self, q: Array, t_end: float, dt: float = 2e-3) -> Iterator[Phase]:
-        """Smooth motions one after the other, from rest at q on some corner; landings are looked for every dt [s]."""
+        """Smooth motions one after the other, from rest at q on some corner; landings are looked
+        for every dt [s]."""
         t, v, size = 0.0, np.zeros(3), np.abs(self.B @ q).max()
         while t < t_end:
             closed = self.B @ q <= ROUNDED * size

@@ -1,4 +1,5 @@
-"""Check what schemes promise that keep nothing but displacement and velocity: restarts, and scaling with the data."""
+"""Check what schemes promise that keep nothing but displacement and velocity: restarts, and scaling
+with the data."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from vi_contact.laws.mass import ConsistentMass
 
 
 def check_restart_from_bare_states(scheme: Any) -> None:
-    """To the last bit, from a state stripped of reactions and contact set, in the middle of the contact."""
+    """To the last bit, from a state stripped of reactions and contact set, in the middle of the
+    contact."""
     problem = thrown(50, mass=ConsistentMass())
     whole = [report.new for report in run(problem, scheme, dt=1 / 150, steps=150)]
     half = whole[99]
@@ -24,7 +26,8 @@ def check_restart_from_bare_states(scheme: Any) -> None:
 
 
 def check_positive_homogeneity(scheme: Any) -> None:
-    """A millionth of gap and velocity gives a millionth of everything: no absolute tolerance anywhere."""
+    """A millionth of gap and velocity gives a millionth of everything: no absolute tolerance
+    anywhere."""
     small: dict[str, Any] = {"gap": 5e-6, "v0": lambda x: np.full_like(x, -1e-5)}
     problems = (thrown(30, mass=ConsistentMass()), bar(30, **small, mass=ConsistentMass()))
     large, little = (list(run(problem, scheme, dt=1 / 90, steps=130)) for problem in problems)

@@ -1,8 +1,10 @@
-"""The sample profile of SHAKE91 (Idriss and Sun 1992): 150 ft of sand and clay on rock, and what pystrata makes of it.
+"""The sample profile of SHAKE91 (Idriss and Sun 1992): 150 ft of sand and clay on rock, and what
+pystrata makes of it.
 
-The input of the program is public (test-data/INP.DAT of shyang107/goshake); its record is not, so the motion is a sum
-of Ricker pulses with the peak of the sample, 0.1 g, on the outcrop. Numbers of pystrata 0.5.4,
-EquivalentLinearCalculator: strain ratio 0.5, tolerance 1e-6, COMP_MODULUS_MODEL "seed", which is G (1 + 2 i xi).
+The input of the program is public (test-data/INP.DAT of shyang107/goshake); its record is not, so
+the motion is a sum of Ricker pulses with the peak of the sample, 0.1 g, on the outcrop. Numbers of
+pystrata 0.5.4, EquivalentLinearCalculator: strain ratio 0.5, tolerance 1e-6, COMP_MODULUS_MODEL
+"seed", which is G (1 + 2 i xi).
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ KIND = ["sand"] * 4 + ["clay"] * 4 + ["sand"] * 8
 WEIGHT = [125] * 8 + [130] * 8  # lb/ft³
 ROCK = LinearElastic.from_wave_speeds(8000 * FOOT, 4000 * FOOT, 140 * PCF)
 
-# from the top: G [Pa], damping ratio and largest strain in the middle of each layer; peak at the surface [m/s²]
+# from the top: G [Pa], damping ratio and largest strain in the middle of each layer; peak at the
+# surface [m/s²]
 EXPECTED_SHEAR = np.array(
     [
         1.84567020e08,
@@ -111,7 +114,8 @@ EXPECTED_PEAK = 1.854352541
 
 
 def curves(kind: str) -> SoilCurves:
-    """Modulus and damping have tables with other strains: one with those of both, interpolated as pystrata does."""
+    """Modulus and damping have tables with other strains: one with those of both, interpolated as
+    pystrata does."""
     strains = np.unique(STRAINS + DAMPED)
     where = np.log(strains)
     return SoilCurves(
@@ -123,7 +127,8 @@ def curves(kind: str) -> SoilCurves:
 
 
 def layers() -> list[Layer]:
-    """The sixteen layers from the top; pressure waves are twice as fast, which nothing here depends on."""
+    """The sixteen layers from the top; pressure waves are twice as fast, which nothing here depends
+    on."""
     return [
         (h * FOOT, LinearElastic.from_wave_speeds(2 * v * FOOT, v * FOOT, w * PCF), curves(kind))
         for h, v, w, kind in zip(FEET, SPEED, WEIGHT, KIND, strict=True)

@@ -1,7 +1,8 @@
-"""Solve vertical waves in a uniform layer: transfer functions, natural frequencies (Kramer 1996, ch. 7).
+"""Solve vertical waves in a uniform layer: transfer functions, natural frequencies (Kramer 1996,
+ch. 7).
 
-Depth z from the free surface, k* = w/c_S*, c_S* = c_S sqrt(1 + 2i xi) with the hysteretic damping ratio xi. In the
-layer u = 2 A cos(k* z) exp(i w t), where A is the amplitude of the upgoing wave.
+Depth z from the free surface, k* = w/c_S*, c_S* = c_S sqrt(1 + 2i xi) with the hysteretic damping
+ratio xi. In the layer u = 2 A cos(k* z) exp(i w t), where A is the amplitude of the upgoing wave.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from vi_contact.laws.materials import LinearElastic
 
 @dataclass(frozen=True)
 class SoilLayer:
-    """Describe a layer of ``height`` [m] and hysteretic damping ratio ``xi``, shaken by vertical shear waves.
+    """Describe a layer of ``height`` [m] and hysteretic damping ratio ``xi``, shaken by vertical
+    shear waves.
 
     InputError unless height > 0 and xi >= 0.
     """
@@ -44,7 +46,8 @@ class SoilLayer:
         return np.asarray(np.abs(1.0 / np.cos(self._phase(f))))
 
     def on_elastic_base(self, f: ArrayLike, rock: LinearElastic) -> Array:
-        """Return |u_surface / u_outcrop| = |1/(cos k*H + i a sin k*H)|, a = rho c_S*/(rho_rock c_S_rock)."""
+        """Return |u_surface / u_outcrop| = |1/(cos k*H + i a sin k*H)|, a = rho c_S*/(rho_rock
+        c_S_rock)."""
         phase = self._phase(f)
         a = (
             self.material.rho
@@ -56,9 +59,11 @@ class SoilLayer:
 
 
 def viscous(material: LinearElastic, f: float, *, alpha: float = 0.0, beta: float = 0.0) -> complex:
-    """Return the complex wave number [1/m] of shear waves with Rayleigh damping at frequency f [Hz].
+    """Return the complex wave number [1/m] of shear waves with Rayleigh damping at frequency f
+    [Hz].
 
-    rho w² (1 - i alpha/w) = G k² (1 + i w beta): what a run with C = alpha M + beta K has in place of k*.
+    rho w² (1 - i alpha/w) = G k² (1 + i w beta): what a run with C = alpha M + beta K has in place
+    of k*.
     """
     w = 2.0 * np.pi * f
     return complex(w / material.c_s * np.sqrt((1.0 - 1j * alpha / w) / (1.0 + 1j * w * beta)))

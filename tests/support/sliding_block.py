@@ -1,6 +1,8 @@
-"""Model a stiff block that slides on a shaken ground with Coulomb friction; its rigid limit is Newmark's block (1965).
+"""Model a stiff block that slides on a shaken ground with Coulomb friction; its rigid limit is
+Newmark's block (1965).
 
-The whole base is in possible contact and free to lift and slide; the run starts from the gravity stage.
+The whole base is in possible contact and free to lift and slide; the run starts from the gravity
+stage.
 """
 
 from collections.abc import Sequence
@@ -26,7 +28,8 @@ from vi_contact.run.static import static_equilibrium
 
 @dataclass(frozen=True)
 class SlidingBody:
-    """Describe the block. ``law``: friction and gravity of the rigid block; width and height [m]; stiff material; mesh.
+    """Describe the block. ``law``: friction and gravity of the rigid block; width and height [m];
+    stiff material; mesh.
 
     InputError for a block so slender, width/height <= mu, that it rocks before it slides.
     """
@@ -42,14 +45,16 @@ class SlidingBody:
     def __post_init__(self) -> None:
         if self.lengths[0] <= self.law.mu * self.lengths[1]:
             raise InputError(
-                f"SlidingBody: a block of {self.lengths[0]:g} m x {self.lengths[1]:g} m rocks before it "
+                f"SlidingBody: a block of {self.lengths[0]:g} m x {self.lengths[1]:g} m rocks "
+                "before it "
                 f"slides with mu = {self.law.mu:g}: make it wider than mu times its height"
             )
 
 
 @dataclass(frozen=True)
 class SlidingModel:
-    """Hold the model. ``problem``: the block on moving ground; ``rest``: standing still; ``centre``: for probes."""
+    """Hold the model. ``problem``: the block on moving ground; ``rest``: standing still;
+    ``centre``: for probes."""
 
     body: SlidingBody
     problem: ContactProblem

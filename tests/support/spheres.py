@@ -1,5 +1,6 @@
-"""Spheres in contact, computed on caps of them, and how far the answers are from the closed forms: for tests and for
-benchmarks/contact_in_space.py. Cells of the first body: a/n under the contact; of the second a/(0.83 n)."""
+"""Spheres in contact, computed on caps of them, and how far the answers are from the closed forms:
+for tests and for benchmarks/contact_in_space.py. Cells of the first body: a/n under the contact; of
+the second a/(0.83 n)."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ APPROACHES = np.linspace(0.85, 1.15, 13)[1:]  # in a
 
 
 def bodies(kind: str, n: float) -> list[Cap]:
-    """What touches: a sphere on a rigid "plane", two "spheres" of 10 and 20 mm, a sphere on an elastic "block"."""
+    """What touches: a sphere on a rigid "plane", two "spheres" of 10 and 20 mm, a sphere on an
+    elastic "block"."""
     one, m = Cap(RADIUS, STEEL, n), COARSER * n
     others = {
         "plane": [],
@@ -44,10 +46,12 @@ def bodies(kind: str, n: float) -> list[Cap]:
 
 
 def hertz(kind: str, n: float, *, simplices: bool = False) -> dict[str, float]:
-    """A quarter pressed together by twelve approaches, so that the edge of contact falls anywhere between nodes.
+    """A quarter pressed together by twelve approaches, so that the edge of contact falls anywhere
+    between nodes.
 
-    Relative errors: force, radius (second moment of the forces), peak (mean pressure on r < a/2) in the mean over the
-    approaches; scatter: standard deviation of the force's; profile: L2 norm of the nodal pressures' error, its mean.
+    Relative errors: force, radius (second moment of the forces), peak (mean pressure on r < a/2) in
+    the mean over the approaches; scatter: standard deviation of the force's; profile: L2 norm of
+    the nodal pressures' error, its mean.
     """
     caps = bodies(kind, n)
     spheres = Caps(
@@ -85,17 +89,20 @@ def hertz(kind: str, n: float, *, simplices: bool = False) -> dict[str, float]:
     }
 
 
-STAGES = 8  # at most; stage 0 of an approach presses the bodies, the others rub them: t = STAGES · approach + stage
+# at most; stage 0 of an approach presses the bodies, the others rub them: t = STAGES · approach +
+# stage
+STAGES = 8
 Moved = Callable[[Array, float, int], Array]
 
 
 @dataclass(frozen=True)
 class Rubbed:
-    """Two equal spheres pressed and then moved along one another in stages, the far sides by the closed form; again
-    and again, with ``approaches`` in a.
+    """Two equal spheres pressed and then moved along one another in stages, the far sides by the
+    closed form; again and again, with ``approaches`` in a.
 
-    ``moved``: (points, radius of contact [m], stage) -> displacements of the far sides of the first body, depth in the
-    place of y; those of the second are the opposite, with its own depth. ``turn``: of the second mesh about the normal.
+    ``moved``: (points, radius of contact [m], stage) -> displacements of the far sides of the first
+    body, depth in the place of y; those of the second are the opposite, with its own depth.
+    ``turn``: of the second mesh about the normal.
     """
 
     n: float
@@ -142,7 +149,8 @@ class Rubbed:
         return [smooth.after(start, float(STAGES * i)) for i in range(len(self.approaches))]
 
     def stages(self, stages: Sequence[int], mu: float = MU) -> list[list[Contact]]:
-        """What these stages leave, of every approach; each begins where the one before has left the bodies."""
+        """What these stages leave, of every approach; each begins where the one before has left the
+        bodies."""
         rough = Equilibria(replace(self.spheres.problem, friction=Coulomb(mu)), solver=Condensed())
         found = []
         for i, state in enumerate(self._pressed):
@@ -176,8 +184,8 @@ PATH = (
 
 @dataclass(frozen=True)
 class PartialSlip:
-    """Cattaneo and Mindlin: half of two spheres, Q along x. Taken back from Q* to Q: q = q(Q*) - 2 q((Q* - Q)/2), the
-    stick radius is that of (Q* - Q)/2 (Mindlin and Deresiewicz 1953)."""
+    """Cattaneo and Mindlin: half of two spheres, Q along x. Taken back from Q* to Q: q = q(Q*) - 2
+    q((Q* - Q)/2), the stick radius is that of (Q* - Q)/2 (Mindlin and Deresiewicz 1953)."""
 
     n: float
     comm: Any = field(default_factory=lambda: MPI.COMM_WORLD)
@@ -202,7 +210,8 @@ class PartialSlip:
         return Mindlin(force, a, MU, 0.5 * FIBROUS.E / (1.0 + nu), nu)
 
     def compared(self) -> list[dict[str, float]]:
-        """Of each stage: relative errors of P, of Q over the greatest, L2 error of q; c and its error over a."""
+        """Of each stage: relative errors of P, of Q over the greatest, L2 error of q; c and its
+        error over a."""
         found = self.rubbed.stages(range(1, 1 + len(PATH)))
         return averaged(
             [
@@ -235,8 +244,8 @@ STICK = (0.9, 0.7, 0.5, 0.3)  # c/a
 
 @dataclass(frozen=True)
 class Torsion:
-    """Lubkin: two whole spheres twisted about their normal; the mesh of the second is turned. After the stages of slip
-    comes the twist of the first one without any."""
+    """Lubkin: two whole spheres twisted about their normal; the mesh of the second is turned. After
+    the stages of slip comes the twist of the first one without any."""
 
     n: float
     approaches: Sequence[float] = tuple(APPROACHES[::2])

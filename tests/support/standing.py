@@ -32,7 +32,8 @@ def standing(
     up: bool = False,
     simplices: bool = False,
 ) -> ContactProblem:
-    """A block on the ground under its weight; ``push`` [Pa] along x on its top, ``held``: u_x = 0 at its bottom."""
+    """A block on the ground under its weight; ``push`` [Pa] along x on its top, ``held``: u_x = 0
+    at its bottom."""
     d = len(lengths)
     mesh, tags = block(COMM, lengths=lengths, divisions=divisions, angle=angle, simplices=simplices)
     normal = np.zeros(d)

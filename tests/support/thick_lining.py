@@ -1,7 +1,8 @@
-"""Solve a circular lining in an elastic full space sheared far away, with and without friction at its outside.
+"""Solve a circular lining in an elastic full space sheared far away, with and without friction at
+its outside.
 
-``ThickLining`` is the plane-strain solution of two rings of Michell's second harmonic; theta is measured from the
-direction in which the ground is stretched, at 45° to the shear gamma:
+``ThickLining`` is the plane-strain solution of two rings of Michell's second harmonic; theta is
+measured from the direction in which the ground is stretched, at 45° to the shear gamma:
 
     phi = (A r² + B r⁴ + C/r² + D) cos 2 theta
     sigma_r = -(2 A + 6 C/r⁴ + 4 D/r²) cos 2 theta
@@ -10,8 +11,9 @@ direction in which the ground is stretched, at 45° to the shear gamma:
     2 G u_r = (-2 A r - 4 nu B r³ + 2 C/r³ + 4 (1 - nu) D/r) cos 2 theta
     2 G u_theta = (2 A r + 2 (3 - 2 nu) B r³ + 2 C/r³ - 2 (1 - 2 nu) D/r) sin 2 theta
 
-with A = -G gamma/2, B = 0 in the soil. It tends to the usual formulas for thin shells (Wang 1993, Hashash et al. 2001)
-and supposes that soil and lining do not part: with full slip that needs a pressure beforehand.
+with A = -G gamma/2, B = 0 in the soil. It tends to the usual formulas for thin shells (Wang 1993,
+Hashash et al. 2001) and supposes that soil and lining do not part: with full slip that needs a
+pressure beforehand.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ from vi_contact.laws.materials import LinearElastic
 
 @dataclass(frozen=True)
 class ThickLining:
-    """Hold inner and outer radius [m]; ``slip``: no friction at the outside, else nothing slides there."""
+    """Hold inner and outer radius [m]; ``slip``: no friction at the outside, else nothing slides
+    there."""
 
     inner: float
     outer: float
@@ -41,12 +44,14 @@ class ThickLining:
         attributes(self, positive=("inner", "outer"))
         if not self.inner < self.outer:
             raise InputError(
-                f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < outer"
+                f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < "
+                "outer"
             )
 
     @cached_property
     def _constants(self) -> Array:
-        """Return A, B, C, D of the lining; C, D of the soil, for gamma = 1, lengths in units of the outer radius."""
+        """Return A, B, C, D of the lining; C, D of the soil, for gamma = 1, lengths in units of the
+        outer radius."""
         G = self.soil.shear_modulus
         inside, interface = _rows(self.lining, self.inner / self.outer), _rows(self.lining, 1.0)
         outside = _rows(self.soil, 1.0)
@@ -64,7 +69,8 @@ class ThickLining:
         return np.asarray(np.linalg.solve(matrix / scale[:, None], right / scale))
 
     def field(self, name: str, r: float, gamma: float) -> float:
-        """Return the amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r", "u_theta" [m] in the lining at r [m]."""
+        """Return the amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r", "u_theta" [m] in the
+        lining at r [m]."""
         size = self.outer if name.startswith("u_") else 1.0
         return float(
             gamma * size * (_rows(self.lining, r / self.outer)[name] @ self._constants[:4])
@@ -75,7 +81,8 @@ class ThickLining:
         return 2.0 * self.field("u_r", self.outer, gamma)
 
     def pressure(self, gamma: float) -> float:
-        """Return the amplitude of sigma_r [Pa] at the outside: contact lasts if the pressure beforehand exceeds it."""
+        """Return the amplitude of sigma_r [Pa] at the outside: contact lasts if the pressure
+        beforehand exceeds it."""
         return self.field("sigma_r", self.outer, gamma)
 
     def thrust(self, gamma: float) -> float:
@@ -83,7 +90,8 @@ class ThickLining:
         return self._integral(gamma)[0]
 
     def moment(self, gamma: float) -> float:
-        """Return the amplitude of the bending moment ∫ sigma_theta (r - R) dr [N m/m] about the mean radius R."""
+        """Return the amplitude of the bending moment ∫ sigma_theta (r - R) dr [N m/m] about the
+        mean radius R."""
         return self._integral(gamma)[1]
 
     def _integral(self, gamma: float) -> tuple[float, float]:

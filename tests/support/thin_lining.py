@@ -1,4 +1,5 @@
-"""The usual formulas of a thin circular lining in sheared ground (Wang 1993; Hashash et al. 2001)."""
+"""The usual formulas of a thin circular lining in sheared ground (Wang 1993; Hashash et al.
+2001)."""
 
 from __future__ import annotations
 
@@ -44,7 +45,8 @@ class ThinLining:
         return self.full_slip * self.flexibility * gamma / 3.0 * 2.0 * self.radius
 
     def thrust(self, gamma: float, *, slip: bool) -> float:
-        """Return the largest hoop force [N/m]: full slip K1 E_m R gamma/(6 (1 + nu)), no slip K2 G R gamma."""
+        """Return the largest hoop force [N/m]: full slip K1 E_m R gamma/(6 (1 + nu)), no slip K2 G
+        R gamma."""
         nu, F, C = self.soil.nu, self.flexibility, self.compressibility
         if slip:
             return self.full_slip * self.soil.E * self.radius * gamma / (6.0 * (1.0 + nu))

@@ -1,4 +1,5 @@
-"""Two free blocks in space, thrown at each other obliquely and with spin, on meshes that do not match (dual mortar)."""
+"""Two free blocks in space, thrown at each other obliquely and with spin, on meshes that do not
+match (dual mortar)."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ def thrown_blocks(
     gap: float = 0.0,
     simplices: bool = False,
 ) -> vc.ContactProblem:
-    """Two blocks of rubber, turned out of all axes. ``bent``: curvature [1/m] of the faces between them."""
+    """Two blocks of rubber, turned out of all axes. ``bent``: curvature [1/m] of the faces between
+    them."""
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     turn *= np.linalg.det(turn)
 
@@ -65,7 +67,8 @@ def rigid_motions(problem: vc.ContactProblem) -> Array:
 
 
 def status(report: Report) -> NDArray[Any]:
-    """What each condition of all ranks does in a step: OPEN, STICKS or SLIPS, as all closed ones do if it is smooth."""
+    """What each condition of all ranks does in a step: OPEN, STICKS or SLIPS, as all closed ones do
+    if it is smooth."""
     slides = slipped(report) if report.problem.frictional else True
     return report.problem.surface.everywhere(
         np.where(report.new.active, np.where(slides, SLIPS, STICKS), OPEN)

@@ -1,4 +1,5 @@
-"""A soft block that tips onto a plane with friction: open, sticking and slipping points in one step."""
+"""A soft block that tips onto a plane with friction: open, sticking and slipping points in one
+step."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ RUBBER = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
 
 
 def tipped(comm: Any, friction: FrictionLaw, *, simplices: bool, angle: float) -> ContactProblem:
-    """A soft rectangle that lands on one corner, turning and gliding, on a plane that gets rougher on one side."""
+    """A soft rectangle that lands on one corner, turning and gliding, on a plane that gets rougher
+    on one side."""
     mesh, tags = block(
         comm, lengths=(1.5, 1.0), divisions=(POINTS - 1, 6), angle=angle, simplices=simplices
     )

@@ -1,4 +1,5 @@
-"""Solve the impact of two coaxial elastic bars. All arguments are SI, forces and impulses per unit of section."""
+"""Solve the impact of two coaxial elastic bars. All arguments are SI, forces and impulses per unit
+of section."""
 
 from __future__ import annotations
 
@@ -14,17 +15,20 @@ from vi_contact.core.errors import InputError
 
 @dataclass(frozen=True)
 class TwoBars:
-    """Describe a bar 1 that hits bar 2, at rest, with `speed` v0 at t = 0; both stress-free, their far ends free.
+    """Describe a bar 1 that hits bar 2, at rest, with `speed` v0 at t = 0; both stress-free, their
+    far ends free.
 
-    With impedances z = rho c and crossing times T = length/c, continuity of velocity gives, until a wave returns,
+    With impedances z = rho c and crossing times T = length/c, continuity of velocity gives, until a
+    wave returns,
 
         p = v0 z1 z2 / (z1 + z2)
 
-    The bar of the smaller T sends relief after 2T; if its impedance is not above the other's, this ends the contact for
-    good, after the impulse 2T p, which leaves that bar free of stress. Equal bars but for length: the striker stops,
-    restitution e = min(T1, T2)/max(T1, T2). length1, length2 [m]; z1, z2 [kg/(m² s)]; c1, c2, speed [m/s], velocities
-    positive from bar 1 to bar 2; pressures and impulses per unit of section. Raises InputError unless all are finite
-    and positive, and for bars that part later than after the first reflection.
+    The bar of the smaller T sends relief after 2T; if its impedance is not above the other's, this
+    ends the contact for good, after the impulse 2T p, which leaves that bar free of stress. Equal
+    bars but for length: the striker stops, restitution e = min(T1, T2)/max(T1, T2). length1,
+    length2 [m]; z1, z2 [kg/(m² s)]; c1, c2, speed [m/s], velocities positive from bar 1 to bar 2;
+    pressures and impulses per unit of section. Raises InputError unless all are finite and
+    positive, and for bars that part later than after the first reflection.
     """
 
     length1: float = 1.0
@@ -40,7 +44,8 @@ class TwoBars:
         first, second = (self.length1 / self.c1, self.z1), (self.length2 / self.c2, self.z2)
         if min(first, second)[1] > max(first, second)[1]:
             raise InputError(
-                "TwoBars: the bar crossed first has the larger impedance, so that contact outlives the "
+                "TwoBars: the bar crossed first has the larger impedance, so that contact outlives "
+                "the "
                 "first reflection; give it an impedance (z1 or z2) that is not above the other's"
             )
 

@@ -1,4 +1,5 @@
-"""Two blocks of finite elements, one on top of the other, for tests of contact between deformable bodies."""
+"""Two blocks of finite elements, one on top of the other, for tests of contact between deformable
+bodies."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ NEED_TAGS = ("clamped", "prescribed", "loads")
 
 
 def per_body(system: SemiDiscreteSystem, *functions: Callable[[Array], Array]) -> Array:
-    """A vector of free unknowns that is one function of the points in body 0, another in body 1, ..."""
+    """A vector of free unknowns that is one function of the points in body 0, another in body 1,
+    ..."""
     space: Any = system.space
     values = np.column_stack(
         [space.restrict(np.asarray(function(space.points))) for function in functions]

@@ -1,7 +1,9 @@
-"""Contact steps on a Q1 plane-strain block, on one process or in parallel, with a dense brute-force solution.
+"""Contact steps on a Q1 plane-strain block, on one process or in parallel, with a dense brute-force
+solution.
 
-The block stands on a clamped base; its right side may touch a wall, u_x <= bound. Every rank assembles the same scipy
-matrix and keeps its rows, so that a case is one problem whatever the number of ranks.
+The block stands on a clamped base; its right side may touch a wall, u_x <= bound. Every rank
+assembles the same scipy matrix and keeps its rows, so that a case is one problem whatever the
+number of ranks.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from vi_contact.core.surfaces import ContactSurface
 
 
 def q1_element(nu: float) -> tuple[Array, Array]:
-    """(stiffness, mass) of a unit square, E = rho = 1, plane strain; nodes anticlockwise, components interleaved."""
+    """(stiffness, mass) of a unit square, E = rho = 1, plane strain; nodes anticlockwise,
+    components interleaved."""
     D = np.array([[1.0 - nu, nu, 0.0], [nu, 1.0 - nu, 0.0], [0.0, 0.0, 0.5 - nu]]) / (
         (1.0 + nu) * (1.0 - 2.0 * nu)
     )
@@ -38,7 +41,8 @@ def q1_element(nu: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Block:
-    """nx x ny elements of size h: K [N/m], M [kg], and the unknowns u_x of the right side, base excluded."""
+    """nx x ny elements of size h: K [N/m], M [kg], and the unknowns u_x of the right side, base
+    excluded."""
 
     K: Any
     M: Any
@@ -133,7 +137,8 @@ def case(
     compliance: Any = None,
     scale: float = 1.0,
 ) -> Case:
-    """The step A x = b - reactions, x <= bound at the unknowns ``contact``, starting from rest without prediction."""
+    """The step A x = b - reactions, x <= bound at the unknowns ``contact``, starting from rest
+    without prediction."""
     rows, A, comm = (
         _parallel(matrix, of_node)
         if parallel
@@ -190,7 +195,8 @@ def pushed_block(
     seed: int = 2,
     **options: Any,
 ) -> Case:
-    """A dynamic step of the block under loads that close half of its points; ``length`` and ``force`` are units."""
+    """A dynamic step of the block under loads that close half of its points; ``length`` and
+    ``force`` are units."""
     rng = np.random.default_rng(seed)
     body = block(nx, ny)
     matrix = (body.K + 4.0 * body.M) * (force / length)

@@ -30,7 +30,8 @@ SCHEME = ZienkiewiczWoodTaylor(phi=0.5)
 
 @dataclass(frozen=True)
 class History:
-    """Every step: u_x of POINTS and of all contact points [m], contact sets, energies and losses [J], iterations."""
+    """Every step: u_x of POINTS and of all contact points [m], contact sets, energies and losses
+    [J], iterations."""
 
     u: Array
     contact: Array

@@ -1,4 +1,5 @@
-"""Give a packet of plane waves that travels up at an angle: initial values with a known reflection."""
+"""Give a packet of plane waves that travels up at an angle: initial values with a known
+reflection."""
 
 from __future__ import annotations
 
@@ -20,12 +21,13 @@ from vi_contact.run.march import march
 
 @dataclass(frozen=True)
 class WavePacket:
-    """Describe waves "P" or "S" around ``angle`` [rad] from the vertical, of one wavelength along x: ``period`` [m].
+    """Describe waves "P" or "S" around ``angle`` [rad] from the vertical, of one wavelength along
+    x: ``period`` [m].
 
         u = sum over k_y of weight(k_y) d cos(k_x x + k_y (y - centre) - w t),   k_x = 2 pi/period,   w = c |k|
 
-    with d the direction of motion and Gaussian weights of standard deviation 1/length: a packet of about 4 ``length``
-    [m] in height, around the height ``centre`` [m] at t = 0.
+    with d the direction of motion and Gaussian weights of standard deviation 1/length: a packet of
+    about 4 ``length`` [m] in height, around the height ``centre`` [m] at t = 0.
     """
 
     material: LinearElastic
@@ -66,7 +68,8 @@ class WavePacket:
         return u, v
 
     def reflected(self) -> float:
-        """Return the mean energy that dashpots on a horizontal boundary above send back, over the packet's."""
+        """Return the mean energy that dashpots on a horizontal boundary above send back, over the
+        packet's."""
         k_y, weights, angles = self._waves()
         shares = [
             dashpot_energy(self.material, angle, wave=self.wave) if angle < 0.5 * math.pi else 1.0
@@ -79,9 +82,11 @@ class WavePacket:
 def energy_sent_back(
     comm: Any, material: LinearElastic, wave: str, angle: float, *, length: float, cells: int
 ) -> tuple[float, float]:
-    """Send a packet up a periodic strip between dashpots; return the share of energy left, and the theory's.
+    """Send a packet up a periodic strip between dashpots; return the share of energy left, and the
+    theory's.
 
-    angle [rad] from the vertical; length of the packet in wavelengths; cells per wavelength. Collective.
+    angle [rad] from the vertical; length of the packet in wavelengths; cells per wavelength.
+    Collective.
     """
     period = 1.0 / math.sin(angle)  # wavelength 1
     nx = round(cells * period)

@@ -1,4 +1,5 @@
-"""Write the folder of a run that nobody made: histories of any length, names and texts of any kind."""
+"""Write the folder of a run that nobody made: histories of any length, names and texts of any
+kind."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ def write_run(
     case: str = "",
     model: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write columns name -> (unit, meaning, values (n,)), with those of every run; ``case``: text of case.toml."""
+    """Write columns name -> (unit, meaning, values (n,)), with those of every run; ``case``: text
+    of case.toml."""
     folder.mkdir(parents=True)
     count = len(next(iter(columns.values()))[2])
     needed = {

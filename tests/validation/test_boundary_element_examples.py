@@ -1,4 +1,5 @@
-"""The four examples of seed 003 by space-time boundary elements: numbers, statements, finite elements beside them."""
+"""The four examples of seed 003 by space-time boundary elements: numbers, statements, finite
+elements beside them."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ ENERGY = {  # an independent script of boundary elements, 20 elements per side
     "none": (0.5339, 1.1351, 1.7723, 2.3529, 2.3045, 1.9808, 1.4837, 0.8213, 0.3292, 0.3049),
     "tresca": (0.5339, 1.1351, 1.7641, 2.3341, 2.2702, 1.9331, 1.4205, 0.7669, 0.3107, 0.2992),
 }
-FINE = {  # finite elements on 160 x 160 cells, default scheme, dt = h: energies at HALVES, impulse until t = 4
+# finite elements on 160 x 160 cells, default scheme, dt = h: energies at HALVES, impulse until t =
+# 4
+FINE = {
     "none": (
         (0.5336, 1.1351, 1.7728, 2.3433, 2.3054, 1.9807, 1.4843, 0.8308, 0.3286, 0.3056),
         4.70304,
@@ -73,8 +76,9 @@ def at(values: Array, *times: float, dt: float = 0.05) -> Array:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_square_energies(law):
-    """V7.1, B9: the table of the independent script to 0.05 %, finite elements on 160 x 160 cells to 0.5 % of the
-    largest energy, linear growth before the wave arrives; certified, closed books, friction takes energy."""
+    """V7.1, B9: the table of the independent script to 0.05 %, finite elements on 160 x 160 cells
+    to 0.5 % of the largest energy, linear growth before the wave arrives; certified, closed books,
+    friction takes energy."""
     found, books = run(law)
     energy = at(books.energy, *HALVES)
     if law in ENERGY:
@@ -91,8 +95,8 @@ def test_square_energies(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_square_impulse(law):
-    """V7.1, B9: impulse of the contact until t = 4 against finite elements on 160 x 160 cells, 0.05 %; no penetration;
-    the independent script's impulses."""
+    """V7.1, B9: impulse of the contact until t = 4 against finite elements on 160 x 160 cells, 0.05
+    %; no penetration; the independent script's impulses."""
     found, _ = run(law)
     assert at(found.impulse[:, 1], 4.0) == pytest.approx(FINE[law][1], rel=5e-4)
     if law == "none":
@@ -101,7 +105,8 @@ def test_square_impulse(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_uzawa_needs_about_two_hundred_iterations(law):
-    """B10: the source's algorithm on all steps at once, 1e-8, against the march: 1e-6; its counts."""
+    """B10: the source's algorithm on all steps at once, 1e-8, against the march: 1e-6; its
+    counts."""
     found = SpaceTimeUzawa(tolerance=1e-8).solve(BoundaryContact(condensed(), friction=LAWS[law]))
     assert np.abs(found.forces - run(law)[0].forces).max() < 1e-6 * np.abs(found.forces).max()
     assert 150 < found.iterations[0] < 250
@@ -111,9 +116,10 @@ def test_uzawa_needs_about_two_hundred_iterations(law):
     ("law", "early", "late"), [("none", 0.0, 0.0), ("tresca", 0.2, 0.25), ("coulomb", 0.05, 0.25)]
 )
 def test_square_tractions_beside_finite_elements(law, early, late):
-    """V7.1: tractions on the whole contact boundary, means over 0.2 s, against 40 x 40 cells: pressure to 5 % in L2;
-    shear on the body along +x: Coulomb's to 5 % while the base sticks, but for its ends; Tresca's, which turns round
-    within a step, and Coulomb's after the unloading wave has passed, to 25 % (160 cells and why: pressed_blocks.md)."""
+    """V7.1: tractions on the whole contact boundary, means over 0.2 s, against 40 x 40 cells:
+    pressure to 5 % in L2; shear on the body along +x: Coulomb's to 5 % while the base sticks, but
+    for its ends; Tresca's, which turns round within a step, and Coulomb's after the unloading wave
+    has passed, to 25 % (160 cells and why: pressed_blocks.md)."""
     from mpi4py import MPI
 
     from demos.problems.square import Square, build
@@ -132,8 +138,8 @@ def test_square_tractions_beside_finite_elements(law, early, late):
 
 
 def test_forces_are_collected_on_the_nodes_of_the_boundary_elements():
-    """What is collected keeps its sum and its moment; means over steps are exact for what is linear in time; equal
-    tractions do not differ."""
+    """What is collected keeps its sum and its moment; means over steps are exact for what is linear
+    in time; equal tractions do not differ."""
     nodes, x = np.linspace(-0.5, 0.5, 6), np.array([-0.5, -0.44, 0.1, 0.31, 0.5])
     force = np.array([1.0, 2.0, -3.0, 4.0, 0.5])
     found = force @ shares(x, nodes)
@@ -153,8 +159,9 @@ def test_forces_are_collected_on_the_nodes_of_the_boundary_elements():
 
 
 def test_concrete_on_steel():
-    """V7.2, B8: 40 ms of a slow load in 163 steps of c_P dt = 4 h: the top goes down by the static 175.308 µm within
-    0.05 %, energy f²a²/(2E') within 0.2 %; with mu = 0.3 the base sticks, top 173.7 µm to 0.5 %."""
+    """V7.2, B8: 40 ms of a slow load in 163 steps of c_P dt = 4 h: the top goes down by the static
+    175.308 µm within 0.05 %, energy f²a²/(2E') within 0.2 %; with mu = 0.3 the base sticks, top
+    173.7 µm to 0.5 %."""
     concrete = vc.LinearElastic.from_wave_speeds(3253.0, 1992.0, 2300.0)
     dt = 0.8 / 3253.0
 
@@ -181,8 +188,9 @@ def test_concrete_on_steel():
 
 
 def test_concrete_in_concrete():
-    """V7.3: coarse (4 elements along the box): energy at 20 ms within 1.5 % (friction 2.7 %) of finite elements on 40
-    cells, shares of the walls, work of friction; both bodies' energies are what load and friction leave."""
+    """V7.3: coarse (4 elements along the box): energy at 20 ms within 1.5 % (friction 2.7 %) of
+    finite elements on 40 cells, shares of the walls, work of friction; both bodies' energies are
+    what load and friction leave."""
     concrete = vc.LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0)
     box = embedded_problem(
         4, concrete, dt=1.0 / 3253.0, steps=65, pressure=lambda t: 4e6 * math.tanh((t / 0.015) ** 2)
@@ -206,8 +214,9 @@ def test_concrete_in_concrete():
 
 
 def test_tennis_ball():
-    """V7.3, B8: 40 elements, gentle push: released at 2.7, then no force, energy constant to round-off; momentum is the
-    slope of the mean displacement; the plane's work is the energy; friction lowers speed and energy, slightly."""
+    """V7.3, B8: 40 elements, gentle push: released at 2.7, then no force, energy constant to
+    round-off; momentum is the slope of the mean displacement; the plane's work is the energy;
+    friction lowers speed and energy, slightly."""
     problem = disk_problem(
         40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=102, radius=0.5
     )

@@ -1,7 +1,7 @@
 """V4.2: the buried channel of seed 000 (second example, Figs. 6-9).
 
-The text has no numbers: an independent program (channel_reference.py) gives them for the same data, and the statements
-of the figures are checked.
+The text has no numbers: an independent program (channel_reference.py) gives them for the same data,
+and the statements of the figures are checked.
 """
 
 from __future__ import annotations
@@ -37,12 +37,13 @@ def gap_at(history: Any, number: int, normal: tuple[float, float]) -> Array:
     return np.asarray(history["gap"])[:, slot]
 
 
-# Numbers --------------------------------------------------------------------------------------------------------------
+# Numbers
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_v4_2_same_as_an_independent_program():
-    """Displacements of the bottom corners and all openings, every one of 400 steps, to 1e-10 of the largest (asked:
-    1e-5 over 40 steps)."""
+    """Displacements of the bottom corners and all openings, every one of 400 steps, to 1e-10 of the
+    largest (asked: 1e-5 over 40 steps)."""
     openings, corners = channel_reference.run(400)
     history = shaken("sliding").history
     found = np.column_stack([history[name] for name in ("u_x_1", "u_y_1", "u_x_7", "u_y_7")])
@@ -61,8 +62,8 @@ def test_v4_2_same_as_an_independent_program():
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing", "bilateral"])
 def test_v4_2_certificates_and_ledger(contact):
-    """V9.7: every step to 1e-9, ledger to 1e-10; the step and the M-orthogonal impact rule create no energy (V9.1,
-    V9.6)."""
+    """V9.7: every step to 1e-9, ledger to 1e-10; the step and the M-orthogonal impact rule create
+    no energy (V9.1, V9.6)."""
     solution = shaken(contact)
     facts, history = solution.facts, solution.history
     assert (
@@ -78,7 +79,8 @@ def test_v4_2_certificates_and_ledger(contact):
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
 def test_v4_2_both_routes(friction):
-    """The volume route, which shares A and b only, gives the same step from the same state, to 1e-9."""
+    """The volume route, which shares A and b only, gives the same step from the same state, to
+    1e-9."""
     problem = model().problem(friction=friction)
     start = vc.static_equilibrium(problem, solver=vc.Condensed())
     steps = 40 if friction is None else 7
@@ -88,12 +90,13 @@ def test_v4_2_both_routes(friction):
     assert checked.worst < 1e-9
 
 
-# Statements -----------------------------------------------------------------------------------------------------------
+# Statements
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_fig_7_openings():
-    """Channel minus soil along the outward normal: never negative, on both walls in turn. The two tops are open
-    together in less than 5 % of the steps (found: 4 %), both whole walls in 1 %."""
+    """Channel minus soil along the outward normal: never negative, on both walls in turn. The two
+    tops are open together in less than 5 % of the steps (found: 4 %), both whole walls in 1 %."""
     history, sides = shaken("sliding").history, model().sides
     gap = np.asarray(history["gap"])
     assert gap.min() == 0.0
@@ -126,8 +129,9 @@ def test_fig_8_rocking():
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing"])
 def test_mirror_symmetry(contact):
-    """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to the run's round-off, that a change of the shaking by a last digit
-    shows: 1e-12 of the largest displacement. Mirrored runs differ by 0.4 to 2 times that, by processor and release."""
+    """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to the run's round-off, that a change of the shaking
+    by a last digit shows: 1e-12 of the largest displacement. Mirrored runs differ by 0.4 to 2 times
+    that, by processor and release."""
     one, two = shaken(contact).history, shaken(contact, amplitude=-2.0).history
     last_digit = shaken(contact, amplitude=np.nextafter(2.0, 3.0)).history
     round_off = max(
@@ -149,8 +153,8 @@ def test_mirror_symmetry(contact):
 
 
 def test_fig_9_unilateral_and_bilateral():
-    """The unilateral motion leaves the bilateral one step by step, and the corners move more in both directions:
-    vertically more than twice as much."""
+    """The unilateral motion leaves the bilateral one step by step, and the corners move more in
+    both directions: vertically more than twice as much."""
     uni, bi = shaken("sliding").history, shaken("bilateral").history
     for name, more in (("u_x_1", 1.02), ("u_y_1", 2.0), ("u_y_7", 2.0), ("u_y_19", 1.5)):
         assert np.ptp(uni[name]) > more * np.ptp(bi[name]), name
@@ -161,8 +165,9 @@ def test_fig_9_unilateral_and_bilateral():
 
 
 def test_fig_9_the_same_before_the_first_gap():
-    """Held where the weight closes the contact, the bilateral run is the unilateral one until another gap opens, then
-    no longer; held everywhere it is nearly. (The weight alone opens the walls a little at the corners.)"""
+    """Held where the weight closes the contact, the bilateral run is the unilateral one until
+    another gap opens, then no longer; held everywhere it is nearly. (The weight alone opens the
+    walls a little at the corners.)"""
     one, uni, bi = model(), shaken("sliding").history, shaken("bilateral").history
     active = np.asarray(uni["active"]) > 0
     first = int(np.argmax(np.any(active != active[0], axis=1)))
@@ -178,7 +183,8 @@ def test_fig_9_the_same_before_the_first_gap():
     assert np.abs(uni["u_x_19"][:21] - held["u_x_19"]).max() > 0.01 * size
 
 
-# Frames, rest, restart ------------------------------------------------------------------------------------------------
+# Frames, rest, restart
+# ------------------------------------------------------------------------------------------------
 
 VERTICAL = vc.Harmonic(1.0, 3.0, direction=(0.0, 1.0))
 
@@ -189,7 +195,8 @@ VERTICAL = vc.Harmonic(1.0, 3.0, direction=(0.0, 1.0))
     ids=["sliding", "rubbing, vertical motion too"],
 )
 def test_frame_invariance(friction, excitation):
-    """An inertia load in the frame of the bedrock and a moved bedrock: the same contact forces, to 1e-8."""
+    """An inertia load in the frame of the bedrock and a moved bedrock: the same contact forces, to
+    1e-8."""
     one = model()
     relative = follow(one, one.problem(friction=friction, excitation=excitation), 120).history
     absolute = moved(excitation, 120, friction=friction).history
@@ -203,9 +210,10 @@ def test_frame_invariance(friction, excitation):
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
 def test_one_quiet_second_after_gravity(friction):
-    """Nothing moves by more than rounding moves the static solution: 2.2e-16 times the condition number of the
-    stiffness, 1.0e4 scaled by its diagonal and without rigid motions, is 2.3e-12 of the largest displacement, and the
-    bound is twice that. Found: 0.3e-12 to 1.1e-12, by processor and release."""
+    """Nothing moves by more than rounding moves the static solution: 2.2e-16 times the condition
+    number of the stiffness, 1.0e4 scaled by its diagonal and without rigid motions, is 2.3e-12 of
+    the largest displacement, and the bound is twice that. Found: 0.3e-12 to 1.1e-12, by processor
+    and release."""
     one = model()
     history = follow(one, one.problem(friction=friction, excitation=()), 80).history
     for name in displacements(history):

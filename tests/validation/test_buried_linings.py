@@ -1,4 +1,5 @@
-"""Linings in sheared ground, S3.4 and S3.5: racking of a box, and a tunnel that may slide in its hole."""
+"""Linings in sheared ground, S3.4 and S3.5: racking of a box, and a tunnel that may slide in its
+hole."""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ def sheared(
     held: bool = True,
     gamma: float = GAMMA,
 ) -> tuple[ContactProblem, State]:
-    """The tunnel in ground that is stretched along x and pressed along y by gamma/2, under a pressure beforehand."""
+    """The tunnel in ground that is stretched along x and pressed along y by gamma/2, under a
+    pressure beforehand."""
     rings: Any = Rings(INNER, OUTER, FAR, divisions)
     mesh, tags = fem.build_mesh(
         rings if slip else Welded(rings, "lining_out", "soil_in"), MPI.COMM_SELF
@@ -64,7 +66,8 @@ def diameter_change(problem: ContactProblem, state: State) -> float:
 
 @pytest.mark.parametrize(("slip", "published"), [(True, 6.61e-3), (False, None)])
 def test_tunnel_in_sheared_ground(slip: bool, published: float | None):
-    """Within 1 % of the plane-strain solution; the formula for thin shells is 5 % off that (thickness R/10)."""
+    """Within 1 % of the plane-strain solution; the formula for thin shells is 5 % off that
+    (thickness R/10)."""
     exact = ThickLining(INNER, OUTER, CONCRETE, SOIL, slip)
     problem, state = sheared(slip, FINE)
     changed = diameter_change(problem, state)
@@ -83,7 +86,8 @@ def test_tunnel_in_sheared_ground(slip: bool, published: float | None):
 
 
 def test_tunnel_under_pressure_keeps_contact():
-    """Under a pressure beforehand the unilateral answer is the bilateral one; without it the ground lets go."""
+    """Under a pressure beforehand the unilateral answer is the bilateral one; without it the ground
+    lets go."""
     exact = ThickLining(INNER, OUTER, CONCRETE, SOIL)
     bilateral = diameter_change(*sheared(True, COARSE))
     pressed = 3.0 * exact.pressure(GAMMA)
@@ -98,7 +102,8 @@ def test_tunnel_under_pressure_keeps_contact():
 
 @pytest.mark.parametrize(("flexibility", "published"), [(0.1, 0.149), (1.0, 0.937)])
 def test_racking_of_a_tied_box(flexibility: float, published: float):
-    """2 % of the published finite elements, whose frame is a line: extrapolated to no thickness; formula 15 %."""
+    """2 % of the published finite elements, whose frame is a line: extrapolated to no thickness;
+    formula 15 %."""
     thick = racking(LinedBox(6.0, 4.0, 0.4, 0.05, slip=False), flexibility)
     thin = racking(LinedBox(6.0, 4.0, 0.2, 0.025, slip=False), flexibility)
     assert 2.0 * thin - thick == pytest.approx(published, rel=0.02)
@@ -107,7 +112,8 @@ def test_racking_of_a_tied_box(flexibility: float, published: float):
 
 
 def test_racking_of_a_box_that_may_slide():
-    """Frictionless and bilateral: 2 % of the published value, below that of the tied box, formula 15 %."""
+    """Frictionless and bilateral: 2 % of the published value, below that of the tied box, formula
+    15 %."""
     box = LinedBox(6.0, 4.0, 0.2, 0.025, slip=True)
     sliding = racking(box, 1.0)
     assert sliding == pytest.approx(0.891, rel=0.02)

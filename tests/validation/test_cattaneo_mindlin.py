@@ -1,17 +1,20 @@
-"""V2.4: partial slip of a Hertz contact under a tangential load (Cattaneo 1938, Mindlin 1949), in the plane.
+"""V2.4: partial slip of a Hertz contact under a tangential load (Cattaneo 1938, Mindlin 1949), in
+the plane.
 
     q = mu p0 [√(1 - x²/a²) - (c/a) √(1 - x²/c²)],   c = a √(1 - Q/(mu P)),   no slip on |x| < c
 
-The normal load comes first, without friction; then Q grows. Taken back from Q* to Q, slip the other way comes in from
-the edges as far as c' = a √(1 - (Q* - Q)/(2 mu P)), and q = q(Q*) - 2 q((Q* - Q)/2) (Mindlin and Deresiewicz 1953).
+The normal load comes first, without friction; then Q grows. Taken back from Q* to Q, slip the other
+way comes in from the edges as far as c' = a √(1 - (Q* - Q)/(2 mu P)), and q = q(Q*) - 2 q((Q* -
+Q)/2) (Mindlin and Deresiewicz 1953).
 
-That is exact for two equal bodies, on which shear does not change the pressure: the mirrored pair. One body (nu = 0.3)
-on a rigid parabola is close to it: shear moves its surface up on one side and down on the other, which changes the
-pressure by up to 3 % of p0 away from the edge and q by up to 4 % of mu p0, as measured: no error of the method. nu near
-1/2 would decouple the two, but Q1 locks: on this mesh p0 is 2 % wrong at nu = 0.49, 16 % at 0.499.
+That is exact for two equal bodies, on which shear does not change the pressure: the mirrored pair.
+One body (nu = 0.3) on a rigid parabola is close to it: shear moves its surface up on one side and
+down on the other, which changes the pressure by up to 3 % of p0 away from the edge and q by up to 4
+% of mu p0, as measured: no error of the method. nu near 1/2 would decouple the two, but Q1 locks:
+on this mesh p0 is 2 % wrong at nu = 0.49, 16 % at 0.499.
 
-The block is 20 a wide on either side and as deep. Uniform shear on its top and sides carries Q without moment; contact
-alone holds it.
+The block is 20 a wide on either side and as deep. Uniform shear on its top and sides carries Q
+without moment; contact alone holds it.
 """
 
 from __future__ import annotations
@@ -73,7 +76,8 @@ def graded(h: float, *, side: float = 1.0) -> BlockMesh:
 
 
 def tractions(tags: Any, history: History, *, body: str = "", side: float = 1.0) -> list[Traction]:
-    """P on the block, or its mirror image, and history(t) mu P; the image is pulled the other way."""
+    """P on the block, or its mirror image, and history(t) mu P; the image is pulled the other
+    way."""
     far, p = "top" if side > 0.0 else "bottom", HERTZ.force / (40.0 * A)
     shear = [(far, (side * MU * p, 0.0)), ("right", (0.0, MU * p)), ("left", (0.0, -MU * p))]
     return [Traction(tags[body + far], (0.0, -side * p))] + [
@@ -91,7 +95,8 @@ def material(bodies: int) -> LinearElastic:
 
 
 def sheared(history: History, *, comm: Any = COMM) -> ContactProblem:
-    """The block under P, without friction, on a rigid parabola; its tangential load is history(t) mu P."""
+    """The block under P, without friction, on a rigid parabola; its tangential load is history(t)
+    mu P."""
     mesh, tags = build_mesh(graded(H), comm)
     system = assemble(mesh, material(1), loads=tractions(tags, history))
     return ContactProblem(
@@ -173,7 +178,8 @@ def shear_error(found: Contact, share: float) -> float:
 
 
 def check_first_loading(found: Contact, share: float, h: float = H) -> None:
-    """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 1e-9 (asked: 1e-6)."""
+    """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 1e-9 (asked:
+    1e-6)."""
     stick, slip, c = found.sticking(), found.slips(1.0), A * np.sqrt(1.0 - share)
     assert abs(stick[0] + c) < h and abs(stick[-1] - c) < h
     assert (
@@ -199,7 +205,8 @@ def cyclic_load(t: float) -> float:
 
 @pytest.mark.serial
 def test_v2_4_the_exact_solution():
-    """c / a = 0.866025, 0.707107, 0.5, 0.316228 (printed digits); q carries Q; p is what it was where all slips."""
+    """c / a = 0.866025, 0.707107, 0.5, 0.316228 (printed digits); q carries Q; p is what it was
+    where all slips."""
     x = np.linspace(-A, A, 200001)
     for share, ratio in zip(SHARES, (0.866025, 0.707107, 0.5, 0.316228), strict=True):
         assert np.sqrt(1.0 - share) == pytest.approx(ratio, abs=5e-7)
@@ -211,8 +218,9 @@ def test_v2_4_the_exact_solution():
 
 @pytest.mark.serial
 def test_v2_4_mirrored_pair():
-    """Equal bodies: shear does not change the pressure and q is even (to 1e-9 P at every node); q to 5 % in L2 on 11.3
-    cells across a, and on meshes twice as fine less than half of that in the mean over Q."""
+    """Equal bodies: shear does not change the pressure and q is even (to 1e-9 P at every node); q
+    to 5 % in L2 on 11.3 cells across a, and on meshes twice as fine less than half of that in the
+    mean over Q."""
     errors = []
     for h in (H, 0.5 * H):
         found = stages(mirrored_pair(growing_load, h=h), SHARES)
@@ -229,9 +237,9 @@ def test_v2_4_mirrored_pair():
 
 @pytest.mark.serial
 def test_v2_4_unloading_and_reloading():
-    """A cycle of the pair: after each turn q is that of the turn less, or more, 2 q(|Q* - Q|/2) of a first loading
-    (nodal forces to 1e-9 P), slip the other way reaches to c' (h), the loop is closed after one round, and increments
-    change nothing."""
+    """A cycle of the pair: after each turn q is that of the turn less, or more, 2 q(|Q* - Q|/2) of
+    a first loading (nodal forces to 1e-9 P), slip the other way reaches to c' (h), the loop is
+    closed after one round, and increments change nothing."""
     top = CYCLE[1]
 
     @cache
@@ -255,8 +263,9 @@ def test_v2_4_unloading_and_reloading():
 
 @pytest.mark.serial
 def test_v2_4_one_body():
-    """On a rigid parabola, any number of ranks: c to h, Q and P to 1e-9; q within 4 % of mu p0 and p within 3 % of p0
-    at |x| < a - 1.5 h. In one step or four: nodal forces to 1e-9 P, the tolerance of the certificate."""
+    """On a rigid parabola, any number of ranks: c to h, Q and P to 1e-9; q within 4 % of mu p0 and
+    p within 3 % of p0 at |x| < a - 1.5 h. In one step or four: nodal forces to 1e-9 P, the
+    tolerance of the certificate."""
     found = stages(sheared(growing_load), SHARES)
     inner = np.abs(found[0].x) < A - 1.5 * H
     for share, contact in zip(SHARES, found, strict=True):
@@ -275,7 +284,8 @@ def test_v2_4_one_body():
 
 @pytest.mark.serial
 def test_v2_4_one_body_reversed():
-    """Turned from Q* to -Q* nothing is left of the first way: the mirror image, to 1e-9 P. Back at Q* the loop closes."""
+    """Turned from Q* to -Q* nothing is left of the first way: the mirror image, to 1e-9 P. Back at
+    Q* the loop closes."""
     found = stages(sheared(cyclic_load), range(1, 7))
     there, turned_round, again = found[0], found[3], found[5]
     for contact, sign in ((turned_round, -1.0), (again, 1.0)):

@@ -39,7 +39,8 @@ LAYER = WALL | {"nu": 0.3, "c_s": C_S}
 def shaken(
     length: float, cells: int, f: float, periods: float, amplitude: float, *, held: bool = False
 ) -> Mapping[str, Array]:
-    """A layer on rock between a smooth wall, on its left, and a side that holds u; rest, then a harmonic; 5 % at f."""
+    """A layer on rock between a smooth wall, on its left, and a side that holds u; rest, then a
+    harmonic; 5 % at f."""
     soil = vc.LinearElastic.from_wave_speeds(C_S * math.sqrt(3.5), C_S, 1900.0)
     mesh, tags = fem.build_mesh(
         BlockMesh(lengths=(length, HEIGHT), divisions=(round(length / HEIGHT) * cells, cells)),
@@ -70,9 +71,10 @@ def shaken(
 
 
 def test_wall_at_rest_and_under_slow_shaking():
-    """32 cells over H: 2.58 % of the rest thrust is that of the lowest half cell, which the clamped rock has (0.1 %);
-    added thrust within 0.7 % of the exact one (measured 0.2 %), its height 1.5 % (0.5 %). The formulas of yielding soil
-    stand beside them: the elastic thrust is 1.4 times Rankine's active one, and grows more than Okabe's wedge."""
+    """32 cells over H: 2.58 % of the rest thrust is that of the lowest half cell, which the clamped
+    rock has (0.1 %); added thrust within 0.7 % of the exact one (measured 0.2 %), its height 1.5 %
+    (0.5 %). The formulas of yielding soil stand beside them: the elastic thrust is 1.4 times
+    Rankine's active one, and grows more than Okabe's wedge."""
     history = shaken(2.0 * HEIGHT, 32, 0.5, 1.5, 1.0)
     rest = AtRest(**WALL, nu=0.3).compare(history)
     weight = 1900.0 * 9.80665 * HEIGHT
@@ -92,7 +94,8 @@ def test_wall_at_rest_and_under_slow_shaking():
 
 
 def test_pressed_walls_are_held_ones_and_open_walls_are_told():
-    """While all is pressed a unilateral wall is a bilateral one; beyond, the check says how much leaves the soil."""
+    """While all is pressed a unilateral wall is a bilateral one; beyond, the check says how much
+    leaves the soil."""
     free, held = (shaken(2.0 * HEIGHT, 8, 0.5, 1.5, 1.0, held=one) for one in (False, True))
     assert free["uplift_wall"].max() == 0.0
     assert np.abs(free["N_wall"] - held["N_wall"]).max() <= 1e-9 * held["N_wall"].max()
@@ -106,8 +109,9 @@ def test_pressed_walls_are_held_ones_and_open_walls_are_told():
 
 @pytest.mark.parametrize(("f", "ratio"), [(0.5, 0.943), (2.0, 0.926), (5.0, 1.145)])
 def test_veletsos_and_younan_beside_finite_elements(f: float, ratio: float):
-    """A long layer, 12 cells over H, steady harmonics at 0.13, 0.53 and 1.33 of its lowest frequency: what leaving
-    vertical stresses out costs. At 0.5 Hz Wood's is met within 2 % (0.9 %), and refused above 1.125 Hz."""
+    """A long layer, 12 cells over H, steady harmonics at 0.13, 0.53 and 1.33 of its lowest
+    frequency: what leaving vertical stresses out costs. At 0.5 Hz Wood's is met within 2 % (0.9 %),
+    and refused above 1.125 Hz."""
     history = shaken(10.0 * HEIGHT, 12, f, 1.5 if f < 1.0 else 3.0 * f, 0.5)
     assert VeletsosYounan(**LAYER).compare(history).ratio == pytest.approx(ratio, abs=0.02)
     slow = Wood(**LAYER).compare(history)
@@ -115,7 +119,8 @@ def test_veletsos_and_younan_beside_finite_elements(f: float, ratio: float):
 
 
 def test_sliding_under_a_record():
-    """A stiff block under four seconds of a synthetic motion (0.3 g, mu = 0.1): Newmark's residual slip within 3 %."""
+    """A stiff block under four seconds of a synthetic motion (0.3 g, mu = 0.1): Newmark's residual
+    slip within 3 %."""
     record = ground_motion.synthetic(
         ground_motion.KanaiTajimi(s0=0.02),
         duration=4.0,
@@ -140,8 +145,9 @@ def test_sliding_under_a_record():
 
 
 def test_rocking_released_and_shaken():
-    """A stiff block on two corners: the first landing after a release within 1 % of Housner's (measured 0.3 %), the
-    largest angle under a pulse of 1.5 times the onset for 0.35 s within 3.5 % (1.2 %)."""
+    """A stiff block on two corners: the first landing after a release within 1 % of Housner's
+    (measured 0.3 %), the largest angle under a pulse of 1.5 times the onset for 0.35 s within 3.5 %
+    (1.2 %)."""
     shape = HousnerBlock(width=0.4, height=2.0)
     material = vc.LinearElastic(E=3e10, nu=0.0, rho=2400.0)
     block = rocking.RockingBlock(shape, material, damping=vc.Rayleigh(alpha=0.0, beta=3e-4))

@@ -1,4 +1,5 @@
-"""V7.3, two bodies: concrete in concrete. What holds for any pair of bodies, the welded interface, the slow limit."""
+"""V7.3, two bodies: concrete in concrete. What holds for any pair of bodies, the welded interface,
+the slow limit."""
 
 from __future__ import annotations
 
@@ -49,8 +50,8 @@ laws = pytest.mark.parametrize("law", LAWS)
 
 @cases
 def test_certificates_and_ledger(law, scheme):
-    """V9.7: every step certified to 1e-9, the ledger closed to 1e-10; what is put in is more than what is stored by
-    what friction takes."""
+    """V9.7: every step certified to 1e-9, the ledger closed to 1e-10; what is put in is more than
+    what is stored by what friction takes."""
     problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
     solution = vc.simulate(
         problem, scheme=scheme, dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(),)
@@ -65,7 +66,8 @@ def test_certificates_and_ledger(law, scheme):
 
 
 def per_body(problem: ContactProblem, load: Array) -> Array:
-    """(body, d) resultants of a load on the unknowns of the equations: box, free part of the block."""
+    """(body, d) resultants of a load on the unknowns of the equations: box, free part of the
+    block."""
     system, bodies = problem.system, problem.system.space.bodies
     columns = [
         relative(problem, column * (bodies == body)) for body in (0, 1) for column in system.influence.T
@@ -75,8 +77,9 @@ def per_body(problem: ContactProblem, load: Array) -> Array:
 
 @cases
 def test_action_is_reaction(law, scheme):
-    """V7.3, V9.8: what the box gains in momentum beyond the impulse of the pressure, the block loses beyond the
-    impulse of its base, to 1e-12; without friction it is the sum of the reactions along the normals."""
+    """V7.3, V9.8: what the box gains in momentum beyond the impulse of the pressure, the block
+    loses beyond the impulse of its base, to 1e-12; without friction it is the sum of the reactions
+    along the normals."""
     problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
     dt, impulses, base = 2.5e-4, [], []
     for _, report in march(problem, scheme=scheme, dt=dt, steps=80):
@@ -101,7 +104,8 @@ def test_action_is_reaction(law, scheme):
 
 @dataclass(frozen=True)
 class Whole:
-    """The mesh of an `Embedded` whose block is one grid without inner interfaces, cut out at the notch."""
+    """The mesh of an `Embedded` whose block is one grid without inner interfaces, cut out at the
+    notch."""
 
     embedded: Embedded
 
@@ -126,7 +130,8 @@ class Whole:
     def _groups(
         self, points: Array, cells: Any, count: int
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Cells and boundaries by where they are, the first `count` cells being those of the box."""
+        """Cells and boundaries by where they are, the first `count` cells being those of the
+        box."""
         inside = np.arange(len(cells)) < count
         sides, owner = cell_sides(cells, "quadrilateral")
         boundaries, bodies = {}, {}
@@ -142,15 +147,16 @@ class Whole:
 
 
 def in_order(system: Any, n: int) -> Any:
-    """Order of the nodes by place, those of the box, the first (n + 1)², before those of the block."""
+    """Order of the nodes by place, those of the box, the first (n + 1)², before those of the
+    block."""
     points = np.round(field(system, system.u0)[0], 9)
     return np.lexsort((*points.T, np.arange(len(points)) >= (n + 1) ** 2))
 
 
 @laws
 def test_a_welded_interface_is_none(law):
-    """V7.3: on the block of five welded sub-meshes and on the block of one grid the motion and the reactions are the
-    same, to 1e-10."""
+    """V7.3: on the block of five welded sub-meshes and on the block of one grid the motion and the
+    reactions are the same, to 1e-10."""
     found = []
     for mesh in (None, lambda: Whole(EMBEDDED)):
         model = build(EMBEDDED, COMM, mesh=mesh)
@@ -167,8 +173,8 @@ def test_a_welded_interface_is_none(law):
 
 
 def test_much_friction_is_a_weld():
-    """V7.3: with mu = 1e6 nothing slips, and as nothing opens under this load either the box moves as if cast in one
-    piece with the block, to 1e-9."""
+    """V7.3: with mu = 1e6 nothing slips, and as nothing opens under this load either the box moves
+    as if cast in one piece with the block, to 1e-9."""
     model, box = build(EMBEDDED, COMM), EMBEDDED.box
     stuck = run(model.problem(friction=vc.Coulomb(1e6)), scheme=vc.Midpoint(), dt=2.5e-4, steps=60)
     assert stuck.active.all()
@@ -188,8 +194,9 @@ def test_much_friction_is_a_weld():
 
 
 def test_friction_takes_energy():
-    """V7.3: less energy, and less work put in, with friction from 2 ms on; its work never decreases; none without it.
-    Walls and floor carry the load: m a of the box apart, forces on it sum to 0."""
+    """V7.3: less energy, and less work put in, with friction from 2 ms on; its work never
+    decreases; none without it. Walls and floor carry the load: m a of the box apart, forces on it
+    sum to 0."""
     histories = {}
     for law, friction in LAWS.items():
         model = build(EMBEDDED, COMM)
@@ -218,7 +225,8 @@ def test_friction_takes_energy():
 
 @pytest.mark.parametrize(("law", "tolerance"), [("smooth", 5e-3), ("rough", 0.02)])
 def test_slow_limit(law, tolerance):
-    """The energy at 20 ms is that of the same load put on without inertia, and the load is in equilibrium there."""
+    """The energy at 20 ms is that of the same load put on without inertia, and the load is in
+    equilibrium there."""
     problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
     history = vc.simulate(
         problem, scheme=vc.Midpoint(), dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(),)
@@ -233,7 +241,8 @@ def test_slow_limit(law, tolerance):
 
 
 def test_stiff_block_and_no_lateral_strain():
-    """nu = 0 and a block 10⁴ times as stiff: the box is in uniaxial stress, E = f² a²/(2E), and the walls are bare."""
+    """nu = 0 and a block 10⁴ times as stiff: the box is in uniaxial stress, E = f² a²/(2E), and the
+    walls are bare."""
     box = replace(EMBEDDED.box, material=vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0))
     model = build(Embedded(box, block=vc.LinearElastic(E=2.0e14, nu=0.0, rho=2400.0)), COMM)
     problem = model.problem()
@@ -256,7 +265,8 @@ def test_refusals():
 
 
 def test_the_embedded_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """V7.3 in the demo, small: certified, ledgers closed, less energy with friction, figures drawn."""
+    """V7.3 in the demo, small: certified, ledgers closed, less energy with friction, figures
+    drawn."""
     numbers = demo("concrete_in_concrete").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     for name in LAWS:

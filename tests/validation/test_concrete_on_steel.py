@@ -1,4 +1,5 @@
-"""V7.2: concrete on steel against an independent script, the static solution and boundary elements."""
+"""V7.2: concrete on steel against an independent script, the static solution and boundary
+elements."""
 
 from __future__ import annotations
 
@@ -46,8 +47,8 @@ def pressed(box: Square, law: str, scheme: Any, *, dt: float, t_end: float) -> M
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("scheme", [vc.Midpoint(), None])
 def test_energies(scheme, law):
-    """V7.2, 20 x 20 cells, dt = 0.05 ms: energies to all five digits with the midpoint rule, to 1e-4 with the default
-    scheme; on steel the base sticks everywhere."""
+    """V7.2, 20 x 20 cells, dt = 0.05 ms: energies to all five digits with the midpoint rule, to
+    1e-4 with the default scheme; on steel the base sticks everywhere."""
     history = pressed(concrete(), law, scheme, dt=5e-5, t_end=0.02)
     energy = history["energy"][[100, 200, 300, 400]] / 1e6  # kg m/ms² is 1e6 J
     if scheme is None:
@@ -62,8 +63,8 @@ def test_energies(scheme, law):
 
 
 def quasi_static(history: Mapping[str, Array]) -> None:
-    """E = f²/(2E'), u_x = ½ nu (1 + nu) f/E, force f, to 0.1 %; E' = E/(1 - nu²) = 23809.8 MPa; u_x as the script has
-    it."""
+    """E = f²/(2E'), u_x = ½ nu (1 + nu) f/E, force f, to 0.1 %; E' = E/(1 - nu²) = 23809.8 MPa; u_x
+    as the script has it."""
     material = concrete().material
     f = 4e6 * np.tanh((20.0 / 15.0) ** 2)
     plane = material.E / (1.0 - material.nu**2)
@@ -82,8 +83,9 @@ def quasi_static(history: Mapping[str, Array]) -> None:
     ("law", "top", "tolerance"), [("smooth", 175.308e-6, 5e-4), ("on steel", 173.75e-6, 5e-3)]
 )
 def test_space_time_boundary_elements(law, top, tolerance):
-    """V7.2 with rho = 2300 kg/m³ at 40 ms against an independent script of space-time boundary elements: displacement
-    of the top, static to 0.05 %; with the base sticking, and stress peaks at its ends, to 0.5 %."""
+    """V7.2 with rho = 2300 kg/m³ at 40 ms against an independent script of space-time boundary
+    elements: displacement of the top, static to 0.05 %; with the base sticking, and stress peaks at
+    its ends, to 0.5 %."""
     box = concrete()
     lighter = replace(box, material=vc.LinearElastic.from_wave_speeds(3253.0, 1992.0, 2300.0))
     history = pressed(lighter, law, None, dt=1e-4, t_end=0.04)
@@ -92,7 +94,8 @@ def test_space_time_boundary_elements(law, top, tolerance):
 
 @pytest.mark.serial
 def test_the_concrete_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """V7.2 with steps of 0.25 ms: certified, ledgers closed, static at the end to 1 %; figures drawn."""
+    """V7.2 with steps of 0.25 ms: certified, ledgers closed, static at the end to 1 %; figures
+    drawn."""
     numbers = demo("concrete_on_steel").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     for name in LAWS:

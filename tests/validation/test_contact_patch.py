@@ -1,18 +1,20 @@
-"""V2.1: the contact patch test. A uniform stress state is reproduced to round-off through the contact conditions.
+"""V2.1: the contact patch test. A uniform stress state is reproduced to round-off through the
+contact conditions.
 
-What is exact, and why. Displacements u = F x are in every P1 and Q1 space, whatever the mesh, and with a constant
-stress sigma the internal force of node i is sigma ∫ n phi_i over its boundary facets. Frictionless contact passes on
-forces along the nodal contact direction only, so the patch test holds on a side exactly when sigma ∫ n phi_i has that
-direction:
+What is exact, and why. Displacements u = F x are in every P1 and Q1 space, whatever the mesh, and
+with a constant stress sigma the internal force of node i is sigma ∫ n phi_i over its boundary
+facets. Frictionless contact passes on forces along the nodal contact direction only, so the patch
+test holds on a side exactly when sigma ∫ n phi_i has that direction:
 
-* flat sides: ∫ n phi_i = n weight_i. Uniaxial compression across the side, pressure r_n / weight = p at every node;
-* curved sides: the nodal normal is by definition the direction of ∫ n phi_i, and sigma = -p I makes every traction
-  normal: r_n = p |∫ n phi_i| at every node. That is the consistent force of the pressure p on the polygonal side. It is
-  smaller than p weight_i by the cosine of half the angle between neighbouring facets, so that r_n / weight is p only up
-  to O(h²) there.
+* flat sides: ∫ n phi_i = n weight_i. Uniaxial compression across the side, pressure r_n / weight =
+  p at every node;
+* curved sides: the nodal normal is by definition the direction of ∫ n phi_i, and sigma = -p I makes
+  every traction normal: r_n = p |∫ n phi_i| at every node. That is the consistent force of the
+  pressure p on the polygonal side. It is smaller than p weight_i by the cosine of half the angle
+  between neighbouring facets, so that r_n / weight is p only up to O(h²) there.
 
-Rigid motions are held by exact displacements of some other side (whose nodes are then no contact nodes). Bodies that
-contact alone holds: test_static.py.
+Rigid motions are held by exact displacements of some other side (whose nodes are then no contact
+nodes). Bodies that contact alone holds: test_static.py.
 """
 
 from __future__ import annotations
@@ -83,10 +85,11 @@ def solved(problem: ContactProblem, solver: Any) -> tuple[State, Array, Array]:
 @dimensions
 @shapes
 def test_v2_1_flat_side(simplices, d, solver):
-    """Distorted mesh on a level plane, pressed down at its top, rollers on one side per lateral direction, else free.
+    """Distorted mesh on a level plane, pressed down at its top, rollers on one side per lateral
+    direction, else free.
 
-    sigma_yy = -p, u_y = -p y / E', u_x = nu p (1 + nu) x / E in plane strain (E' = E/(1 - nu²)), -p y/E and nu p x/E in
-    3D; pressure p at every node, all to 1e-12.
+    sigma_yy = -p, u_y = -p y / E', u_x = nu p (1 + nu) x / E in plane strain (E' = E/(1 - nu²)), -p
+    y/E and nu p x/E in 3D; pressure p at every node, all to 1e-12.
     """
     lengths, divisions = PLANE if d == 2 else SPACE
     mesh, tags = block(
@@ -119,8 +122,8 @@ def test_v2_1_flat_side(simplices, d, solver):
 @shapes
 @pytest.mark.parametrize("angle", [pi / 6.0, -2.0])
 def test_v2_1_turned_side(angle, simplices, d, solver):
-    """The same state turned by 30 degrees (and by -2 rad), pressed by a traction on its top, exact displacements on the
-    left, every other side free: displacements and pressures to 1e-12."""
+    """The same state turned by 30 degrees (and by -2 rad), pressed by a traction on its top, exact
+    displacements on the left, every other side free: displacements and pressures to 1e-12."""
     lengths, divisions = PLANE if d == 2 else SPACE
     mesh, tags = block(
         COMM,
@@ -158,7 +161,8 @@ def test_v2_1_turned_side(angle, simplices, d, solver):
 
 
 def shrunk(x: Array) -> Array:
-    """u of sigma = -p I (in plane strain in the plane only), about a point below the body: the bottom moves down."""
+    """u of sigma = -p I (in plane strain in the plane only), about a point below the body: the
+    bottom moves down."""
     nu = STEEL.nu
     bulk = (1.0 + nu) * (1.0 - 2.0 * nu) if x.shape[1] == 2 else 1.0 - 2.0 * nu
     return -P * bulk / STEEL.E * (x - np.array([1.0, -4.0, 0.75])[: x.shape[1]])
@@ -178,7 +182,8 @@ def pressed_sides(tags: Any, d: int, names: tuple[str, ...]) -> list[Traction]:
 
 
 class Fitted:
-    """An obstacle that the boundary reaches exactly when it shrinks: gap0 = u(x)·n along the body's own normals."""
+    """An obstacle that the boundary reaches exactly when it shrinks: gap0 = u(x)·n along the body's
+    own normals."""
 
     def directions(self, points: Array, normals: Array) -> Array:
         return normals
@@ -188,7 +193,8 @@ class Fitted:
 
 
 def bulged(x: Array) -> Array:
-    """The bottom bent downwards to a smooth curve (in 3D a doubly curved, asymmetric bulge), the other sides plane."""
+    """The bottom bent downwards to a smooth curve (in 3D a doubly curved, asymmetric bulge), the
+    other sides plane."""
     depth = 0.2 * np.sin(pi * x[:, 0] / 2.0)
     if x.shape[1] == 3:
         depth = depth * (1.0 + 0.5 * np.cos(2.0 * x[:, 2]))
@@ -201,10 +207,12 @@ def bulged(x: Array) -> Array:
 @dimensions
 @shapes
 def test_v2_1_curved_side(simplices, d, solver):
-    """sigma = -p I on a body with a curved side: displacements exact, r_n = p |∫ n phi_i|, no force along the side.
+    """sigma = -p I on a body with a curved side: displacements exact, r_n = p |∫ n phi_i|, no force
+    along the side.
 
-    All to 1e-12. The normals of the polygon are found here from its nodes (2D: half the chord between the neighbours);
-    r_n / weight is below p by the cosine of half the angle between facets, 2 % on this mesh.
+    All to 1e-12. The normals of the polygon are found here from its nodes (2D: half the chord
+    between the neighbours); r_n / weight is below p by the cosine of half the angle between facets,
+    2 % on this mesh.
     """
     lengths, divisions = PLANE if d == 2 else SPACE
     mesh, tags = block(
@@ -231,9 +239,10 @@ def test_v2_1_curved_side(simplices, d, solver):
 @dimensions
 @shapes
 def test_v2_1_forces_of_the_curved_side(simplices, d):
-    """The same state on the body without any support: K u - f vanishes inside and on the pressed sides; at every node
-    of the curved side, its ends included, it is a push along the nodal normal. The pushes sum to p times the projected
-    area; sideways they balance the plane sides (in 3D front and back differ in area)."""
+    """The same state on the body without any support: K u - f vanishes inside and on the pressed
+    sides; at every node of the curved side, its ends included, it is a push along the nodal normal.
+    The pushes sum to p times the projected area; sideways they balance the plane sides (in 3D front
+    and back differ in area)."""
     lengths, divisions = PLANE if d == 2 else SPACE
     mesh, tags = block(
         COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=bulged

@@ -1,4 +1,5 @@
-"""A step with contact is the sum of two structures without it (V8.11; boundary method, eqs. 34 to 36), and figures."""
+"""A step with contact is the sum of two structures without it (V8.11; boundary method, eqs. 34 to
+36), and figures."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from demos.problems.wall import CASES, Wall, build
 
 @pytest.mark.serial
 def test_loads_and_reactions_add_up_to_the_step(comm: Any, shared_tmp: Path) -> None:
-    """Step 30 of case b presses most: u = u_1 + u_2 at every node; only u_2 knows reactions, and u_1 goes too far."""
+    """Step 30 of case b presses most: u = u_1 + u_2 at every node; only u_2 knows reactions, and
+    u_1 goes too far."""
     wall = Wall()
     model = build(wall, comm, base_inertia="catalogue")
     problem = model.problem("b")

@@ -1,4 +1,5 @@
-"""Errors of both forms of the Poincaré-Steklov operator against the finest symmetric solution, and their slopes."""
+"""Errors of both forms of the Poincaré-Steklov operator against the finest symmetric solution, and
+their slopes."""
 
 from __future__ import annotations
 
@@ -31,9 +32,10 @@ pytestmark = pytest.mark.serial
 def test_squared_energy_errors_decay_with_similar_slope(
     tmp_path: Path, name, support, slopes, apart
 ):
-    """B12: the statement of [13] on 3 and 6 elements a side against 12: errors within 15 % of each other, slopes within
-    0.15; the forms differ by a hundredth of the error where the mesh is the finest. Measured: 1.02 and 1.04, 1.25 and
-    1.36 here; 1.3 and 1.4 on finer meshes (docs/theory/bem.md)."""
+    """B12: the statement of [13] on 3 and 6 elements a side against 12: errors within 15 % of each
+    other, slopes within 0.15; the forms differ by a hundredth of the error where the mesh is the
+    finest. Measured: 1.02 and 1.04, 1.25 and 1.36 here; 1.3 and 1.4 on finer meshes
+    (docs/theory/bem.md)."""
     rows = measure(name, (3, 6, 12), support)
     found = {(row["form"], row["k"]): row for row in rows}
     assert len(found) == 5 and {row["case"] for row in rows} == {f"{name}, {support}"}
@@ -53,7 +55,8 @@ def test_squared_energy_errors_decay_with_similar_slope(
 
 
 def test_a_large_reference_is_solved_on_the_circle_of_frequencies(monkeypatch):
-    """Errors of both forms are those against the marched reference; the forms are not compared on the last level."""
+    """Errors of both forms are those against the marched reference; the forms are not compared on
+    the last level."""
     marched = measure("square", (2, 4, 8), "no friction")
     monkeypatch.setattr("demos.problems.error_of_forms.MARCHED", 4)
     circled = measure("square", (2, 4, 8), "no friction")
@@ -66,8 +69,8 @@ def test_a_large_reference_is_solved_on_the_circle_of_frequencies(monkeypatch):
 
 
 def test_the_energy_norm_is_the_work_of_the_solution():
-    """The norm of the symmetric solution is the sum of its energies; that of what is linear between nodes and times is
-    the same on the finer mesh."""
+    """The norm of the symmetric solution is the sum of its energies; that of what is linear between
+    nodes and times is the same on the finer mesh."""
     found = Solutions()
     example = EXAMPLES["square"].only("rollers")
     operator = example.operator(4)
@@ -88,8 +91,8 @@ def test_the_energy_norm_is_the_work_of_the_solution():
 
 @pytest.mark.parametrize("along", [False, True])
 def test_the_error_of_the_reference(along):
-    """It is exact where differences fall by a constant factor, whether they are perpendicular to each other (sums of
-    squares) or point the same way (Richardson's extrapolation)."""
+    """It is exact where differences fall by a constant factor, whether they are perpendicular to
+    each other (sums of squares) or point the same way (Richardson's extrapolation)."""
     q, size = 0.6, 40
     parts = np.zeros((size, size)) if along else np.diag(q ** np.arange(size))
     if along:

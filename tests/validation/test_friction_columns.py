@@ -1,6 +1,7 @@
 """Columns and a mass that rub on their base, against exact solutions: V1.5, V1.6, V2.7 (iii).
 
-Each with the midpoint rule on consistent mass and with the trapezoidal rule on redistributed mass; errors fall with h.
+Each with the midpoint rule on consistent mass and with the trapezoidal rule on redistributed mass;
+errors fall with h.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ N, DT = 100, 5e-3
 def history(
     problem: ContactProblem, scheme: Any, *, t_end: float, dt: float = DT, **solver: Any
 ) -> dict[str, Any]:
-    """The history, once every step is certified and the ledger (V9.7) with friction in it closes."""
+    """The history, once every step is certified and the ledger (V9.7) with friction in it
+    closes."""
     found = dict(
         simulate(
             problem,
@@ -57,7 +59,8 @@ def history(
 
 
 def impulses(found: dict[str, Any], scheme: Any) -> tuple[float, float]:
-    """Normal (up) and tangential impulse of the base on the column: means of the step, or the trapezoidal rule."""
+    """Normal (up) and tangential impulse of the base on the column: means of the step, or the
+    trapezoidal rule."""
     forces = [found["contact_force_y"], found["friction_force_x"]]
     ends = [0.5 * force[0] if isinstance(scheme, Trapezoidal) else 0.0 for force in forces]
     return tuple(
@@ -67,7 +70,8 @@ def impulses(found: dict[str, Any], scheme: Any) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("scheme", "mass"), PAIRS, ids=NAMES)
 def test_V15_oblique_impact(scheme: Any, mass: Any) -> None:
-    """V1.5: slip speed 0.575736 during the contact, impulses (2.0, -0.6), friction work 0.345442, energy 0.654558."""
+    """V1.5: slip speed 0.575736 during the contact, impulses (2.0, -0.6), friction work 0.345442,
+    energy 0.654558."""
     exact = ObliqueImpact(height=1.0, material=UNIT, speed_n=1.0, speed_t=1.0, mu=0.3)
     assert exact.slip_speed == pytest.approx(0.575736, abs=1e-6)
     assert exact.friction_work == pytest.approx(0.345442, abs=1e-6)
@@ -90,8 +94,8 @@ def test_V15_oblique_impact(scheme: Any, mass: Any) -> None:
 
 @pytest.mark.parametrize(("scheme", "mass"), PAIRS, ids=NAMES)
 def test_V15_sticks_under_much_friction(scheme: Any, mass: Any) -> None:
-    """V1.5 with mu = 1.5: the base sticks at once; the traction is rho c_S v_t and no friction work is done but by the
-    first step, in which the node of the base is stopped."""
+    """V1.5 with mu = 1.5: the base sticks at once; the traction is rho c_S v_t and no friction work
+    is done but by the first step, in which the node of the base is stopped."""
     exact = ObliqueImpact(height=1.0, material=UNIT, speed_n=1.0, speed_t=1.0, mu=1.5)
     assert exact.slip_speed == 0.0
     found = history(column(N, v0=(1.0, -1.0), friction=Coulomb(1.5), mass=mass), scheme, t_end=1.3)
@@ -103,7 +107,8 @@ def test_V15_sticks_under_much_friction(scheme: Any, mass: Any) -> None:
 
 @pytest.mark.parametrize(("scheme", "mass"), PAIRS, ids=NAMES)
 def test_V16_slides_to_rest(scheme: Any, mass: Any) -> None:
-    """V1.6: slip speeds 0.85, 0.55, 0.25 for two seconds each, stick at t = 6 for good; slip 3.3, work 0.495."""
+    """V1.6: slip speeds 0.85, 0.55, 0.25 for two seconds each, stick at t = 6 for good; slip 3.3,
+    work 0.495."""
     exact = ShearColumn(height=1.0, material=UNIT, speed=1.0, tau_y=0.15)
     assert exact.slip_speeds == pytest.approx(
         [0.85, 0.55, 0.25]
@@ -137,7 +142,8 @@ def test_V15_other_methods_agree(method: Any) -> None:
 
 @pytest.mark.parametrize("friction", [Coulomb(1.0), Tresca(1.0)], ids=repr)
 def test_V27_friction_oscillator(friction: Any) -> None:
-    """V2.7 (iii): M = 1, K = 1e4, mu N = 1, u0 = 0.85 mm: turns at -0.65, 0.45, -0.25, 0.05 mm, then sticks."""
+    """V2.7 (iii): M = 1, K = 1e4, mu N = 1, u0 = 0.85 mm: turns at -0.65, 0.45, -0.25, 0.05 mm,
+    then sticks."""
     half = np.pi / 100.0
     found = history(
         rubbing_mass(u0=0.85e-3, friction=friction, mass=ConsistentMass()),

@@ -1,8 +1,10 @@
-"""V2.7 (i), (ii): a block under the pressure p sheared with 0.99 mu p sticks, with 1.01 mu p it has no equilibrium.
+"""V2.7 (i), (ii): a block under the pressure p sheared with 0.99 mu p sticks, with 1.01 mu p it has
+no equilibrium.
 
-Tractions on all free sides make the stress uniform (sigma_xy = q, sigma_yy = -p) in a material without lateral
-contraction; the block does not rotate and u_x = q y / G, u_y = -p y / E exactly, at every node of its base
-r_n = p weight, r_t = q weight: a patch test of friction. Nothing but contact holds the block.
+Tractions on all free sides make the stress uniform (sigma_xy = q, sigma_yy = -p) in a material
+without lateral contraction; the block does not rotate and u_x = q y / G, u_y = -p y / E exactly, at
+every node of its base r_n = p weight, r_t = q weight: a patch test of friction. Nothing but contact
+holds the block.
 """
 
 from __future__ import annotations
@@ -49,7 +51,8 @@ laws = pytest.mark.parametrize("law", LAWS, ids=["Coulomb", "Tresca"])
 
 
 def sheared(law: FrictionLaw, body: str, share: float, *, nu: float = 0.0) -> ContactProblem:
-    """``share`` of the threshold as shear at t = 1, in proportion to t; the pressure is there from the start."""
+    """``share`` of the threshold as shear at t = 1, in proportion to t; the pressure is there from
+    the start."""
     spec = dict(BODIES[body])
     degree = spec.pop("degree", 1)
     angle, d = float(spec.get("angle", 0.0)), len(spec["lengths"])
@@ -84,7 +87,8 @@ def thrust(problem: ContactProblem, state: State) -> Array:
 @laws
 @bodies
 def test_v2_7_below_the_threshold_sticks(body, law):
-    """0.99: no node slips, u is the uniform strain and r_t / r_n = 0.99 mu at every node, to 1e-8."""
+    """0.99: no node slips, u is the uniform strain and r_t / r_n = 0.99 mu at every node, to
+    1e-8."""
     problem = sheared(law, body, 0.99)
     state = static_equilibrium(problem, solver=Condensed(), t=1.0)
     weights = problem.surface.weights
@@ -117,7 +121,8 @@ def test_v2_7_above_the_threshold_has_no_equilibrium(body, law):
 @pytest.mark.serial
 @laws
 def test_v2_7_load_steps_end_where_the_threshold_is(law):
-    """Ten steps from 0.91 to 1.0 less 1e-6 of the threshold are equilibria, one with 1e-6 too much is not."""
+    """Ten steps from 0.91 to 1.0 less 1e-6 of the threshold are equilibria, one with 1e-6 too much
+    is not."""
     below = [*np.linspace(0.91, 0.99, 9), 1.0 - 1e-6]
     stages = quasi_static(
         sheared(law, "quadrilaterals", 1.0), [*below, 1.0 + 1e-6], solver=Condensed()
@@ -134,8 +139,8 @@ def test_v2_7_load_steps_end_where_the_threshold_is(law):
 @laws
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_v2_7_with_lateral_contraction(law, share):
-    """nu = 0.3: stresses are not uniform, part of the base slips on a small way of the order of the elastic strain
-    under 0.99, and the threshold of the whole is the same."""
+    """nu = 0.3: stresses are not uniform, part of the base slips on a small way of the order of the
+    elastic strain under 0.99, and the threshold of the whole is the same."""
     problem = sheared(law, "quadrilaterals", share, nu=0.3)
     if share > 1.0:
         with pytest.raises(InputError, match=r"carry it off along \(1, "):

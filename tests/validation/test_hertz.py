@@ -1,14 +1,17 @@
 """V2.3: Hertz contact, lines and points, against the closed form.
 
-In the plane two elastic half-planes without friction share one pressure, and the pressure bends each in proportion to
-(1 - nu²)/E: steel on aluminium is the same problem as one body of modulus E* = 1/Σ (1 - nu_i²)/E_i against a rigid
-parabola x²/2R. That is what is computed here: an elastic block with a flat side, on an obstacle that curves away.
+In the plane two elastic half-planes without friction share one pressure, and the pressure bends
+each in proportion to (1 - nu²)/E: steel on aluminium is the same problem as one body of modulus E*
+= 1/Σ (1 - nu_i²)/E_i against a rigid parabola x²/2R. That is what is computed here: an elastic
+block with a flat side, on an obstacle that curves away.
 
-The block is 30 a wide on either side and as deep, and nothing but contact holds it vertically; the load is a uniform
-pressure on its top. What the finite block changes was measured: p0 by -0.15 %, -0.03 %, 0.01 % for 16, 30, 60 a.
-The approach of a half-plane is logarithmic in its size: no test of it.
+The block is 30 a wide on either side and as deep, and nothing but contact holds it vertically; the
+load is a uniform pressure on its top. What the finite block changes was measured: p0 by -0.15 %,
+-0.03 %, 0.01 % for 16, 30, 60 a. The approach of a half-plane is logarithmic in its size: no test
+of it.
 
-In space a steel sphere lies on a rigid plane: an eighth of it, of tetrahedra, with a uniform pressure on its cut.
+In space a steel sphere lies on a rigid plane: an eighth of it, of tetrahedra, with a uniform
+pressure on its cut.
 """
 
 from __future__ import annotations
@@ -70,8 +73,8 @@ def profile_error(result: Pressed, exact: HertzLine) -> float:
 
 @pytest.mark.parametrize("name", list(SETS))
 def test_v2_3_line_contact(name):
-    """(i) steel cylinder on aluminium, (ii) unit data; 11.3 cells across a: p0 and p(a/2) to 0.2 % (asked: 2 %), P to
-    1e-9, a to h. The edge of the contact is no node."""
+    """(i) steel cylinder on aluminium, (ii) unit data; 11.3 cells across a: p0 and p(a/2) to 0.2 %
+    (asked: 2 %), P to 1e-9, a to h. The edge of the contact is no node."""
     result, exact, h = computed(name, per_a=11.3)
     assert exact.half_width == pytest.approx(SETS[name][3], rel=1e-5)
     assert exact.peak == pytest.approx(SETS[name][4], rel=1e-5)
@@ -88,8 +91,8 @@ def test_v2_3_line_contact(name):
 @pytest.mark.serial
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 def test_v2_3_pressure_converges_with_h(simplices):
-    """L2 error of the pressure: 3.9, 2.0, 1.0 % of its norm at 10, 20, 40 cells across a, order 1 because of the root
-    at the edge (2.6, 1.1, 0.4 % on triangles)."""
+    """L2 error of the pressure: 3.9, 2.0, 1.0 % of its norm at 10, 20, 40 cells across a, order 1
+    because of the root at the edge (2.6, 1.1, 0.4 % on triangles)."""
     errors = [
         profile_error(*computed("unit", per_a=n, simplices=simplices)[:2])
         for n in (10.0, 20.0, 40.0)
@@ -100,7 +103,8 @@ def test_v2_3_pressure_converges_with_h(simplices):
 
 @pytest.mark.serial
 def test_v2_3_does_not_depend_on_units():
-    """The two data sets are one problem: p / p0 at x / a agree to 1e-9, nine orders of magnitude apart in pressure."""
+    """The two data sets are one problem: p / p0 at x / a agree to 1e-9, nine orders of magnitude
+    apart in pressure."""
     one, unit = (computed(name, per_a=11.3)[:2] for name in ("NAFEMS", "unit"))
     shares = [result.pressure / exact.peak for result, exact in (one, unit)]
     assert np.abs(shares[0] - shares[1]).max() < 1e-9
@@ -113,8 +117,9 @@ SPHERE = HertzPoint(force=100.0, modulus=contact_modulus((2.1e11, 0.3)), radius=
 def point_contact(cells: int) -> dict[str, float]:
     """Relative errors of the sphere with ``cells`` cells in the contact radius.
 
-    force; peak: mean pressure over r < a/2 over that of the closed form; radius: from the second moment of the forces,
-    Σ r² r_n / Σ r_n = 2/5 a²; profile: L2 norm of the nodal pressures' error; approach: mean displacement of the cut.
+    force; peak: mean pressure over r < a/2 over that of the closed form; radius: from the second
+    moment of the forces, Σ r² r_n / Σ r_n = 2/5 a²; profile: L2 norm of the nodal pressures' error;
+    approach: mean displacement of the cut.
     """
     a, F = SPHERE.contact_radius, SPHERE.force
     ball = BallMesh(radius=SPHERE.radius, size=a / cells, foot=1.5 * a, eighth=True)
@@ -147,10 +152,10 @@ def point_contact(cells: int) -> dict[str, float]:
 
 @pytest.mark.serial
 def test_v2_3_point_contact():
-    """(iv) a steel sphere of R = 8 mm, 100 N: a = 0.1375 mm, p0 = 2525 MPa. With 5 and 10 cells across a the peak is
-    2.9 and 0.7 % off, the radius 1.8 and 0.6 %, the nodal pressures scatter by 11 and 6 %; the force is exact. The
-    approach of the cut is 4 and 3 % too small: P1 is stiff on the coarse cells far away, and R is not infinite beside
-    a."""
+    """(iv) a steel sphere of R = 8 mm, 100 N: a = 0.1375 mm, p0 = 2525 MPa. With 5 and 10 cells
+    across a the peak is 2.9 and 0.7 % off, the radius 1.8 and 0.6 %, the nodal pressures scatter by
+    11 and 6 %; the force is exact. The approach of the cut is 4 and 3 % too small: P1 is stiff on
+    the coarse cells far away, and R is not infinite beside a."""
     assert SPHERE.contact_radius == pytest.approx(1.37507e-4, rel=1e-5)
     assert SPHERE.peak == pytest.approx(2.52518e9, rel=1e-5)
     coarse, fine = point_contact(5), point_contact(10)

@@ -1,6 +1,7 @@
-"""V2.3 in space between two deformable bodies: spheres of steel pressed together, an eighth of each, on meshes that do
-not match, with a uniform pressure on the cut of one; and caps of spheres whose far sides move as the closed form says,
-so that the force is what the contact answers to an approach."""
+"""V2.3 in space between two deformable bodies: spheres of steel pressed together, an eighth of
+each, on meshes that do not match, with a uniform pressure on the cut of one; and caps of spheres
+whose far sides move as the closed form says, so that the force is what the contact answers to an
+approach."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ FORCE, RADIUS = 100.0, 8.0e-3
 
 @dataclass(frozen=True)
 class TwoBalls:
-    """The first ball above the plane y = 0, the second below it; groups "upper_foot", "lower_foot", …"""
+    """The first ball above the plane y = 0, the second below it; groups "upper_foot", "lower_foot",
+    …"""
 
     upper: BallMesh
     lower: BallMesh
@@ -60,7 +62,8 @@ class TwoBalls:
 def pressed(
     upper: int, lower: int, *, radius: float = RADIUS, swapped: bool = False
 ) -> dict[str, float]:
-    """Relative errors with so many cells in the contact radius; ``radius``: of the lower ball. As in test_hertz.py."""
+    """Relative errors with so many cells in the contact radius; ``radius``: of the lower ball. As
+    in test_hertz.py."""
     exact = HertzPoint(
         force=FORCE,
         modulus=contact_modulus(*[(STEEL.E, STEEL.nu)] * 2),
@@ -103,7 +106,8 @@ def pressed(
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_v2_3_unequal_spheres(swapped):
-    """Radii 8 and 16 mm, 5 cells across a on one side, 4 on the other: peak to 4 %, radius to 2.5 %, force 1e-12."""
+    """Radii 8 and 16 mm, 5 cells across a on one side, 4 on the other: peak to 4 %, radius to 2.5
+    %, force 1e-12."""
     found = pressed(5, 4, radius=2.0 * RADIUS, swapped=swapped)
     assert (
         abs(found["force"]) < 1e-12 and abs(found["peak"]) < 0.04 and abs(found["radius"]) < 0.025
@@ -111,8 +115,8 @@ def test_v2_3_unequal_spheres(swapped):
 
 
 def test_v2_3_two_spheres_converge():
-    """With 5 and 4, then 10 and 8 cells across a the peak is 2.9 and 0.6 % off, the radius 2.0 and 0.8 %, the nodal
-    pressures scatter by 11 and 7 %: as for the sphere on a rigid plane."""
+    """With 5 and 4, then 10 and 8 cells across a the peak is 2.9 and 0.6 % off, the radius 2.0 and
+    0.8 %, the nodal pressures scatter by 11 and 7 %: as for the sphere on a rigid plane."""
     coarse, fine = pressed(5, 4), pressed(10, 8)
     for name, bounds in {
         "peak": (0.032, 0.008),
@@ -124,15 +128,17 @@ def test_v2_3_two_spheres_converge():
 
 
 def test_v2_3_force_of_a_sphere_on_a_plane():
-    """6 cells across a, mean of twelve approaches: force 0.1 % (found 0.01), p0 0.2 % (0.04), a 0.9 % (0.3)."""
+    """6 cells across a, mean of twelve approaches: force 0.1 % (found 0.01), p0 0.2 % (0.04), a 0.9
+    % (0.3)."""
     found = hertz("plane", 6)
     assert abs(found["force"]) < 1e-3 and abs(found["peak"]) < 2e-3 and abs(found["radius"]) < 9e-3
 
 
 def test_v2_3_force_of_two_spheres():
-    """8 and 6.6 cells across a: force 0.1 % (0.03 found), p0 0.25 % (0.08), a 0.2 % (0.04). With half as many the
-    pressures are twice as wrong in L2, 4.2 and 2.0 %, order 1 because of the root at the edge; the force of one
-    approach scatters round its mean by 0.3 and 0.05 %, as the edge moves between the nodes."""
+    """8 and 6.6 cells across a: force 0.1 % (0.03 found), p0 0.25 % (0.08), a 0.2 % (0.04). With
+    half as many the pressures are twice as wrong in L2, 4.2 and 2.0 %, order 1 because of the root
+    at the edge; the force of one approach scatters round its mean by 0.3 and 0.05 %, as the edge
+    moves between the nodes."""
     coarse, fine = hertz("spheres", 4), hertz("spheres", 8)
     assert abs(fine["force"]) < 1e-3 and abs(fine["peak"]) < 2.5e-3 and abs(fine["radius"]) < 2e-3
     assert abs(coarse["force"]) < 6e-3 and 0.8 < np.log2(coarse["profile"] / fine["profile"]) < 1.3

@@ -1,9 +1,11 @@
-"""V3.3: a steel ball of 10 mm thrown at a rigid plane with 0.1 m/s, default scheme, against the quasi-static theory.
+"""V3.3: a steel ball of 10 mm thrown at a rigid plane with 0.1 m/s, default scheme, against the
+quasi-static theory.
 
-A quarter of tetrahedra with as many cells in the contact radius as in the radius of the ball. The theory is that of a
-mass on Hertz' spring; its displacement is the one of the centre of mass, for which m u'' = F holds exactly (the node at
-the centre moves by 0.02 % less). The polyhedron lacks 2.0 % of the sphere's volume with 4 cells and 0.5 % with 8: its
-own mass is put into the formulas. The contact lasts as long as twelve passages of a pressure wave through the ball.
+A quarter of tetrahedra with as many cells in the contact radius as in the radius of the ball. The
+theory is that of a mass on Hertz' spring; its displacement is the one of the centre of mass, for
+which m u'' = F holds exactly (the node at the centre moves by 0.02 % less). The polyhedron lacks
+2.0 % of the sphere's volume with 4 cells and 0.5 % with 8: its own mass is put into the formulas.
+The contact lasts as long as twelve passages of a pressure wave through the ball.
 """
 
 from __future__ import annotations
@@ -35,8 +37,9 @@ COMM = MPI.COMM_WORLD
 
 @dataclass(frozen=True)
 class Impact:
-    """Histories of the whole ball: time, height of the centre of mass over that of the first touch, its velocity,
-    force, mean force of the step, contact radius (second moment of the forces: Σ r² r_n / Σ r_n = 2/5 a²), energy."""
+    """Histories of the whole ball: time, height of the centre of mass over that of the first touch,
+    its velocity, force, mean force of the step, contact radius (second moment of the forces: Σ r²
+    r_n / Σ r_n = 2/5 a²), energy."""
 
     model: BallModel
     dt: float
@@ -110,9 +113,11 @@ FINE = pytest.mark.serial  # 15 000 unknowns: the coarse ball shows that ranks d
 
 @pytest.mark.parametrize("mesh, bar", [("coarse", 0.05), pytest.param("fine", 0.03, marks=FINE)])
 def test_v3_3_hertz_impact(mesh: str, bar: float, request: pytest.FixtureRequest) -> None:
-    """Approach, duration (a whole number of steps), largest force, its contact radius; rms of the force's history.
+    """Approach, duration (a whole number of steps), largest force, its contact radius; rms of the
+    force's history.
 
-    Measured in percent, with 4, 5, 6, 8, 10, 12 cells in the contact radius (1685 to 29 365 unknowns, 1 to 35 s):
+    Measured in percent, with 4, 5, 6, 8, 10, 12 cells in the contact radius (1685 to 29 365
+    unknowns, 1 to 35 s):
         approach  -3.3, -2.4, -1.9, -1.4, -1.1, -0.9        duration  -3.3, -2.0, -2.0, -1.5, -1.0, -1.0
         force      4.2,  2.7,  2.4,  1.6,  1.3,  1.1        radius    -0.2, -0.8, -0.1, -0.3, -0.2, -0.1
         history    4.6,  3.1,  2.5,  1.8,  1.4,  1.2        radius of Hertz for that force: -1.6 to -0.5
@@ -127,8 +132,8 @@ def test_v3_3_hertz_impact(mesh: str, bar: float, request: pytest.FixtureRequest
 
 @pytest.mark.serial
 def test_v3_3_converges(coarse: Impact, fine: Impact) -> None:
-    """Errors of order 1 in the cell size, which vanish with it: at the least 0.9 between 4 and 8 cells (measured 1.3,
-    1.4, 1.4); too stiff, as P1 is."""
+    """Errors of order 1 in the cell size, which vanish with it: at the least 0.9 between 4 and 8
+    cells (measured 1.3, 1.4, 1.4); too stiff, as P1 is."""
     for name in ("approach", "force", "force_history"):
         assert abs(fine.errors[name]) <= abs(coarse.errors[name]) * 0.5**0.9, name
     for found in (coarse, fine):
@@ -141,9 +146,10 @@ def test_v3_3_converges(coarse: Impact, fine: Impact) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize("mesh", ["coarse", pytest.param("fine", marks=FINE)])
 def test_v3_3_balances(mesh: str, request: pytest.FixtureRequest) -> None:
-    """It rebounds with 0.1 m/s within 1e-3 (measured 2e-5: hardly any vibration is left, the pulse is long); the
-    impulses are 2 m v, and the change of momentum to round-off; energy within 1e-3 (measured 1e-4), the ledger closed.
-    The force is one pulse that rises and falls with the approach: no chatter."""
+    """It rebounds with 0.1 m/s within 1e-3 (measured 2e-5: hardly any vibration is left, the pulse
+    is long); the impulses are 2 m v, and the change of momentum to round-off; energy within 1e-3
+    (measured 1e-4), the ledger closed. The force is one pulse that rises and falls with the
+    approach: no chatter."""
     found: Impact = request.getfixturevalue(mesh)
     m, v = found.model.mass, found.model.ball.speed
     energy = 0.5 * m * v**2
@@ -163,7 +169,8 @@ def test_v3_3_balances(mesh: str, request: pytest.FixtureRequest) -> None:
 
 @pytest.mark.serial
 def test_v3_3_course_of_the_theory() -> None:
-    """The closed form of d(t) and F(t) against velocity Verlet for m d'' = -F, 20 000 steps, to 1e-7."""
+    """The closed form of d(t) and F(t) against velocity Verlet for m d'' = -F, 20 000 steps, to
+    1e-7."""
     exact = Ball().impact(0.0326726)
     assert exact.approach == pytest.approx(2.813135e-6, rel=1e-6)
     assert exact.deepest.force == pytest.approx(145.18, rel=1e-4)
@@ -189,8 +196,9 @@ def test_v3_3_course_of_the_theory() -> None:
     ids=["plane", "oblique"],
 )
 def test_inertia_of_the_ball_is_kept(obstacle: object, friction: Coulomb | None) -> None:
-    """V9.4 on a curved foot: contact directions all along -y, or along normals up to 37 degrees from it. The contact
-    unknowns lose their mass; mass, centre of mass and all moments of inertia stay to 1e-12."""
+    """V9.4 on a curved foot: contact directions all along -y, or along normals up to 37 degrees
+    from it. The contact unknowns lose their mass; mass, centre of mass and all moments of inertia
+    stay to 1e-12."""
     mesh, tags = build_mesh(BallMesh(radius=0.01, size=1.2e-3, foot=6.0e-3, coarsest=1.8e-3), COMM)
     system = assemble(mesh, Ball().material)
     surface = contact_surface(system, tags["foot"], obstacle=obstacle)

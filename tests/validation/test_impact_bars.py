@@ -1,8 +1,9 @@
-"""The default scheme in impacts with exact solutions: V1.1, V1.2, V1.3 and SDNV100, on bars and strips of 100 elements.
+"""The default scheme in impacts with exact solutions: V1.1, V1.2, V1.3 and SDNV100, on bars and
+strips of 100 elements.
 
-The strip has nu = 0, three elements across and free sides. Energies are those of the exact solution at most, but for
-1e-9; V1.3 loses 1 % at its start, where the massless foot lets go of the energy of the first element, which the exact
-bar keeps.
+The strip has nu = 0, three elements across and free sides. Energies are those of the exact solution
+at most, but for 1e-9; V1.3 loses 1 % at its start, where the massless foot lets go of the energy of
+the first element, which the exact bar keeps.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ COURANTS = (1.0, 0.5, 0.1)
 
 @dataclass(frozen=True)
 class History:
-    """Per step: time, contact force, mean force of the step and total energy, the last three over the section."""
+    """Per step: time, contact force, mean force of the step and total energy, the last three over
+    the section."""
 
     t: Array
     force: Array
@@ -94,7 +96,8 @@ def follow(
     ],
 )
 def test_thrown_bar(body: str, courant: float) -> None:
-    """V1.1: force within 1 % of 300 in the window, contact 2/3 s ± 2 dt, mean rebound 10 ± 2 %, energy within 1 %."""
+    """V1.1: force within 1 % of 300 in the window, contact 2/3 s ± 2 dt, mean rebound 10 ± 2 %,
+    energy within 1 %."""
     found = follow(Bar(ThrownBar(), **BODIES[body]), courant, 1.6)  # type: ignore[arg-type]
     window = (found.t > 0.6) & (found.t < 1.067)
     assert np.abs(found.force[window] / 300.0 - 1.0).max() <= 0.01
@@ -112,9 +115,9 @@ def test_thrown_bar(body: str, courant: float) -> None:
     [(body, 1.0) for body in BODIES] + [("bar", 0.1), ("strip", 0.5), ("triangles", 0.5)],
 )
 def test_period_three(body: str, courant: float) -> None:
-    """V1.3, four bounces: energy never above 1/8 nor below 98 % of it, force up to 1.8 times the exact one, impulse of
-    the first contact within 2 %. Of all four together 4 % are missing at Courant number 1, 2.5 % at ½, 1.5 % at 0.1: it
-    has gone into waves too short for the mesh."""
+    """V1.3, four bounces: energy never above 1/8 nor below 98 % of it, force up to 1.8 times the
+    exact one, impulse of the first contact within 2 %. Of all four together 4 % are missing at
+    Courant number 1, 2.5 % at ½, 1.5 % at 0.1: it has gone into waves too short for the mesh."""
     missing = {1.0: 0.04, 0.5: 0.025, 0.1: 0.015}[courant]
     found = follow(Bar(PeriodicBar(), **BODIES[body]), courant, 12.0)  # type: ignore[arg-type]
     assert found.energy.max() <= 0.125 * (1.0 + 1e-9) and found.energy[-1] >= 0.98 * 0.125
@@ -127,7 +130,8 @@ def test_period_three(body: str, courant: float) -> None:
 @pytest.mark.parametrize("courant, periods, floor", [(1.0, 4, 0.988), (0.5, 1, 0.998)])
 @pytest.mark.parametrize("body", ["strip"])
 def test_bouncing_strip(body: str, courant: float, periods: float, floor: float) -> None:
-    """V1.2: energy after so many periods (ten of the bar: below), impulse of the first contact 800/3 within 0.5 %."""
+    """V1.2: energy after so many periods (ten of the bar: below), impulse of the first contact
+    800/3 within 0.5 %."""
     bar = Bar(BouncingBar(), **BODIES[body])  # type: ignore[arg-type]
     found = follow(bar, courant, periods * 16.0 / 3.0)
     above = found.energy + bar.case.energy  # zero is the bar standing on the wall
@@ -140,9 +144,9 @@ def test_bouncing_strip(body: str, courant: float, periods: float, floor: float)
     "courant, periods, floor", [(1.0, 10, 0.88), (0.5, 2, 0.992), (0.2, 0.5, 0.9999)]
 )
 def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float) -> None:
-    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after two, 0.9999 after half of one (4000 steps), at
-    most 1.001 of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and
-    0.9 %)."""
+    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after two, 0.9999 after half of
+    one (4000 steps), at most 1.001 of it; the foot as the exact bar's in the first period, 1.5 %
+    rms of the height (measured 1.4, 1.1 and 0.9 %)."""
     exact, dt = BouncingBar(), courant / 300.0
     problem = bouncing(100, mass=Redistributed())
     lowest, highest, impulse, error = 1.0, 0.0, 0.0, []
@@ -167,8 +171,9 @@ def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float
 @pytest.mark.serial
 @pytest.mark.parametrize("body", BODIES)
 def test_code_aster_sdnv100(body: str) -> None:
-    """The second data set of V1.1: contact from 2e-5 to 1e-4 s, the top 4 mm lower at the deepest than at touch-down
-    (6 mm than at the start), 8e6 S joule, velocity of the top -100 to 100 m/s within 1 %, pressure 4e9 Pa."""
+    """The second data set of V1.1: contact from 2e-5 to 1e-4 s, the top 4 mm lower at the deepest
+    than at touch-down (6 mm than at the start), 8e6 S joule, velocity of the top -100 to 100 m/s
+    within 1 %, pressure 4e9 Pa."""
     case = ThrownBar(length=0.2, E=2.0e11, rho=8000.0, height=2.0e-3, speed=100.0)
     bar = Bar(case, **BODIES[body])  # type: ignore[arg-type]
     model, dt = build(bar, MPI.COMM_WORLD), bar.time_step(0.5)
@@ -207,8 +212,8 @@ def test_code_aster_sdnv100(body: str) -> None:
 @pytest.mark.parametrize("courant", COURANTS)
 @pytest.mark.parametrize("scheme", [Midpoint(), ContactStabilisedNewmark(), MoreauJean()], ids=repr)
 def test_dissipative_schemes_never_gain(scheme: Any, courant: float) -> None:
-    """No step of V1.3 raises the energy by more than 1e-11 of its start: two periods, at Courant number 0.1 the
-    first contact."""
+    """No step of V1.3 raises the energy by more than 1e-11 of its start: two periods, at Courant
+    number 0.1 the first contact."""
     problem = period_three(100, mass=ConsistentMass())
     last, periods = 0.125, 2.0 if courant > 0.1 else 0.7
     for report in serial_run(
@@ -222,7 +227,8 @@ def test_dissipative_schemes_never_gain(scheme: Any, courant: float) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize("courant", [1.0, 0.5])
 def test_newmark_on_consistent_mass_blows_up(courant: float) -> None:
-    """Negative test, V1.3: more than ten times the energy after four bounces, more so with the smaller step."""
+    """Negative test, V1.3: more than ten times the energy after four bounces, more so with the
+    smaller step."""
     problem = period_three(100, mass=ConsistentMass())
     *_, last = serial_run(problem, Newmark(), dt=courant / 100.0, steps=round(1200 / courant))
     assert energy(problem, last.new) > 10.0 * 0.125
@@ -232,7 +238,8 @@ def test_newmark_on_consistent_mass_blows_up(courant: float) -> None:
 @pytest.mark.parametrize("courant", COURANTS)
 @pytest.mark.parametrize("case", [ThrownBar(), PeriodicBar()], ids=lambda case: type(case).__name__)
 def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) -> None:
-    """The same on strips of 40 elements: the contact-stabilised scheme in V1.1 and in one period of V1.3."""
+    """The same on strips of 40 elements: the contact-stabilised scheme in V1.1 and in one period of
+    V1.3."""
     bar = Bar(case, elements=40, dimension=2)
     t_end = 1.3 if isinstance(case, ThrownBar) else 3.0
     found = follow(bar, courant, t_end, scheme=ContactStabilisedNewmark())
@@ -242,7 +249,8 @@ def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) ->
 
 @pytest.mark.serial
 def test_newmark_on_consistent_mass_blows_up_on_a_strip() -> None:
-    """Negative test: V1.3 on a strip of triangles, Courant number ½, where not all nodes of the foot act as one."""
+    """Negative test: V1.3 on a strip of triangles, Courant number ½, where not all nodes of the
+    foot act as one."""
     found = follow(
         Bar(PeriodicBar(), dimension=2, triangles=True),
         0.5,

@@ -1,4 +1,5 @@
-"""Energy in long time steps: the table of docs/guide/schemes.md, and that the warning names a scheme that helps."""
+"""Energy in long time steps: the table of docs/guide/schemes.md, and that the warning names a
+scheme that helps."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ def run(scheme: Any, dt: Any = DT) -> vc.Solution:
 
 
 def test_the_scheme_of_the_warning_creates_none(caplog: pytest.LogCaptureFixture) -> None:
-    """Where the default, HHT and halved steps warn, certified step by step, the scheme of the sentence creates none."""
+    """Where the default, HHT and halved steps warn, certified step by step, the scheme of the
+    sentence creates none."""
     for scheme, dt in (
         (vc.Trapezoidal(), DT),
         (vc.HHT(), DT),
@@ -49,7 +51,8 @@ def test_the_scheme_of_the_warning_creates_none(caplog: pytest.LogCaptureFixture
 
 @pytest.mark.parametrize("name", BENCHMARK.SCHEMES)
 def test_the_table_of_the_page(name: str) -> None:
-    """Its first column, steps of 10 ms, in classes: what grows is chaotic, and whether it grows is not."""
+    """Its first column, steps of 10 ms, in classes: what grows is chaotic, and whether it grows is
+    not."""
     page = (ROOT / "docs" / "guide" / "schemes.md").read_text(encoding="utf-8")
     row = re.search(
         rf"^\| {re.escape(name)} \| ([^|]+) \|", page[page.index("| 10 ms (67) |") :], re.MULTILINE

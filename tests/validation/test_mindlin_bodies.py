@@ -1,8 +1,9 @@
-"""V2.4 in space: two spheres on meshes that do not match, pressed together and then moved along one another (Cattaneo
-1938, Mindlin 1949), and back (Mindlin and Deresiewicz 1953).
+"""V2.4 in space: two spheres on meshes that do not match, pressed together and then moved along one
+another (Cattaneo 1938, Mindlin 1949), and back (Mindlin and Deresiewicz 1953).
 
-The far sides of the bodies move as the closed form says, and the tangential force is what the contact answers: the law
-of force against shift is tested. nu = 0, so that shear moves the surface along Q alone and the closed form is exact.
+The far sides of the bodies move as the closed form says, and the tangential force is what the
+contact answers: the law of force against shift is tested. nu = 0, so that shear moves the surface
+along Q alone and the closed form is exact.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ FORM = Mindlin(force=2.0, a=1.3, mu=0.4, G=5.0, nu=0.0)
 
 @pytest.mark.parametrize("share", [row[0] for row in PATH[:4]])
 def test_v2_4_closed_form_in_space(share):
-    """q carries Q; p there where all slips; c/a = 0.908560, 0.793701, 0.629961, 0.464159; the surface that sticks has
-    moved as the body (both tractions are of Hertz's shape: their displacements are known inside); nothing at Q = 0."""
+    """q carries Q; p there where all slips; c/a = 0.908560, 0.793701, 0.629961, 0.464159; the
+    surface that sticks has moved as the body (both tractions are of Hertz's shape: their
+    displacements are known inside); nothing at Q = 0."""
     c, mu_p = FORM.stick(share), FORM.mu * FORM.force
     printed = {0.25: 0.908560, 0.5: 0.793701, 0.75: 0.629961, 0.9: 0.464159}
     assert c / FORM.a == pytest.approx(printed[share], abs=5e-7)
@@ -40,8 +42,8 @@ def test_v2_4_closed_form_in_space(share):
 
 
 def test_v2_4_displacements_below_tractions():
-    """Boussinesq and Cerruti: both are in equilibrium and leave the surface free (stresses by differences, 1e-6), and
-    far away a traction is its resultant."""
+    """Boussinesq and Cerruti: both are in equilibrium and leave the surface free (stresses by
+    differences, 1e-6), and far away a traction is its resultant."""
     point, nu, h = np.array([[0.7, 0.9, -0.4], [1.1, 0.0, 0.6]]), 0.3, 1e-4
     pull = np.array([[1.0, 2.0, -0.5]])
 
@@ -77,9 +79,9 @@ def test_v2_4_displacements_below_tractions():
 
 @pytest.mark.slow
 def test_v2_4_partial_slip_of_spheres():
-    """4 cells across a, in the mean over six approaches: P to 0.3 % (0.05 found) and the same in all stages, for shear
-    of equal bodies leaves the pressure alone; Q to 2 % (0.7 at most); c to 0.08 a, a third of a cell (0.02); q in L2 to
-    22 and 15 % where most slips (7 and 5)."""
+    """4 cells across a, in the mean over six approaches: P to 0.3 % (0.05 found) and the same in
+    all stages, for shear of equal bodies leaves the pressure alone; Q to 2 % (0.7 at most); c to
+    0.08 a, a third of a cell (0.02); q in L2 to 22 and 15 % where most slips (7 and 5)."""
     stages = PartialSlip(4).compared()
     for found in stages:
         assert abs(found["force"]) < 3e-3 and abs(found["force"] - stages[0]["force"]) < 1e-4

@@ -1,7 +1,9 @@
-"""V8.5: a manufactured wave without contact, from a body force in space and time and moving boundaries.
+"""V8.5: a manufactured wave without contact, from a body force in space and time and moving
+boundaries.
 
-u = (sin kx x cos ky y sin wt, cos kx x sin ky y cos wt) solves rho u'' = div sigma + b with the body force below.
-Orders of P1/Q1: 1 in H1, 2 in L2; of the Zienkiewicz-Wood-Taylor step: 2 at phi = ½, 1 otherwise.
+u = (sin kx x cos ky y sin wt, cos kx x sin ky y cos wt) solves rho u'' = div sigma + b with the
+body force below. Orders of P1/Q1: 1 in H1, 2 in L2; of the Zienkiewicz-Wood-Taylor step: 2 at phi =
+½, 1 otherwise.
 """
 
 from __future__ import annotations
@@ -130,7 +132,8 @@ def errors(n: int, *, simplices: bool, steps: int) -> tuple[Errors, Errors]:
 
 @pytest.mark.parametrize("simplices", [False, True])
 def test_v8_5_orders_in_space(simplices):
-    """n = 4, 8, 16 with dt = h/4: H1 order 1, L2 order 2, and the gradients as good as the interpolant's."""
+    """n = 4, 8, 16 with dt = h/4: H1 order 1, L2 order 2, and the gradients as good as the
+    interpolant's."""
     found, best = zip(
         *[errors(n, simplices=simplices, steps=2 * n) for n in (4, 8, 16)], strict=True
     )
@@ -149,7 +152,8 @@ def fine() -> tuple[SemiDiscreteSystem, State]:
 @pytest.mark.serial  # long marches of few unknowns, nothing in them depends on ranks
 @pytest.mark.parametrize("phi, order", [(0.5, 2.0), (0.75, 1.0), (1.0, 1.0)])
 def test_v8_5_orders_in_time(phi, order):
-    """On one mesh, against a fine midpoint solution of the same mesh: displacement and velocity alike."""
+    """On one mesh, against a fine midpoint solution of the same mesh: displacement and velocity
+    alike."""
     system, exact = fine()
     steps = (40, 80, 160) if phi == 0.5 else (160, 320, 640)
     found = [final(system, dt=0.5 / n, steps=n, phi=phi) for n in steps]

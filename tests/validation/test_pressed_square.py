@@ -1,4 +1,5 @@
-"""V7.1: the compressed square of seed 003 against an independent script, boundary elements and its own statements."""
+"""V7.1: the compressed square of seed 003 against an independent script, boundary elements and its
+own statements."""
 
 from __future__ import annotations
 
@@ -96,8 +97,8 @@ LAST_DIGIT = {"energy": 1e-5, "loss_friction": 1e-5, "u_y_top": 1e-4, "u_x_corne
     "law", [pytest.param(law, marks=() if law == "coulomb" else one_rank) for law in RUBBING]
 )
 def test_midpoint_on_the_reference_mesh(law):
-    """V7.1, 20 x 20 cells, consistent mass: energies, work of friction, displacements and the mean force of the steps
-    between t = 1.2 and 1.8 to every printed digit."""
+    """V7.1, 20 x 20 cells, consistent mass: energies, work of friction, displacements and the mean
+    force of the steps between t = 1.2 and 1.8 to every printed digit."""
     history, reference = run(law, "midpoint"), REFERENCE[law]
     for column, times in TIMES.items():
         expected = pytest.approx(reference[column], rel=0.0, abs=0.5001 * LAST_DIGIT[column])
@@ -111,8 +112,8 @@ def test_midpoint_on_the_reference_mesh(law):
 @one_rank
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_the_wave_takes_in_energy_at_a_constant_rate(scheme):
-    """V7.1: E = p² L/(rho c_P) t + 1.4e-3 t² until the wave is at the support, t = 1, to 1 % of E(1); until then it
-    does not matter whether and how the support rubs."""
+    """V7.1: E = p² L/(rho c_P) t + 1.4e-3 t² until the wave is at the support, t = 1, to 1 % of
+    E(1); until then it does not matter whether and how the support rubs."""
     history = run("none", scheme)
     early = history["t"] < 1.0 - 1e-9
     t, energy = history["t"][early], history["energy"][early]
@@ -124,8 +125,9 @@ def test_the_wave_takes_in_energy_at_a_constant_rate(scheme):
 @one_rank
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_friction_takes_energy_for_a_while(scheme):
-    """V7.1: less energy with friction for 2 <= t <= 4, more at t = 6, where the phases have drifted apart; the work of
-    friction never decreases; with Coulomb's mu = 0.5 the corner nearly sticks until t = 4."""
+    """V7.1: less energy with friction for 2 <= t <= 4, more at t = 6, where the phases have drifted
+    apart; the work of friction never decreases; with Coulomb's mu = 0.5 the corner nearly sticks
+    until t = 4."""
     free = run("none", scheme)
     between = (free["t"] > 2.0 - 1e-9) & (free["t"] < 4.0 + 1e-9)
     for law in ("tresca", "coulomb"):
@@ -142,8 +144,8 @@ def test_friction_takes_energy_for_a_while(scheme):
 @one_rank
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_confined_square(scheme):
-    """V7.1 with sides on rollers, plane waves: E = 0.01 t until t = 2, to 0.5 % of E(2); twice the pressure on the base
-    for 1 < t < 3, to 1.5 % in the mean."""
+    """V7.1 with sides on rollers, plane waves: E = 0.01 t until t = 2, to 0.5 % of E(2); twice the
+    pressure on the base for 1 < t < 3, to 1.5 % in the mean."""
     history = run("none", scheme, confined=True)
     t = history["t"]
     rising, pressed = (t > 0.2) & (t < 1.9), (t > 1.2) & (t < 2.8)
@@ -156,7 +158,8 @@ def test_confined_square(scheme):
     ("scheme", "law"), [("midpoint", "none"), ("default", "none"), ("default", "coulomb")]
 )
 def test_energies_converge_with_the_mesh(scheme, law):
-    """V7.1: the mean square over time of E_N - E_2N, N = 10, 20, halves with h: order 1 +- 0.3, as a front has it."""
+    """V7.1: the mean square over time of E_N - E_2N, N = 10, 20, halves with h: order 1 +- 0.3, as
+    a front has it."""
     energies = [run(law, scheme, cells)["energy"][:: cells // 10] for cells in (10, 20, 40)]
     coarse, fine = (
         np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(energies, energies[1:], strict=False)
@@ -166,8 +169,9 @@ def test_energies_converge_with_the_mesh(scheme, law):
 
 @one_rank
 def test_space_time_boundary_elements():
-    """V7.1 against an independent script of space-time boundary elements, 20 and 40 per side: energies at t = 0.5, 1,
-    ... 5 to 1.5 % of the largest, impulse at t = 4 to 0.1 %, work of friction to 1 %; default scheme, 40 cells."""
+    """V7.1 against an independent script of space-time boundary elements, 20 and 40 per side:
+    energies at t = 0.5, 1, ... 5 to 1.5 % of the largest, impulse at t = 4 to 0.1 %, work of
+    friction to 1 %; default scheme, 40 cells."""
     free, rubbed = run("none", "default", 40), run("weak tresca", "default", 40)
     times = tuple(0.5 * np.arange(1, 11))
     smooth = (0.5339, 1.1351, 1.7723, 2.3529, 2.3045, 1.9808, 1.4837, 0.8213, 0.3292, 0.3049)
@@ -207,8 +211,9 @@ def test_the_square_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixt
 
 
 def check_what_is_drawn(folder: Path) -> None:
-    """Frames and tractions are those of the history: displacement of the top, resultants of pressure and friction; at
-    t = 2 friction holds the square together, at both ends with Tresca's threshold."""
+    """Frames and tractions are those of the history: displacement of the top, resultants of
+    pressure and friction; at t = 2 friction holds the square together, at both ends with Tresca's
+    threshold."""
     frames, tractions = read_frames(folder), read_tractions(folder)
     columns = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
     t, u, stress = frames.at(2.01)

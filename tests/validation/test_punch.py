@@ -1,8 +1,9 @@
 """V2.5: a flat rigid punch without friction, against p = P / (pi sqrt(a² - x²)).
 
-The elastic block lies on the punch: zero gap for |x| <= a, a gap wider than any displacement beside it. A uniform
-pressure on its far side presses it on; contact alone carries it. The pressure is infinite at the edge, so that the
-force of the last node never converges to a pressure, and what is right is right from two cells away.
+The elastic block lies on the punch: zero gap for |x| <= a, a gap wider than any displacement beside
+it. A uniform pressure on its far side presses it on; contact alone carries it. The pressure is
+infinite at the edge, so that the force of the last node never converges to a pressure, and what is
+right is right from two cells away.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ RUBBER = LinearElastic(E=1.0e9, nu=0.3, rho=1000.0)
 
 
 def computed(cells: int) -> Pressed:
-    """On a block of 20 a with cells of a / ``cells`` at the edge of the punch, growing in every direction."""
+    """On a block of 20 a with cells of a / ``cells`` at the edge of the punch, growing in every
+    direction."""
     a = PUNCH.half_width
     h, size = a / cells, 20.0 * a
     x = np.append(a - growing(h, a)[::-1], a + growing(h, size - a)[1:])
@@ -41,8 +43,9 @@ def near_edge(result: Pressed, cells: int) -> tuple[Array, Mask]:
 
 
 def test_v2_5_flat_punch():
-    """200 cells in a at the edge: p(0) to 0.5 %, p(a/2) to 0.5 %, P to 1e-9, slope of log p over log (a - x) in
-    [2h, 0.2 a]: -0.47 (asked: -0.50 ± 0.05; the closed form itself has -0.485 there)."""
+    """200 cells in a at the edge: p(0) to 0.5 %, p(a/2) to 0.5 %, P to 1e-9, slope of log p over
+    log (a - x) in [2h, 0.2 a]: -0.47 (asked: -0.50 ± 0.05; the closed form itself has -0.485
+    there)."""
     result = computed(200)
     distance, fit = near_edge(result, 200)
     assert 2.0 * result.r_n.sum() == pytest.approx(PUNCH.force, rel=1e-9)
@@ -60,8 +63,8 @@ def test_v2_5_flat_punch():
 
 @pytest.mark.serial
 def test_v2_5_singularity_converges_with_the_root_of_h():
-    """The force of the edge node is O(√h), the integral of the singular pressure over its cell; the slope, freed of the
-    smooth factor √(a + x), goes to -1/2 from above."""
+    """The force of the edge node is O(√h), the integral of the singular pressure over its cell; the
+    slope, freed of the smooth factor √(a + x), goes to -1/2 from above."""
     forces, slopes = [], []
     for cells in (100, 400):
         result = computed(cells)

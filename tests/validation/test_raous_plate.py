@@ -1,10 +1,12 @@
-"""V2.6: the plate of Raous and of the GRECO working group, pressed and pushed over a rough plane (Coulomb, mu = 1).
+"""V2.6: the plate of Raous and of the GRECO working group, pressed and pushed over a rough plane
+(Coulomb, mu = 1).
 
-Half of a plate, [0, 0.04]² m in plane strain: symmetry on the right, 150 MPa on the left side, 50 MPa on the top. Left
-to right the base opens, slips and sticks. Points of the base: A 0, B 1.25, C 5, D 7.5, E 11.25 mm.
+Half of a plate, [0, 0.04]² m in plane strain: symmetry on the right, 150 MPa on the left side, 50
+MPa on the top. Left to right the base opens, slips and sticks. Points of the base: A 0, B 1.25, C
+5, D 7.5, E 11.25 mm.
 
-The reference fixes the corner (0.04, 0); here its contact condition does that, under pressure and on the symmetry line.
-Its reaction is left out of the sums, as there.
+The reference fixes the corner (0.04, 0); here its contact condition does that, under pressure and
+on the symmetry line. Its reaction is left out of the sums, as there.
 """
 
 from __future__ import annotations
@@ -66,7 +68,8 @@ def plate(
 
 @dataclass(frozen=True)
 class Base:
-    """Along the base, left to right: x [m], u_x, u_y [m], reactions on the ground along -y and +x [N/m]."""
+    """Along the base, left to right: x [m], u_x, u_y [m], reactions on the ground along -y and +x
+    [N/m]."""
 
     x: Array
     u_x: Array
@@ -102,9 +105,11 @@ def computed(*, solver: Solver = CONDENSED, **spec: Any) -> Base:
     "method", [FrictionNewton(), FixedPoint()], ids=["FrictionNewton", "FixedPoint"]
 )
 def test_v2_6_digits(method):
-    """All printed digits of u_x at A ... E, u_y(A), the sums of the reactions and that of the last free point.
+    """All printed digits of u_x at A ... E, u_y(A), the sums of the reactions and that of the last
+    free point.
 
-    (NSGS is no method for a body that contact alone holds vertically: 5000 sweeps do not move it enough.)"""
+    (NSGS is no method for a body that contact alone holds vertically: 5000 sweeps do not move it
+    enough.)"""
     base = computed(solver=Condensed(friction_method=method))
     assert base.at_points() == pytest.approx(REFERENCE, rel=3e-8)
     assert base.u_x[0] == pytest.approx(2.84594384e-5, rel=2e-9)
@@ -116,7 +121,8 @@ def test_v2_6_digits(method):
 
 
 def test_v2_6_zones():
-    """Open on [0, 3.75), slip towards the symmetry line on [3.75, 31.25), stick on [31.25, 40] mm; all is balanced."""
+    """Open on [0, 3.75), slip towards the symmetry line on [3.75, 31.25), stick on [31.25, 40] mm;
+    all is balanced."""
     base = computed()
     mm = 1e3 * base.x
     opened, slipping, sticking = mm < 3.7, (mm > 3.7) & (mm < 31.2), mm > 31.2
@@ -134,7 +140,8 @@ def test_v2_6_zones():
 
 
 def test_v2_6_ten_load_steps():
-    """Proportional loading in ten steps ends like one step, to 1e-8; u grows with the load (homogeneity)."""
+    """Proportional loading in ten steps ends like one step, to 1e-8; u grows with the load
+    (homogeneity)."""
     problem = plate()
     once = static_equilibrium(problem, solver=Condensed(), t=1.0)
     for state in quasi_static(problem, np.linspace(0.1, 1.0, 10), solver=Condensed()):
@@ -155,8 +162,8 @@ def released(friction: FrictionLaw) -> ContactProblem:
 
 
 def test_v2_6_unloading_is_another_path():
-    """At half the load on the way back friction still holds 93 % of u_x(A), found to 1e-3 with half as many steps;
-    without friction it is half. At zero load nothing presses and nothing is left."""
+    """At half the load on the way back friction still holds 93 % of u_x(A), found to 1e-3 with half
+    as many steps; without friction it is half. At zero load nothing presses and nothing is left."""
     found = {}
     for steps in (5, 10):
         times = [1.0, *np.linspace(1.0, 2.0, 2 * steps + 1)[1:]]
@@ -183,7 +190,8 @@ def test_v2_6_unloading_is_another_path():
     ids=["32x32", "64x20", "64x64 triangles", "48x40"],
 )
 def test_v2_6_other_meshes(divisions, simplices):
-    """1 % of u_x at A ... E on other meshes; A and B between nodes where the mesh has none there."""
+    """1 % of u_x at A ... E on other meshes; A and B between nodes where the mesh has none
+    there."""
     assert computed(divisions=divisions, simplices=simplices).at_points() == pytest.approx(
         REFERENCE, rel=0.01
     )

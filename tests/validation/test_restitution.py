@@ -1,8 +1,9 @@
-"""Restitution is a law for nodes: on fine meshes the body of V1.1 rebounds with its full speed, whatever e says.
+"""Restitution is a law for nodes: on fine meshes the body of V1.1 rebounds with its full speed,
+whatever e says.
 
-The macroscopic rebound is momentum over mass after the separation, divided by the speed of approach. A single mass has
-exactly e. In a bar e is that of the contact node, whose share of the mass goes to zero with the mesh size; what presses
-the body off the wall are waves.
+The macroscopic rebound is momentum over mass after the separation, divided by the speed of
+approach. A single mass has exactly e. In a bar e is that of the contact node, whose share of the
+mass goes to zero with the mesh size; what presses the body off the wall are waves.
 """
 
 from __future__ import annotations
@@ -61,10 +62,12 @@ def test_a_single_mass_rebounds_with_e(law: str, e: float) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize("law", LAWS)
 def test_the_rebound_of_a_bar_tends_to_one_for_every_restitution(law: str) -> None:
-    """V1.1, Courant number 0.45: with every finer mesh less of the full rebound is missing, and e changes less of it.
+    """V1.1, Courant number 0.45: with every finer mesh less of the full rebound is missing, and e
+    changes less of it.
 
-    Of 160 elements 1 % are missing at most and e = 0, ½, 1 differ by 0.4 % (of 320 0.6 and 0.1 %); of one element 34
-    to 50 % are missing and e decides on 13 to 21 %, without being the rebound even there.
+    Of 160 elements 1 % are missing at most and e = 0, ½, 1 differ by 0.4 % (of 320 0.6 and 0.1 %);
+    of one element 34 to 50 % are missing and e decides on 13 to 21 %, without being the rebound
+    even there.
     """
     table = np.array([[rebound(n, *LAWS[law](e)) for n in MESHES] for e in RESTITUTIONS])
     missing, differences = np.max(1.0 - table, axis=0), np.ptp(table, axis=0)
@@ -77,7 +80,8 @@ def test_the_rebound_of_a_bar_tends_to_one_for_every_restitution(law: str) -> No
 @pytest.mark.serial
 @pytest.mark.parametrize("reading", [ComponentReset, ImpulseUpdate])
 def test_inelastic_and_elastic_are_the_ends_of_the_range(reading: Any) -> None:
-    """V1.1, 20 elements: Inelastic (every closed point, in every step) and Elastic rebound as Newton's 0 and 1 do."""
+    """V1.1, 20 elements: Inelastic (every closed point, in every step) and Elastic rebound as
+    Newton's 0 and 1 do."""
     scheme = ZienkiewiczWoodTaylor()
     for named, e in ((Inelastic(reading()), 0.0), (Elastic(reading()), 1.0)):
         found = rebound(20, scheme, named)
@@ -89,8 +93,9 @@ def test_inelastic_and_elastic_are_the_ends_of_the_range(reading: Any) -> None:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("triangles", [False, True], ids=["quadrilaterals", "triangles"])
 def test_the_rebound_of_a_strip_does_not_know_e(law: str, triangles: bool) -> None:
-    """V1.1 in two dimensions, three elements across: from 10 to 40 elements along the strip the rebound comes closer to
-    1, and what e changes of it is less than half as much; of 40 elements 3 % are missing at most, 2 % of it by e."""
+    """V1.1 in two dimensions, three elements across: from 10 to 40 elements along the strip the
+    rebound comes closer to 1, and what e changes of it is less than half as much; of 40 elements 3
+    % are missing at most, 2 % of it by e."""
     coarse, fine = (
         1.0 - np.array([strip_rebound(n, *LAWS[law](e), triangles) for e in RESTITUTIONS])
         for n in (10, 40)

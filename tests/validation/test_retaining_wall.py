@@ -1,4 +1,5 @@
-"""An L-shaped retaining wall whose contact boundary goes round three corners: one group or one for each side (V2.8)."""
+"""An L-shaped retaining wall whose contact boundary goes round three corners: one group or one for
+each side (V2.8)."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ SIDES = {
     "heel": ("heel_top",),
     "stem": ("stem_right",),
 }
-WALLS = {  # lowest corner, width and height [m]; the ground lies below, to the right and on the heel
+# lowest corner, width and height [m]; the ground lies below, to the right and on the heel
+WALLS = {
     "foot": (0.0, 0.0, 0.5, 0.5),
     "heel": (0.5, 0.0, 2.5, 0.5),
     "stem": (0.0, 0.5, 0.5, 3.5),
@@ -72,7 +74,8 @@ def surface(system: Any, sides: dict[str, Facets], kind: str) -> Any:
 
 
 def run(kind: str, shaking: Any, dt: float, t_end: float) -> dict[str, Any]:
-    """Histories of thrust, friction work and uplift, and the last displacements, from rest under the weight."""
+    """Histories of thrust, friction work and uplift, and the last displacements, from rest under
+    the weight."""
     system, sides = wall()
     problem = vc.ContactProblem(
         system, surface(system, sides, kind), friction=vc.Coulomb(0.3), excitation=shaking
@@ -95,7 +98,8 @@ def compare(one: dict[str, Any], other: dict[str, Any]) -> dict[str, float]:
 
 
 def test_one_group_is_four() -> None:
-    """The same motion to 1e-8 with contact, friction and uplift; that of mean normals at the corners is another one."""
+    """The same motion to 1e-8 with contact, friction and uplift; that of mean normals at the
+    corners is another one."""
     shaking = vc.Harmonic(4.0, 2.5, direction=(1.0, 0.3))
     one, four, mean = (
         run(kind, shaking, 4e-3, 0.3) for kind in ("one group", "four groups", "mean normals")

@@ -1,4 +1,5 @@
-"""A soil layer accelerated against a rigid smooth wall, S3.3: thrust and its height, contact while pressed."""
+"""A soil layer accelerated against a rigid smooth wall, S3.3: thrust and its height, contact while
+pressed."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def pressed(
     surcharge: float = 0.0,
     bilateral: bool = True,
 ) -> tuple[ContactProblem, State]:
-    """A layer of LENGTH on rock; body force towards the wall at x = 0; the far side does not settle."""
+    """A layer of LENGTH on rock; body force towards the wall at x = 0; the far side does not
+    settle."""
     soil = LinearElastic(E=1e8, nu=nu, rho=1900.0)
     divisions = (round(LENGTH / HEIGHT) * cells, cells)
     mesh, tags = fem.build_mesh(
@@ -56,7 +58,8 @@ def pressed(
     ("nu", "thrust", "height"), [(0.3, 0.960, 0.576), (1 / 3, 0.987, 0.572), (0.4, 1.049, 0.564)]
 )
 def test_smooth_bilateral_wall(nu: float, thrust: float, height: float):
-    """Q and h within 1 % of the published plane-strain values (measured 0.2 and 0.2 %), 7 % of the 1D theory."""
+    """Q and h within 1 % of the published plane-strain values (measured 0.2 and 0.2 %), 7 % of the
+    1D theory."""
     problem, state = pressed(nu, 2.0)
     y = problem.surface.points[:, 1]
     thrusts = state.r_n.sum()
@@ -66,7 +69,8 @@ def test_smooth_bilateral_wall(nu: float, thrust: float, height: float):
 
 
 def test_unilateral_while_the_ground_presses():
-    """Gravity and a surcharge first: the same as bilateral while all pressures are positive; beyond, a gap opens."""
+    """Gravity and a surcharge first: the same as bilateral while all pressures are positive;
+    beyond, a gap opens."""
 
     def added(acceleration: float, bilateral: bool) -> tuple[ContactProblem, State]:
         return pressed(0.3, acceleration, cells=12, gravity=G, surcharge=1e5, bilateral=bilateral)

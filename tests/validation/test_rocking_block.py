@@ -1,7 +1,8 @@
 """V3.1: a stiff finite element block on two corners in contact rocks as Housner's rigid block does.
 
-Two statements each time: within the tolerances of V3.1 of Housner's numbers, and much closer to the rigid limit of the
-model itself, whose small displacements make times 1 % longer at equal theta/(b/h) (see docs/guide/rocking_block.md).
+Two statements each time: within the tolerances of V3.1 of Housner's numbers, and much closer to the
+rigid limit of the model itself, whose small displacements make times 1 % longer at equal
+theta/(b/h) (see docs/guide/rocking_block.md).
 """
 
 from __future__ import annotations
@@ -87,8 +88,9 @@ def first_impact(model: rocking.RockingModel, theta0: float) -> float:
 
 @pytest.mark.serial
 def test_free_rocking(model):
-    """V3.1: impact times within 2 %, amplitudes and restitution within 5 %; the rigid limit to 0.3, 0.5 and 0.5 %.
-    Every step is certified to 1e-9, and each impact takes 1 - e² of the energy to 2 %."""
+    """V3.1: impact times within 2 %, amplitudes and restitution within 5 %; the rigid limit to 0.3,
+    0.5 and 0.5 %. Every step is certified to 1e-9, and each impact takes 1 - e² of the energy to 2
+    %."""
     theta0 = 0.5 * SHAPE.alpha
     history, facts = released(model, theta0, 2.3)
     times, peaks = rocking.impacts(history)
@@ -113,7 +115,8 @@ def test_free_rocking(model):
 
 @pytest.mark.parametrize("share", PERIODS)
 def test_period(model, share):
-    """V3.1: four times the fall from theta0 = share of the overturning angle is T to 2 %, the rigid limit to 0.05 %."""
+    """V3.1: four times the fall from theta0 = share of the overturning angle is T to 2 %, the rigid
+    limit to 0.05 %."""
     theta0 = share * model.block.overturning_angle
     period = 4.0 * first_impact(model, theta0)
     assert period == pytest.approx(PERIODS[share], rel=0.02)
@@ -122,7 +125,8 @@ def test_period(model, share):
 
 @pytest.mark.parametrize("share", [0.1, 0.75])
 def test_period_at_housners_angle(model, share):
-    """V3.1: T to 2 % from the same angle in radians. At 0.9 alpha small displacements make 2.8 %."""
+    """V3.1: T to 2 % from the same angle in radians. At 0.9 alpha small displacements make 2.8
+    %."""
     assert 4.0 * first_impact(model, share * SHAPE.alpha) == pytest.approx(PERIODS[share], rel=0.02)
 
 
@@ -138,7 +142,8 @@ def test_stiffness(model):
 
 
 def test_time_step(model):
-    """Short steps, shorter still where a corner lands, follow the rigid block ten times closer than long ones."""
+    """Short steps, shorter still where a corner lands, follow the rigid block ten times closer than
+    long ones."""
     theta0, errors = 0.5 * SHAPE.alpha, []
     for dt in (4e-3, model.time_steps()):
         history, _ = released(model, theta0, 2.2, dt=dt)
@@ -152,8 +157,9 @@ def test_time_step(model):
 def test_ledger(model):
     """V9.7 for V3.1: the ledger closes to 1e-11 of the largest energy and the round-off of uᵀKu.
 
-    K u of a rotation is zero by cancellation only. It leaves 5e-11 of the energy in a soft block, 1e-9 in one as stiff
-    as V3.1 asks for: on every kind of processor a sixth of what is allowed here.
+    K u of a rotation is zero by cancellation only. It leaves 5e-11 of the energy in a soft block,
+    1e-9 in one as stiff as V3.1 asks for: on every kind of processor a sixth of what is allowed
+    here.
     """
     soft = rocking.build(block(3.0e9), COMM)
     for built, tilt, t_end in ((soft, 0.25 * SHAPE.alpha, 1.2), (model, 0.5 * SHAPE.alpha, 0.6)):
@@ -180,8 +186,8 @@ def lifted(model: rocking.RockingModel, peak: float) -> tuple[float, float, floa
 
 
 def test_onset(model):
-    """V3.1: rocking starts at g b/h = 1.962 m/s²: 1 % less lifts nothing, 1 % more does. The mesh's own criterion, the
-    moment of its inertia load, holds to 0.2 %."""
+    """V3.1: rocking starts at g b/h = 1.962 m/s²: 1 % less lifts nothing, 1 % more does. The mesh's
+    own criterion, the moment of its inertia load, holds to 0.2 %."""
     assert SHAPE.onset_acceleration == pytest.approx(1.962, rel=1e-12)
     gap, least, angle = lifted(model, 0.99 * SHAPE.onset_acceleration)
     assert gap == 0.0 and least > 0.0 and abs(angle) < 1e-6
@@ -218,9 +224,10 @@ def test_overturning(model):
 
 @pytest.mark.serial
 def test_default_scheme_keeps_the_loss_as_vibration(model):
-    """The trapezoidal rule on an undamped block in fine steps: rocking loses what the rigid block loses (5 %), but 95 %
-    of that energy is still in the body 0.05 s later, which hops on its corner. (Later landings, round-off decides
-    which, take or add some per cent.) With inelastic impulses and damping it is gone, and the corner stays down.
+    """The trapezoidal rule on an undamped block in fine steps: rocking loses what the rigid block
+    loses (5 %), but 95 % of that energy is still in the body 0.05 s later, which hops on its
+    corner. (Later landings, round-off decides which, take or add some per cent.) With inelastic
+    impulses and damping it is gone, and the corner stays down.
     """
     theta0 = 0.25 * SHAPE.alpha
     arm = 0.5 * SHAPE.width * theta0 * (1.0 - 0.5 * theta0 / model.block.overturning_angle)

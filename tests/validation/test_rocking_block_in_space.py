@@ -1,4 +1,5 @@
-"""A block that rocks on its edges and corners in space, solved without a factor: the books stay closed."""
+"""A block that rocks on its edges and corners in space, solved without a factor: the books stay
+closed."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ WEIGHT = 9.81 * 2000.0
 
 @pytest.fixture(scope="module")
 def rocking() -> tuple[vc.ContactProblem, vc.State]:
-    """A block of 1 m x 2.4 m x 0.8 m under its weight on a rough plane, pushed over two axes at once."""
+    """A block of 1 m x 2.4 m x 0.8 m under its weight on a rough plane, pushed over two axes at
+    once."""
 
     def pushed(x: np.ndarray) -> np.ndarray:
         return np.cross((0.1, 0.0, 0.2), x - (1.0, 0.0, 0.8))
@@ -41,8 +43,9 @@ def rocking() -> tuple[vc.ContactProblem, vc.State]:
 @pytest.mark.slow
 @pytest.mark.serial  # ranks change none of it: the steps below show that
 def test_two_hundred_steps_without_drift(rocking: tuple[vc.ContactProblem, vc.State]) -> None:
-    """Every step certified; on one corner, on an edge and on more; what the ledger cannot explain stays below 1e-7 of
-    the energy: two hundred steps of residuals of 3e-10, a thousand of which are found to add up to 5e-9."""
+    """Every step certified; on one corner, on an edge and on more; what the ledger cannot explain
+    stays below 1e-7 of the energy: two hundred steps of residuals of 3e-10, a thousand of which are
+    found to add up to 5e-9."""
     problem, state = rocking
     solution = vc.simulate(
         problem, solver=vc.Iterative(), dt=DT, steps=200, state=state, progress=False

@@ -1,8 +1,10 @@
-"""V3.4: a stiff finite element block rocks in space, on edges and corners of its base, as the rigid block does.
+"""V3.4: a stiff finite element block rocks in space, on edges and corners of its base, as the rigid
+block does.
 
-The ground is a rigid plane, or a stiff slab whose mesh does not match that of the block (dual mortar); block and ground
-are turned about the vertical, so that nothing but the vertical lies along an axis. Rotations are small: the rigid block
-is that of ``tests/support/rigid_block.py``, see docs/guide/rocking_block.md for what it leaves out.
+The ground is a rigid plane, or a stiff slab whose mesh does not match that of the block (dual
+mortar); block and ground are turned about the vertical, so that nothing but the vertical lies along
+an axis. Rotations are small: the rigid block is that of ``tests/support/rigid_block.py``, see
+docs/guide/rocking_block.md for what it leaves out.
 """
 
 from __future__ import annotations
@@ -45,7 +47,8 @@ grounds = pytest.mark.parametrize("slab", [False, True], ids=["plane", "slab"])
 
 @dataclass(frozen=True)
 class Model:
-    """The block, with geometric stiffness, and at rest under its weight. Vectors below are along the block's axes."""
+    """The block, with geometric stiffness, and at rest under its weight. Vectors below are along
+    the block's axes."""
 
     shape: RigidBlock
     problem: vc.ContactProblem
@@ -53,7 +56,8 @@ class Model:
 
     @cached_property
     def fit(self) -> tuple[Array, Array]:
-        """(nodes of the block, what gives the translation and rotation (6,) of their displacements)."""
+        """(nodes of the block, what gives the translation and rotation (6,) of their
+        displacements)."""
         points = self.problem.system.space.points @ TURN
         rows = np.flatnonzero(points[:, 1] > 0.1 * self.shape.half[1])
         x = points[rows]
@@ -88,7 +92,8 @@ class Model:
 
 @cache
 def built(shape: RigidBlock, slab: bool, friction: bool = False) -> Model:
-    """A block on four corners. Its base is held sideways, or rubs with mu = 1, and is then free to spin on a corner."""
+    """A block on four corners. Its base is held sideways, or rubs with mu = 1, and is then free to
+    spin on a corner."""
     a, h, c = shape.half
     meshes = {
         "block": BlockMesh(
@@ -162,8 +167,8 @@ def rocked(model: Model, state: State, t_end: float) -> Rocked:
 
 
 def differences(found: Rocked, shape: RigidBlock, phases: list[Phase]) -> tuple[Array, Array]:
-    """Angles and rates less those of the rigid block, over the largest of these; rates 2 ms before landings to 30 ms
-    after them count as zero: there the block shakes."""
+    """Angles and rates less those of the rigid block, over the largest of these; rates 2 ms before
+    landings to 30 ms after them count as zero: there the block shakes."""
     q, v = shape.motion(phases, found.t)
     starts = np.array([one.start for one in phases[1:]])
     shaken = np.any((found.t[:, None] > starts - 2e-3) & (found.t[:, None] < starts + 0.03), axis=1)
@@ -174,11 +179,13 @@ def differences(found: Rocked, shape: RigidBlock, phases: list[Phase]) -> tuple[
     return angles, np.where(shaken, 0.0, rates)
 
 
-# The rigid block ------------------------------------------------------------------------------------------------------
+# The rigid block
+# ------------------------------------------------------------------------------------------------------
 
 
 def test_the_rigid_block_on_an_edge_is_housners():
-    """Times of impacts and amplitudes are those of the slender block with e = 1 - 1.5 sin²(alpha) (V3.1), to 1e-9."""
+    """Times of impacts and amplitudes are those of the slender block with e = 1 - 1.5 sin²(alpha)
+    (V3.1), to 1e-9."""
     plane = rocking_block.RockingBlock(HousnerBlock(width=0.5, height=2.0, gravity=G))
     phases = list(OBLONG.phases(OBLONG.tilted(0, 0.0, 0.05), 1.5))
     assert [one.pivots.tolist() for one in phases[:2]] == [
@@ -193,7 +200,8 @@ def test_the_rigid_block_on_an_edge_is_housners():
 
 
 def test_the_rigid_block_keeps_its_angular_momentum_about_the_corner_it_lands_on():
-    """In all landings of the run below: of the full inertia in space, about both horizontal axes, to 1e-12."""
+    """In all landings of the run below: of the full inertia in space, about both horizontal axes,
+    to 1e-12."""
     a, h, c = OBLONG.half
     central = np.diag([h**2 + c**2, a**2 + c**2, a**2 + h**2]) / 3.0
 
@@ -212,7 +220,8 @@ def test_the_rigid_block_keeps_its_angular_momentum_about_the_corner_it_lands_on
         assert np.abs(after.v - v).max() > 0.02
 
 
-# Finite elements ------------------------------------------------------------------------------------------------------
+# Finite elements
+# ------------------------------------------------------------------------------------------------------
 
 
 @grounds
@@ -220,9 +229,9 @@ def test_the_rigid_block_keeps_its_angular_momentum_about_the_corner_it_lands_on
     ("tilt", "landings"), [((0.0, 0.05), 2), ((-0.06, 0.08), 3)], ids=["edge", "corner"]
 )
 def test_rocking(slab, tilt, landings):
-    """V3.4: released on an edge or a corner: angles to 2.5e-5 until the first landing (what is left is elasticity), to
-    2 % of the largest over two landings on edges or three on corners; angular velocities after each landing to 2 %, its
-    time to 0.4 %."""
+    """V3.4: released on an edge or a corner: angles to 2.5e-5 until the first landing (what is left
+    is elasticity), to 2 % of the largest over two landings on edges or three on corners; angular
+    velocities after each landing to 2 %, its time to 0.4 %."""
     model, start = built(OBLONG, slab), OBLONG.tilted(0, *tilt)
     phases = list(OBLONG.phases(start, 1.5))[: landings + 1]
     found = rocked(model, model.tilted(start), 0.5 * (phases[-1].start + phases[-1].end) + 0.02)
@@ -240,9 +249,10 @@ def test_rocking(slab, tilt, landings):
 
 @grounds
 def test_a_square_block_on_its_diagonal(slab):
-    """V3.4: theta'' = p² (theta - sqrt(2) a/h), p² = g h/((a² + h²)/3 + 2 a² + h²), to 2.5e-5. Then three corners land
-    at once, and a rigid block has no one answer: e by the angular momentum about the far corner if it lands first, or
-    after the two beside the diagonal. The block of finite elements is in between."""
+    """V3.4: theta'' = p² (theta - sqrt(2) a/h), p² = g h/((a² + h²)/3 + 2 a² + h²), to 2.5e-5. Then
+    three corners land at once, and a rigid block has no one answer: e by the angular momentum about
+    the far corner if it lands first, or after the two beside the diagonal. The block of finite
+    elements is in between."""
     a, h, _ = SQUARE.half
     about, limit, theta = (
         (a**2 + h**2) / 3.0 + 2.0 * a**2 + h**2,
@@ -266,8 +276,9 @@ def test_a_square_block_on_its_diagonal(slab):
 
 @grounds
 def test_spinning_on_a_corner(slab):
-    """V3.4: a rough block on one corner spins about the vertical too: I theta'' = m g (c + h theta_x, 0, h theta_z - a)
-    with the inertia I in space about the corner, to 1.5e-5 of the largest angle, until another corner lands."""
+    """V3.4: a rough block on one corner spins about the vertical too: I theta'' = m g (c + h
+    theta_x, 0, h theta_z - a) with the inertia I in space about the corner, to 1.5e-5 of the
+    largest angle, until another corner lands."""
     a, h, c = OBLONG.half
     arm, tilt = np.array([a, h, c]), np.array([-0.06, 0.0, 0.08])
     inertia = (
@@ -301,9 +312,10 @@ def test_spinning_on_a_corner(slab):
 @grounds
 @pytest.mark.parametrize("friction", [False, True], ids=["held", "rough"])
 def test_onset(slab, friction):
-    """V3.4: on ground that accelerates along both axes of the base at once, slowly more and more, an edge lifts at
-    g b/h of its own direction whatever the other one is, and three corners lift when both are passed: 1 % below
-    nothing but elasticity (1 um), 1 % above more than 0.2 mm in 0.3 s."""
+    """V3.4: on ground that accelerates along both axes of the base at once, slowly more and more,
+    an edge lifts at g b/h of its own direction whatever the other one is, and three corners lift
+    when both are passed: 1 % below nothing but elasticity (1 um), 1 % above more than 0.2 mm in 0.3
+    s."""
     a, h, c = OBLONG.half
     model = built(OBLONG, slab, friction)
     for shares, up in (

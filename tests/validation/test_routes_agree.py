@@ -1,7 +1,9 @@
-"""Independent routes to the same step (volume and condensed, every method), and the same body written differently.
+"""Independent routes to the same step (volume and condensed, every method), and the same body
+written differently.
 
-Design idea 4: PETSc's SNES-VI and TAO on all unknowns share nothing with the condensed route but A and b. From one
-state both must give the same step. And nothing may depend on the frame, the unit of length or the number of ranks.
+Design idea 4: PETSc's SNES-VI and TAO on all unknowns share nothing with the condensed route but A
+and b. From one state both must give the same step. And nothing may depend on the frame, the unit of
+length or the number of ranks.
 """
 
 from __future__ import annotations
@@ -67,15 +69,18 @@ def timing(name: str) -> tuple[float, int]:
     return (BOX_DT, 8) if "box" in name else (WALL_DT, 34)
 
 
-# Routes ---------------------------------------------------------------------------------------------------------------
+# Routes
+# ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
 @many_routes
 def test_all_routes_agree_at_every_step(name):
-    """Every method against the active set on the condensed problem, from the same states: u and r_n to 1e-9.
+    """Every method against the active set on the condensed problem, from the same states: u and r_n
+    to 1e-9.
 
-    The wall is followed from just before its first contact, at step 20, over closing, sliding apart and closing again.
+    The wall is followed from just before its first contact, at step 20, over closing, sliding apart
+    and closing again.
     """
     dt, steps = timing(name)
     problem = PROBLEMS[name](COMM)
@@ -108,7 +113,8 @@ def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:
 @pytest.mark.slow
 @many_routes
 def test_warm_start_at_the_solution_costs_nothing(name):
-    """A step begun at its own solution: no change of the contact set, no Newton step, no TAO iteration.
+    """A step begun at its own solution: no change of the contact set, no Newton step, no TAO
+    iteration.
 
     (Hildreth counts sweeps; it is told the contact set, not the reactions.)
     """
@@ -140,8 +146,9 @@ def test_bilateral_points_by_both_routes(solver):
 
 @pytest.mark.serial
 def test_stiff_springs_tend_to_the_rigid_wall():
-    """Ground of 1e13 to 1e15 Pa/m under the shaken wall, without impact law: the distance to the rigid ground's motion
-    falls as 1/k. (Points on springs have no impacts: the law is for rigid supports.)"""
+    """Ground of 1e13 to 1e15 Pa/m under the shaken wall, without impact law: the distance to the
+    rigid ground's motion falls as 1/k. (Points on springs have no impacts: the law is for rigid
+    supports.)"""
 
     def motion(springs: float | None) -> Run:
         return run(replace(shaken_wall(COMM, springs=springs), impact=None), dt=WALL_DT, steps=24)
@@ -153,7 +160,8 @@ def test_stiff_springs_tend_to_the_rigid_wall():
     assert np.log10(distance[1] / distance[2]) == pytest.approx(1.0, abs=0.05)
 
 
-# The same body, written differently -----------------------------------------------------------------------------------
+# The same body, written differently
+# -----------------------------------------------------------------------------------
 
 
 @cache
@@ -163,7 +171,8 @@ def reference(name: str, *, alone: bool = False) -> Run:
 
 
 def same(found: Run, other: Run, *, u: Any = None, r_n: float = 1.0, digits: float = 1e-9) -> None:
-    """Same contact sets; displacements and reactions equal after undoing the change of frame or unit."""
+    """Same contact sets; displacements and reactions equal after undoing the change of frame or
+    unit."""
     seen = found.u if u is None else u(found.u)
     assert np.array_equal(found.active, other.active) and other.active.any()
     assert np.abs(seen - other.u).max() < digits * np.abs(other.u).max()
@@ -174,7 +183,8 @@ def same(found: Run, other: Run, *, u: Any = None, r_n: float = 1.0, digits: flo
 @pytest.mark.serial
 @pytest.mark.parametrize("angle", [pi / 6.0, pi / 2.0, -2.0])
 def test_turned_wall_moves_like_the_straight_one(angle):
-    """Mesh, ground, contact directions and shaking turned together: the same motion, turned, to 1e-9."""
+    """Mesh, ground, contact directions and shaking turned together: the same motion, turned, to
+    1e-9."""
     found = run(shaken_wall(COMM, angle=angle), dt=WALL_DT, steps=34)
     same(found, reference("quadrilaterals"), u=lambda u: turned(u, -angle))
 
@@ -200,8 +210,8 @@ def test_inclined_box_moves_like_the_level_one(simplices):
 @pytest.mark.parametrize("route", ["condensed", "reduced Newton", "TAO TRON"])
 @pytest.mark.parametrize("name", ["turned wall", "soft springs"])
 def test_the_unit_of_length_does_not_matter(name, route, metre):
-    """Lengths, E, rho and acceleration in mm or km: the same motion to 1e-9, whatever solves the steps. No tolerance
-    knows about metres."""
+    """Lengths, E, rho and acceleration in mm or km: the same motion to 1e-9, whatever solves the
+    steps. No tolerance knows about metres."""
     settings = PROBLEMS[name].keywords
     solver = Condensed() if route == "condensed" else VOLUME[route]
     found = run(shaken_wall(COMM, metre=metre, **settings), dt=WALL_DT, steps=34, solver=solver)
@@ -210,7 +220,8 @@ def test_the_unit_of_length_does_not_matter(name, route, metre):
 
 @problems
 def test_the_number_of_ranks_does_not_matter(name):
-    """All ranks together and this rank alone: equal contact sets, displacements and reactions to 1e-10."""
+    """All ranks together and this rank alone: equal contact sets, displacements and reactions to
+    1e-10."""
     same(reference(name), reference(name, alone=True), digits=1e-10)
 
 

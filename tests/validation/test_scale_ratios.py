@@ -1,4 +1,5 @@
-"""What a step without a factor costs, in counts that no machine changes, beside the committed table."""
+"""What a step without a factor costs, in counts that no machine changes, beside the committed
+table."""
 
 from __future__ import annotations
 
@@ -42,8 +43,9 @@ MOST_PRODUCTS = {"1": 20, "10": 50, "100": 40, "static": 40}
 
 
 def test_counts_are_those_of_the_table(tmp_path: Path) -> None:
-    """The benchmark on a block of 4000 unknowns: iterations, products, Newton steps and renewals, each at most 1.6
-    times the committed ones; the bounds of the contract with its users in every row."""
+    """The benchmark on a block of 4000 unknowns: iterations, products, Newton steps and renewals,
+    each at most 1.6 times the committed ones; the bounds of the contract with its users in every
+    row."""
     found = tmp_path / "scale.json"
     command = [
         sys.executable,

@@ -1,8 +1,10 @@
-"""V8.7: displacements of second order (P2, Q2) against exact solutions: rates, Hertz contact, Cook's membrane, impacts.
+"""V8.7: displacements of second order (P2, Q2) against exact solutions: rates, Hertz contact,
+Cook's membrane, impacts.
 
-With contact: V2.3 on a cylinder whose foot is a curve of second-order cells, V1.1, V1.2 and V1.3 on bars and strips of
-50 elements. Without: a manufactured solution on distorted cells, and the membrane of Cook, whose tip is 23.96 deep in
-every text book (plane stress, E = 1, nu = 1/3, unit load).
+With contact: V2.3 on a cylinder whose foot is a curve of second-order cells, V1.1, V1.2 and V1.3 on
+bars and strips of 50 elements. Without: a manufactured solution on distorted cells, and the
+membrane of Cook, whose tip is 23.96 deep in every text book (plane stress, E = 1, nu = 1/3, unit
+load).
 """
 
 from __future__ import annotations
@@ -101,7 +103,8 @@ def errors(name: str, n: int, curved: bool) -> tuple[float, float]:
     ],
 )
 def test_orders_three_and_two(name: str, curved: bool) -> None:
-    """Measured: 3.02 to 3.06 in L2, 1.93 to 2.02 in H1 between the two meshes, with straight sides too."""
+    """Measured: 3.02 to 3.06 in L2, 1.93 to 2.02 in H1 between the two meshes, with straight sides
+    too."""
     counts = (4, 8) if CELLS[name][1] == 2 else (3, 6)
     coarse, fine = (np.array(errors(name, n, curved)) for n in counts)
     assert np.log2(coarse / fine) == pytest.approx([3.0, 2.0], abs=0.1)
@@ -113,7 +116,8 @@ HERTZ = HertzLine(force=np.pi * HALF_WIDTH**2 / (4.0 * RADIUS), modulus=1.0, rad
 
 
 def cylinder(per_a: float, degree: int, simplices: bool) -> dict[str, float]:
-    """Relative errors of the pressure and its resultant: half a cylinder, its foot a parabola, on a rigid plane.
+    """Relative errors of the pressure and its resultant: half a cylinder, its foot a parabola, on a
+    rigid plane.
 
     Cells of a / ``per_a`` below; those of degree 2 have curved sides, which are the parabola.
     """
@@ -162,8 +166,9 @@ def cylinder(per_a: float, degree: int, simplices: bool) -> dict[str, float]:
 @pytest.mark.serial
 @pytest.mark.parametrize("simplices", [True, False], ids=["P2", "Q2"])
 def test_v2_3_cylinder_of_curved_cells(simplices: bool) -> None:
-    """Pressure in L2 1.2 and 0.6 % off (P2), 0.9 and 0.5 % (Q2) with 5.65 and 11.3 cells, twice as many nodes, in the
-    half-width; its sum over the inner half 0.1 %; the force exact, the edge within a node."""
+    """Pressure in L2 1.2 and 0.6 % off (P2), 0.9 and 0.5 % (Q2) with 5.65 and 11.3 cells, twice as
+    many nodes, in the half-width; its sum over the inner half 0.1 %; the force exact, the edge
+    within a node."""
     coarse, fine = (cylinder(per_a, 2, simplices) for per_a in (5.65, 11.3))
     for found, per_a in ((coarse, 5.65), (fine, 11.3)):
         assert abs(found["force"]) < 1e-9 and abs(found["edge"]) < 0.5 / per_a
@@ -199,7 +204,8 @@ def cook(n: int, degree: int, simplices: bool) -> float:
 
 @pytest.mark.serial
 def test_cooks_membrane() -> None:
-    """544 unknowns each: P2 0.4 %, Q2 0.15 %, Q1 2.2 % and P1 8 % short of 23.96 (P1 with 2112 still 2.9 %)."""
+    """544 unknowns each: P2 0.4 %, Q2 0.15 %, Q1 2.2 % and P1 8 % short of 23.96 (P1 with 2112
+    still 2.9 %)."""
     p2, q2, q1 = cook(8, 2, True), cook(8, 2, False), cook(16, 1, False)
     assert 23.96 * 0.993 < p2 < 23.97 and 23.96 * 0.997 < q2 < 23.97 and q1 < 23.96 * 0.985
 
@@ -212,8 +218,8 @@ BARS = {
 
 
 def followed(case: Any, name: str, t_end: float) -> tuple[Array, Array, Array, Array, float]:
-    """(times, forces, energies, means of the forces in a step, dt) of the default scheme, a quarter of a cell a
-    step."""
+    """(times, forces, energies, means of the forces in a step, dt) of the default scheme, a quarter
+    of a cell a step."""
     model = build(Bar(case, elements=50, across=2, degree=2, **BARS[name]), COMM)  # type: ignore[arg-type]
     bar, dt, rows = model.bar, model.bar.time_step(0.25), []
     for state, report in vc.march(model.problem(), dt=dt, steps=round(t_end / dt)):
@@ -231,8 +237,8 @@ def followed(case: Any, name: str, t_end: float) -> tuple[Array, Array, Array, A
     "name", ["P2", *(pytest.param(name, marks=pytest.mark.serial) for name in ("P2 bar", "Q2"))]
 )
 def test_v1_1_thrown_bar(name: str) -> None:
-    """The force in the window within 5 % of 300 (measured 1.6; P1 0.02), contact 2/3 s ± 4 dt, impulse 200 within 1 %,
-    energy within 0.1 %."""
+    """The force in the window within 5 % of 300 (measured 1.6; P1 0.02), contact 2/3 s ± 4 dt,
+    impulse 200 within 1 %, energy within 0.1 %."""
     t, force, energy, mean, dt = followed(ThrownBar(), name, 1.6)
     window, touching = (t > 0.6) & (t < 1.067), t[force > 0.0]
     assert np.abs(force[window] / 300.0 - 1.0).max() <= 0.05
@@ -246,8 +252,8 @@ def test_v1_1_thrown_bar(name: str) -> None:
 @pytest.mark.serial  # on two ranks the thrown one strikes
 @pytest.mark.parametrize("name", ["P2 bar", "P2"])
 def test_v1_2_and_v1_3_bouncing_bars(name: str) -> None:
-    """V1.2: impulse 800/3 of the first contact within 0.5 %, energy from 99.5 to 100.1 %. V1.3: energy from 98 to 100 %
-    of the start, impulse ½ of the first contact within 3 %."""
+    """V1.2: impulse 800/3 of the first contact within 0.5 %, energy from 99.5 to 100.1 %. V1.3:
+    energy from 98 to 100 % of the start, impulse ½ of the first contact within 3 %."""
     case = BouncingBar()
     t, _, energy, mean, dt = followed(case, name, 2.5)
     assert dt * mean.sum() == pytest.approx(800.0 / 3.0, rel=5e-3)

@@ -1,7 +1,9 @@
-"""V4: the wall of seed 000 (first example, Figs. 2-5) against the reference numbers and the statements of its figures.
+"""V4: the wall of seed 000 (first example, Figs. 2-5) against the reference numbers and the
+statements of its figures.
 
-Reference (REF): an independent script, Q1 8 x 12, consistent mass, mid-step load; displacements printed to 1e-11 m in
-rows and 1e-9 m in minima and maxima. Every number is compared at its printed precision.
+Reference (REF): an independent script, Q1 8 x 12, consistent mass, mid-step load; displacements
+printed to 1e-11 m in rows and 1e-9 m in minima and maxima. Every number is compared at its printed
+precision.
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ def printed(text: str) -> Any:
     return pytest.approx(float(text), abs=0.5001 * place, rel=0.0)
 
 
-# V4.1, the numbers ----------------------------------------------------------------------------------------------------
+# V4.1, the numbers
+# ----------------------------------------------------------------------------------------------------
 
 CASES = {
     "free": (
@@ -71,7 +74,8 @@ CASES = {
 @one_rank
 @pytest.mark.parametrize("case", CASES)
 def test_v4_1_displacements(case):
-    """u12 at six steps, minima and maxima of u12, u6, u7, u26 [1e-6 m]; a printed 0 is exactly 0."""
+    """u12 at six steps, minima and maxima of u12, u6, u7, u26 [1e-6 m]; a printed 0 is exactly
+    0."""
     found = history("a", projection=True) if case == "a, M-projection" else history(case)
     rows, extremes = CASES[case]
     u = 1e6 * found.u
@@ -86,7 +90,8 @@ def test_v4_1_displacements(case):
 
 @one_rank
 def test_v4_1_bilateral():
-    """Statement 7: held on the ground, the contact side does not move at all; the opposite side does."""
+    """Statement 7: held on the ground, the contact side does not move at all; the opposite side
+    does."""
     found = history("bilateral")
     assert not found.contact.any() and found.active.all()
     assert not found.u[:, :3].any()
@@ -130,7 +135,8 @@ LEDGERS = {
 @one_rank
 @pytest.mark.parametrize("case", LEDGERS)
 def test_v4_1_energy_ledger(case):
-    """Input work = reset loss + contact work of the steps + energy at the end [J], closed to round-off (V9.7)."""
+    """Input work = reset loss + contact work of the steps + energy at the end [J], closed to
+    round-off (V9.7)."""
     found = history(case)
     losses = found.losses | {"end": found.energy[-1]}
     for name, text in LEDGERS[case].items():
@@ -145,7 +151,8 @@ def test_v4_1_energy_ledger(case):
 
 
 def sweeps(D: Array, z: Array, v: Array) -> tuple[Array, int]:
-    """The seed's Hildreth-d'Esopo on (49), word for word: v_i <- min(0, v_i + (z - D v)_i / D_ii), cyclically.
+    """The seed's Hildreth-d'Esopo on (49), word for word: v_i <- min(0, v_i + (z - D v)_i / D_ii),
+    cyclically.
 
     Ends when no v_i changed by more than 1e-13 of the largest; every sweep must lower ½ vᵀDv - zᵀv.
     """
@@ -164,10 +171,12 @@ def sweeps(D: Array, z: Array, v: Array) -> tuple[Array, int]:
 @one_rank
 @pytest.mark.parametrize("case, mean", [("a", 5.7), ("b", 20.7)])
 def test_v4_1_sweeps_of_the_seeds_own_method(case, mean):
-    """Projected Gauss-Seidel on D~, z~ from the last displacements gives the same u_N, in 5.7 or 20.7 sweeps (mean).
+    """Projected Gauss-Seidel on D~, z~ from the last displacements gives the same u_N, in 5.7 or
+    20.7 sweeps (mean).
 
-    REF does not say what the change of a sweep was compared with; other sensible choices move the mean by up to 1.2 in
-    case b (and by 0.2 in case a). Half a sweep is allowed here: found are 5.69 and 21.16.
+    REF does not say what the change of a sweep was compared with; other sensible choices move the
+    mean by up to 1.2 in case b (and by 0.2 in case a). Half a sweep is allowed here: found are 5.69
+    and 21.16.
     """
     given, A, solver = prepared(case)
     D, surface = np.linalg.inv(solver.delassus), given.surface
@@ -187,8 +196,8 @@ def test_v4_1_sweeps_of_the_seeds_own_method(case, mean):
 @pytest.mark.parametrize("case", ["a", "b"])
 @pytest.mark.parametrize("primal", [True, False])
 def test_statement_8_hildreth_needs_few_sweeps(case, primal):
-    """At most 30 sweeps in any step, in both forms. An open step counts none and the last reactions are the start, so
-    the means are below those of the seed's own sweeps."""
+    """At most 30 sweeps in any step, in both forms. An open step counts none and the last reactions
+    are the start, so the means are below those of the seed's own sweeps."""
     given = problem(case)
     found = follow(
         given, dt=model().time_step(), solver=Condensed(Hildreth(primal=primal, tolerance=1e-13))
@@ -197,13 +206,15 @@ def test_statement_8_hildreth_needs_few_sweeps(case, primal):
     assert np.abs(found.u - history(case).u).max() < 1e-10 * np.abs(found.u).max()
 
 
-# V4.0: three forms of one problem -------------------------------------------------------------------------------------
+# V4.0: three forms of one problem
+# -------------------------------------------------------------------------------------
 
 
 @one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_v4_0_condensed_matrix_is_the_schur_complement(case):
-    """D~ = K_cc - K_ci K_ii^-1 K_ic of the dense effective matrix, symmetric to 1e-12 and positive definite.
+    """D~ = K_cc - K_ci K_ii^-1 K_ic of the dense effective matrix, symmetric to 1e-12 and positive
+    definite.
 
     And z~ = F_c - K_ci K_ii^-1 F_i is what the unconstrained solution gives, D~ (A^-1 F)_c.
     """
@@ -240,7 +251,8 @@ def test_v4_0_primal_dual_and_active_set_agree(case):
     assert all(found.size["r_n"] > 0.0 and found.steps == 60 for found in checked.found)
 
 
-# The statements about Figs. 4 and 5 -----------------------------------------------------------------------------------
+# The statements about Figs. 4 and 5
+# -----------------------------------------------------------------------------------
 
 
 @one_rank
@@ -257,7 +269,8 @@ def test_statement_1_linear_before_first_contact(case):
 @one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_statement_2_contact_points_never_penetrate(case):
-    """u_n <= 0 without exception; in case a the points between and above the three contacts do pass the line."""
+    """u_n <= 0 without exception; in case a the points between and above the three contacts do pass
+    the line."""
     found = history(case)
     assert found.contact.max() == 0.0
     if case == "a":
@@ -266,7 +279,8 @@ def test_statement_2_contact_points_never_penetrate(case):
 
 @one_rank
 def test_statements_3_and_4_cases_differ():
-    """Case b: the whole side is one-sided, point 26 moves to +9. Peaks to the right: 22.4 against 0; left: alike."""
+    """Case b: the whole side is one-sided, point 26 moves to +9. Peaks to the right: 22.4 against
+    0; left: alike."""
     a, b = history("a").u * 1e6, history("b").u * 1e6
     assert history("b").contact.max(axis=0).tolist() == [0.0] * 11
     assert b[:, 3].max() > 9.0
@@ -277,8 +291,9 @@ def test_statements_3_and_4_cases_differ():
 @one_rank
 @pytest.mark.parametrize("projection", [False, True])
 def test_statement_5_energy_is_lost_in_contact_only(projection):
-    """Undamped and no longer shaken: constant in free flight to 1e-12, lost in contact. The M-orthogonal reset and the
-    step itself never create energy (V9.1, V9.6); the literal reset of components may, step by step."""
+    """Undamped and no longer shaken: constant in free flight to 1e-12, lost in contact. The
+    M-orthogonal reset and the step itself never create energy (V9.1, V9.6); the literal reset of
+    components may, step by step."""
     dt = model().time_step()
     reading = ImpulseUpdate() if projection else None
     shaken = follow(problem("a", reading=reading), dt=dt, steps=37)
@@ -300,7 +315,8 @@ def test_statement_5_energy_is_lost_in_contact_only(projection):
 @one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_statement_6_positive_homogeneity(case):
-    """2.5 times the ground acceleration gives 2.5 times every displacement and the same contact sets."""
+    """2.5 times the ground acceleration gives 2.5 times every displacement and the same contact
+    sets."""
     base = history(case)
     found = follow(problem(case, a0=2.5), dt=model().time_step(), steps=150)
     assert np.array_equal(found.active, base.active[:150]) and found.active.any()
@@ -309,14 +325,16 @@ def test_statement_6_positive_homogeneity(case):
 
 @one_rank
 def test_density_read_as_a_tenth_only_scales():
-    """rho = 0.24 instead of 2.4 kN s²/m⁴ with f = f1/2 and dt = 1/(40 f): every displacement is exactly a tenth."""
+    """rho = 0.24 instead of 2.4 kN s²/m⁴ with f = f1/2 and dt = 1/(40 f): every displacement is
+    exactly a tenth."""
     light = Wall(material=LinearElastic(E=2.0e10, nu=0.0, rho=240.0))
     found, base = history("a", wall=light), history("a")
     assert np.array_equal(found.active, base.active)
     assert np.abs(10.0 * found.u - base.u).max() < 1e-10 * np.abs(base.u).max()
 
 
-# Discretisations and ranks --------------------------------------------------------------------------------------------
+# Discretisations and ranks
+# --------------------------------------------------------------------------------------------
 
 OTHER = {
     "triangles": Wall(triangles=True),
@@ -341,8 +359,9 @@ def test_other_discretisations(case, other):
 def test_other_discretisations_of_isolated_contact_points(other):
     """Case a: minima within 10 % of the largest displacement, on the finer meshes.
 
-    A point contact has no limit in two dimensions (its compliance grows with log 1/h, the mass that a reset stops
-    shrinks with h²), so case a belongs to its mesh: triangles of the coarse mesh are off by 17 %, maxima by up to 14 %.
+    A point contact has no limit in two dimensions (its compliance grows with log 1/h, the mass that
+    a reset stops shrinks with h²), so case a belongs to its mesh: triangles of the coarse mesh are
+    off by 17 %, maxima by up to 14 %.
     """
     found, base = history("a", wall=OTHER[other]).u, history("a").u
     assert np.all(np.abs(found.min(axis=0) - base.min(axis=0)) < 0.1 * np.abs(base).max(axis=0))

@@ -1,7 +1,9 @@
-"""V2.2: the elastic Signorini field with exact solution, static and moving: how the contact discretisation converges.
+"""V2.2: the elastic Signorini field with exact solution, static and moving: how the contact
+discretisation converges.
 
-Plane strain, rigid frictionless obstacle below y = 0, contact for x < x0 = 1/7, open beyond; body [-1, 1] x [0, 1],
-exact displacements on the three other sides. Reference (REF): an independent Q1 script, h = 1/n.
+Plane strain, rigid frictionless obstacle below y = 0, contact for x < x0 = 1/7, open beyond; body
+[-1, 1] x [0, 1], exact displacements on the three other sides. Reference (REF): an independent Q1
+script, h = 1/n.
 """
 
 from __future__ import annotations
@@ -48,8 +50,9 @@ SIDES = ("left", "right", "top")
 
 @dataclass(frozen=True)
 class Motion:
-    """s(t), s'(t), s''(t) of V2.2d, s = 1 + ½ sin 2 pi t; ``dt``: means over the step around t instead, where u and v
-    of a boundary node follow the midpoint rule from its positions at the ends of the steps."""
+    """s(t), s'(t), s''(t) of V2.2d, s = 1 + ½ sin 2 pi t; ``dt``: means over the step around t
+    instead, where u and v of a boundary node follow the midpoint rule from its positions at the
+    ends of the steps."""
 
     dt: float | None = None
 
@@ -155,7 +158,8 @@ def test_v2_2_reference_table(n):
 @one_rank
 @pytest.mark.parametrize("simplices", [False, True])
 def test_v2_2_rates(simplices):
-    """Q1 and P1, n = 8 to 64: H1 and energy at least 0.95 between all neighbours, L2 two in the mean."""
+    """Q1 and P1, n = 8 to 64: H1 and energy at least 0.95 between all neighbours, L2 two in the
+    mean."""
     found = [static(n, simplices=simplices)[2] for n in REFERENCE]
     assert orders([error.h1 for error in found]).min() >= 0.95
     assert orders([error.energy for error in found]).min() >= 0.95
@@ -166,7 +170,8 @@ def test_v2_2_rates(simplices):
 @pytest.mark.parametrize("n", [8, 16, 32, pytest.param(64, marks=one_rank)])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_v2_2_contact_set_ends_within_one_element(n, simplices):
-    """One connected contact zone from the left, whose last node is less than h away from x0 = 1/7."""
+    """One connected contact zone from the left, whose last node is less than h away from x0 =
+    1/7."""
     problem, state, _ = static(n, simplices=simplices)
     surface = problem.surface
     x, state = surface.whole().points[:, 0], gathered(surface, state)
@@ -180,14 +185,16 @@ def test_v2_2_contact_set_ends_within_one_element(n, simplices):
 @pytest.mark.serial
 @pytest.mark.parametrize("n", [8, 16])
 def test_v2_2_total_reaction(n):
-    """The contact force is the integral of the exact pressure, (2/3) a (1 + x0)^(3/2), up to the clamped corner's half
-    element, whose share h a √(1 + x0) / 2 no contact condition carries; to second order."""
+    """The contact force is the integral of the exact pressure, (2/3) a (1 + x0)^(3/2), up to the
+    clamped corner's half element, whose share h a √(1 + x0) / 2 no contact condition carries; to
+    second order."""
     problem, state, _ = static(n)
     exact = 2.0 / 3.0 * (1.0 + X0) ** 1.5 - 0.5 / n * np.sqrt(1.0 + X0)
     assert total(problem.surface.comm, state.r_n.sum()) == pytest.approx(exact, abs=1.0 / n**2)
 
 
-# V2.2d, the moving version --------------------------------------------------------------------------------------------
+# V2.2d, the moving version
+# --------------------------------------------------------------------------------------------
 
 
 def march_once(n: int, *, averaged: bool = False) -> Errors:
@@ -212,9 +219,11 @@ MOVING = {8: (5.17e-2, 5.99e-3), 16: (2.40e-2, 1.53e-3), 32: (1.18e-2, 3.47e-4)}
 
 @pytest.mark.parametrize("n", [8, 16, pytest.param(32, marks=one_rank)])
 def test_v2_2d_reference_table(n):
-    """REF averages load and boundary motion of both ends of the step; given that, its numbers come out.
+    """REF averages load and boundary motion of both ends of the step; given that, its numbers come
+    out.
 
-    (With mid-step values, which is what the scheme does by itself, the L2 errors are a quarter smaller.)
+    (With mid-step values, which is what the scheme does by itself, the L2 errors are a quarter
+    smaller.)
     """
     energy, l2 = MOVING[n]
     found = march_once(n, averaged=True)

@@ -1,4 +1,5 @@
-"""V3.2: a stiff finite element block with Coulomb friction on a shaken ground slides as Newmark's rigid block does."""
+"""V3.2: a stiff finite element block with Coulomb friction on a shaken ground slides as Newmark's
+rigid block does."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ def shaken(
     )
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
     u, defect = solution.history["u_x_centre"], np.abs(solution.history["energy_defect"]).max()
-    # round-off: on five kinds of processor, with steps of 0.5 to 2 ms, at most 0.11 of this; 1.35e-10 of the energy
+    # round-off: on five kinds of processor, with steps of 0.5 to 2 ms, at most 0.11 of this;
+    # 1.35e-10 of the energy
     assert (
         0.0
         < defect
@@ -49,8 +51,9 @@ def shaken(
 
 
 def test_rectangular_pulse():
-    """V3.2: A = 0.5 g for 0.2 s, mu = 0.2: slips 0.147150 m to 1 % (the mean load of a step takes half a step off the
-    pulse: 0.25 %), stops at 0.5 s; friction takes mu m g times the slip; the base stays down."""
+    """V3.2: A = 0.5 g for 0.2 s, mu = 0.2: slips 0.147150 m to 1 % (the mean load of a step takes
+    half a step off the pulse: 0.25 %), stops at 0.5 s; friction takes mu m g times the slip; the
+    base stays down."""
     history, u = shaken(0.2, vc.Rectangular(0.5 * G, 0.2), 0.6, 5e-4)
     assert u[-1] == pytest.approx(-0.147150, rel=0.01)
     t = history["t"]
@@ -69,8 +72,8 @@ def test_harmonic_base():
 
 
 def test_weak_shaking_moves_nothing():
-    """V3.2: below mu g the block sticks: it moves with the ground but for its own elastic shear, in which its edges
-    slip. Friction takes less than a millionth of what the pulse above loses."""
+    """V3.2: below mu g the block sticks: it moves with the ground but for its own elastic shear, in
+    which its edges slip. Friction takes less than a millionth of what the pulse above loses."""
     history, u = shaken(0.2, vc.Harmonic(0.19 * G, 1.0), 0.5, 2e-3)
     assert np.max(np.abs(u)) < 1e-5
     assert np.max(np.abs(history["loss_friction"])) < 1e-6 * 0.2 * 2400.0 * 0.5 * G * 0.147150

@@ -1,6 +1,8 @@
-"""V3.5: a deformable block slides on an inclined plane in space, alike in any orientation, as a point does.
+"""V3.5: a deformable block slides on an inclined plane in space, alike in any orientation, as a
+point does.
 
-The plane is rigid, or a deformable ground whose mesh does not match that of the block (dual mortar).
+The plane is rigid, or a deformable ground whose mesh does not match that of the block (dual
+mortar).
 """
 
 from __future__ import annotations
@@ -39,8 +41,9 @@ def rotation(number: int) -> Array:
 
 @dataclass(frozen=True)
 class Slope:
-    """A block on a plane, turned by ``turn`` as a whole. In its own axes y is the normal of the plane, and the weight
-    acts along (sin(a) cos(b), -cos(a), sin(a) sin(b)); its part along the plane grows with the time as ``history``."""
+    """A block on a plane, turned by ``turn`` as a whole. In its own axes y is the normal of the
+    plane, and the weight acts along (sin(a) cos(b), -cos(a), sin(a) sin(b)); its part along the
+    plane grows with the time as ``history``."""
 
     problem: vc.ContactProblem
     turn: Array
@@ -139,9 +142,9 @@ def resting(slope: Slope) -> State:
 @grounds
 @pytest.mark.parametrize("simplices", [False, True], ids=["hexahedra", "tetrahedra"])
 def test_alike_in_any_orientation(ground, simplices):
-    """V3.5: at first most of it sticks; kicked, so that an edge hops, and tilted by a growing weight, it slides as a
-    whole in the end. Turned back from other orientations displacements are the same to 1e-9, and the same points are
-    open, stick and slip in every step."""
+    """V3.5: at first most of it sticks; kicked, so that an edge hops, and tilted by a growing
+    weight, it slides as a whole in the end. Turned back from other orientations displacements are
+    the same to 1e-9, and the same points are open, stick and slip in every step."""
     found = []
     for number in (0, 4, 7):
         slope = sloping(
@@ -176,8 +179,8 @@ def test_alike_in_any_orientation(ground, simplices):
 
 @grounds
 def test_acceleration(ground):
-    """V3.5: it starts from rest, sticking, and once its vibrations are over accelerates by g (sin(a) - mu cos(a)) down
-    the slope, to 1e-9 in every step."""
+    """V3.5: it starts from rest, sticking, and once its vibrations are over accelerates by g
+    (sin(a) - mu cos(a)) down the slope, to 1e-9 in every step."""
     mu, tangent, dt = 0.3, 0.6, 1e-3
     slope = sloping(
         tangent, mu, ground=ground, number=4, history=lambda t: 0.3 + 0.7 * min(t / 0.03, 1.0)
@@ -220,9 +223,9 @@ def test_the_point_obeys_its_equation():
 @grounds
 @pytest.mark.parametrize(("mu", "tangent"), [(0.3, 0.4), (0.5, 0.25)], ids=["faster", "to rest"])
 def test_thrown_across_the_slope(ground, mu, tangent):
-    """V3.5: friction opposes the velocity, so that the path bends down the slope; it goes on for ever, or ends. It is
-    that of the point with an error of first order in dt (0.4 and 1.6 % of it in steps of 4 ms) and, extrapolated to
-    dt = 0, of less than 0.012 %. The block does not spin."""
+    """V3.5: friction opposes the velocity, so that the path bends down the slope; it goes on for
+    ever, or ends. It is that of the point with an error of first order in dt (0.4 and 1.6 % of it
+    in steps of 4 ms) and, extrapolated to dt = 0, of less than 0.012 %. The block does not spin."""
     slope = sloping(
         tangent, mu, ground=ground, number=7, E=1.0e9, beta=1.0e-4, history=lambda t: float(t > 0.0)
     )

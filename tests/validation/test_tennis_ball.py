@@ -1,4 +1,5 @@
-"""V7.3: the disk that a moving plane pushes up and releases: invariants of its flight, and boundary elements."""
+"""V7.3: the disk that a moving plane pushes up and releases: invariants of its flight, and boundary
+elements."""
 
 from __future__ import annotations
 
@@ -43,8 +44,8 @@ def model(push: Push, size: float = 0.04) -> DiskModel:
 
 @cache
 def run(law: str, scheme: str, push: Push = PUSH, size: float = 0.04) -> dict[str, Array]:
-    """The history of the push and of the flight, with "energy", the "force" that acts in each step, and "last": the row
-    of the last contact."""
+    """The history of the push and of the flight, with "energy", the "force" that acts in each step,
+    and "last": the row of the last contact."""
     disk = model(push, size)
     solution = vc.simulate(
         disk.problem(friction=LAWS[law]),
@@ -72,9 +73,9 @@ def run(law: str, scheme: str, push: Push = PUSH, size: float = 0.04) -> dict[st
 
 @every_run
 def test_flight(scheme, law):
-    """V7.3: once released, while the plane retracts, the contact force is 0 and stays 0; velocity of the centre of mass
-    and energy are constant to 1e-10. Coulomb's friction is 0 as well; Tresca's goes on to act on what does not touch,
-    as the source warns."""
+    """V7.3: once released, while the plane retracts, the contact force is 0 and stays 0; velocity
+    of the centre of mass and energy are constant to 1e-10. Coulomb's friction is 0 as well;
+    Tresca's goes on to act on what does not touch, as the source warns."""
     history = run(law, scheme)
     last = int(history["last"])
     flight = slice(
@@ -91,8 +92,9 @@ def test_flight(scheme, law):
 @pytest.mark.serial
 @every_run
 def test_momentum_and_energy_have_their_sources(scheme, law):
-    """V7.3: momentum is the impulse of the contact forces, to 1e-10; none sideways, none angular. The energy is the
-    work of the moving plane, Σ force (s1 - s0), less what contact and friction take; the ledger closes."""
+    """V7.3: momentum is the impulse of the contact forces, to 1e-10; none sideways, none angular.
+    The energy is the work of the moving plane, Σ force (s1 - s0), less what contact and friction
+    take; the ledger closes."""
     history, push = run(law, scheme), model(PUSH).disk.push
     momentum = history["momentum_y"][-1]
     impulse = np.cumsum(history["force"]) * history["t"][1]
@@ -116,7 +118,8 @@ def test_momentum_and_energy_have_their_sources(scheme, law):
 @one_rank
 @pytest.mark.parametrize(("scheme", "law"), list(product(SCHEMES, ("coulomb", "tresca"))))
 def test_friction_opposes_every_slip(scheme, law):
-    """V7.3: the reaction at the end of a step (midpoint: its mean) never helps the slip of that step."""
+    """V7.3: the reaction at the end of a step (midpoint: its mean) never helps the slip of that
+    step."""
     history = run(law, scheme)
     work = history["traction_t"][1:] * np.diff(history["slip"], axis=0)
     assert history["traction_t"].any()
@@ -126,9 +129,10 @@ def test_friction_opposes_every_slip(scheme, law):
 
 @one_rank
 def test_gentle_push_of_the_boundary_elements():
-    """V7.3 with the push 0.1 sin²(pi t/8) of an independent script of space-time boundary elements, 80 on the circle:
-    released at t = 2.69, flies with 0.06793, with friction 0.06789. Cells of 0.02 to 0.5 %, release to two steps of
-    0.01, the ratio as far as its digits go, 1.5e-4. Friction leaves less energy."""
+    """V7.3 with the push 0.1 sin²(pi t/8) of an independent script of space-time boundary elements,
+    80 on the circle: released at t = 2.69, flies with 0.06793, with friction 0.06789. Cells of 0.02
+    to 0.5 %, release to two steps of 0.01, the ratio as far as its digits go, 1.5e-4. Friction
+    leaves less energy."""
     free, rubbed = (run(law, "default", GENTLE, 0.02) for law in ("none", "coulomb"))
     assert free["t"][free["last"]] == pytest.approx(2.69, abs=2 * 0.01 + 1e-9)
     velocity = free["momentum_y"][-1] / model(GENTLE, 0.02).mass
@@ -142,9 +146,9 @@ def test_gentle_push_of_the_boundary_elements():
 @one_rank
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_faster_push_gives_more_to_a_disk_that_sticks(scheme):
-    """V7.3: E_with <= E_without is no law where the obstacle is driven: a foot that sticks is stiffer, and here the
-    plane does more work on it than friction takes. The excess of 0.35 % is that of finer meshes
-    (docs/guide/pressed_blocks.md)."""
+    """V7.3: E_with <= E_without is no law where the obstacle is driven: a foot that sticks is
+    stiffer, and here the plane does more work on it than friction takes. The excess of 0.35 % is
+    that of finer meshes (docs/guide/pressed_blocks.md)."""
     free, rubbed = run("none", scheme), run("coulomb", scheme)
     taken = rubbed["loss_friction"][-1]
     given = rubbed["work_input"][-1] - free["work_input"][-1]
@@ -154,8 +158,8 @@ def test_faster_push_gives_more_to_a_disk_that_sticks(scheme):
 
 @pytest.mark.serial
 def test_gap_of_the_moving_plane():
-    """V7.3: g(x, t) = R - sqrt(R² - x²) - s(t), vertical, at every point of the foot; s goes up by 0.05
-    (1 - cos pi t)/2 and down as it came."""
+    """V7.3: g(x, t) = R - sqrt(R² - x²) - s(t), vertical, at every point of the foot; s goes up by
+    0.05 (1 - cos pi t)/2 and down as it came."""
     disk = model(PUSH)
     surface = disk.problem().surface
     x, R = surface.whole().points[:, 0], disk.disk.radius
@@ -169,7 +173,8 @@ def test_gap_of_the_moving_plane():
 
 @one_rank
 def test_disk_mesh():
-    """Mirror images to the last bit, nodes on the circle, area short by (size/R)²/6, lowest point a node."""
+    """Mirror images to the last bit, nodes on the circle, area short by (size/R)²/6, lowest point a
+    node."""
     mesh = arrays_from_script(DiskMesh(radius=0.5, size=0.05))
     images = {(-x, y) for x, y in mesh.points}
     assert images == {(x, y) for x, y in mesh.points + 0.0} and (0.0, 0.0) in images
@@ -205,7 +210,8 @@ def test_bad_input_is_refused():
 def test_the_tennis_ball_demo(
     comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """V7.3 with cells of 0.1: certified, ledgers closed, no change of energy in flight; figures drawn."""
+    """V7.3 with cells of 0.1: certified, ledgers closed, no change of energy in flight; figures
+    drawn."""
     numbers = demo("tennis_ball").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     for name in ("no friction", "Coulomb 2", "Tresca 2"):

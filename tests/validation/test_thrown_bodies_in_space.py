@@ -1,5 +1,5 @@
-"""V9.7 and V9.8 in space, over a whole collision: two free bodies, on meshes that do not match, thrown at each other
-obliquely and with spin, press, rub and part."""
+"""V9.7 and V9.8 in space, over a whole collision: two free bodies, on meshes that do not match,
+thrown at each other obliquely and with spin, press, rub and part."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ BENT = 0.2  # [1/m]: curvature of the curved faces
     "scheme", [vc.Trapezoidal(), vc.Midpoint(), vc.MoreauJean()], ids=lambda s: type(s).__name__
 )
 def test_a_whole_collision(scheme, bent, gap, friction, simplices):
-    """Momentum, angular momentum and the ledger to 1e-11 of the largest. Rough curved faces are polygons that do not
-    fit, and friction acts on both sides of the gaps between them: its moment is all that angular momentum changes by,
-    to 1e-11 in every step; in the end 2e-4."""
+    """Momentum, angular momentum and the ledger to 1e-11 of the largest. Rough curved faces are
+    polygons that do not fit, and friction acts on both sides of the gaps between them: its moment
+    is all that angular momentum changes by, to 1e-11 in every step; in the end 2e-4."""
     problem = thrown_blocks(COMM, friction=friction, bent=bent, gap=gap, simplices=simplices)
     problem = replace(problem, mass=scheme.mass)
     surface, equations, rigid = problem.surface, problem.equations, rigid_motions(problem)

@@ -1,7 +1,8 @@
-"""V2.11: two spheres on meshes that do not match, pressed together and twisted about their normal under Coulomb
-friction (Mindlin 1949 without slip, Lubkin 1951 with it).
+"""V2.11: two spheres on meshes that do not match, pressed together and twisted about their normal
+under Coulomb friction (Mindlin 1949 without slip, Lubkin 1951 with it).
 
-The far sides of the bodies turn as the closed form says, and the moment is what the contact answers.
+The far sides of the bodies turn as the closed form says, and the moment is what the contact
+answers.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ def carried(c: float) -> float:
 @pytest.mark.serial
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99])
 def test_v2_11_closed_form(share):
-    """τ carries T (1e-9) and is below μ p inside c; the surface turns as a rigid disk where it sticks and less beyond,
-    that is, slip goes the way of the twist; the twist is Johnson's (3 μ P/(4 π G a²)) [K - E] per body."""
+    """τ carries T (1e-9) and is below μ p inside c; the surface turns as a rigid disk where it
+    sticks and less beyond, that is, slip goes the way of the twist; the twist is Johnson's (3 μ
+    P/(4 π G a²)) [K - E] per body."""
     c = share * FORM.a
     assert carried(c) == pytest.approx(FORM.moment(c), rel=1e-9)
     inside = np.linspace(0.05, 0.95, 7) * c
@@ -53,8 +55,9 @@ def test_v2_11_closed_form(share):
 
 @pytest.mark.serial
 def test_v2_11_limits_of_the_closed_form():
-    """c -> a: T = (16/3) G a³ β, less by a share that vanishes with a - c, so that slip begins at once. c -> 0: the
-    moment of full sliding, 3 π μ P a/16, while the twist grows without bound. More twist, less stick, more moment."""
+    """c -> a: T = (16/3) G a³ β, less by a share that vanishes with a - c, so that slip begins at
+    once. c -> 0: the moment of full sliding, 3 π μ P a/16, while the twist grows without bound.
+    More twist, less stick, more moment."""
     edge, centre = FORM.a * (1.0 - 1e-4), 1e-4 * FORM.a
     assert FORM.moment(edge) == pytest.approx(FORM.no_slip(FORM.twist(edge)), rel=2e-4)
     assert FORM.moment(centre) == pytest.approx(FORM.sliding, rel=1e-6)
@@ -66,8 +69,8 @@ def test_v2_11_limits_of_the_closed_form():
 
 @pytest.mark.serial
 def test_v2_11_displacements_below_the_twist():
-    """The field of disks is that of forces round the axis (1e-4, the root of τ at c); far away it is that of their
-    moment, T r/(8 π G |x|³), with slip and without."""
+    """The field of disks is that of forces round the axis (1e-4, the root of τ at c); far away it
+    is that of their moment, T r/(8 π G |x|³), with slip and without."""
     points = np.array([[5.0, 0.0, 1.0], [3.0, 3.0, 2.0], [0.1, 6.0, 0.2]])
     c, places, forces = 0.8, [], []
     angle = 2.0 * np.pi * np.arange(24) / 24
@@ -100,8 +103,9 @@ def twisted() -> Torsion:
 @pytest.mark.slow
 @pytest.mark.serial
 def test_v2_11_slip_from_the_edge():
-    """In the mean over six approaches: P to 0.3 % (0.09 found), T to 3 % (1.0 at most) and, close to full sliding, to
-    1 % (0.3), radius of stick to 0.12 a, half a cell (0.05), τ in L2 to 15 % where most slips (5)."""
+    """In the mean over six approaches: P to 0.3 % (0.09 found), T to 3 % (1.0 at most) and, close
+    to full sliding, to 1 % (0.3), radius of stick to 0.12 a, half a cell (0.05), τ in L2 to 15 %
+    where most slips (5)."""
     stages = twisted().compared()
     for found in stages:
         assert (
@@ -115,15 +119,16 @@ def test_v2_11_slip_from_the_edge():
 @pytest.mark.slow
 @pytest.mark.serial
 def test_v2_11_no_slip():
-    """T = (16/3) G a³ β where friction has no bound: 4.6 % more, as τ is infinite at the edge and nodes stick whose
-    area reaches beyond it; finer meshes in benchmarks/contact_in_space.py."""
+    """T = (16/3) G a³ β where friction has no bound: 4.6 % more, as τ is infinite at the edge and
+    nodes stick whose area reaches beyond it; finer meshes in benchmarks/contact_in_space.py."""
     assert abs(twisted().without_slip()) < 0.12
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(COMM.size == 1, reason="compares several ranks with one")
 def test_v2_11_ranks_agree():
-    """All ranks together and each alone: the same points are open, stick and slip; nodal forces to 1e-9 P."""
+    """All ranks together and each alone: the same points are open, stick and slip; nodal forces to
+    1e-9 P."""
     stages = range(1, 1 + len(STICK))
     together, alone = (
         Torsion(3, (1.0, 1.1), comm).rubbed.stages(stages) for comm in (COMM, MPI.COMM_SELF)

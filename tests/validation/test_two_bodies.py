@@ -1,5 +1,6 @@
-"""Two deformable bodies: bars that collide (V1.4), the patch test through an interface (V2.1), action and reaction
-(V9.8), friction, and the same answer from all solvers and on any number of ranks."""
+"""Two deformable bodies: bars that collide (V1.4), the patch test through an interface (V2.1),
+action and reaction (V9.8), friction, and the same answer from all solvers and on any number of
+ranks."""
 
 from __future__ import annotations
 
@@ -44,12 +45,14 @@ pytestmark = pytest.mark.slow
 COMM = MPI.COMM_WORLD
 ELEMENTS, ACROSS = 50, 3  # of the shorter bar, across a strip
 
-# V1.4 -----------------------------------------------------------------------------------------------------------------
+# V1.4
+# -----------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Collision:
-    """Per step: time, pressure, mean pressure of the step, energy; mean velocities of both bars at the end."""
+    """Per step: time, pressure, mean pressure of the step, energy; mean velocities of both bars at
+    the end."""
 
     t: Array
     pressure: Array
@@ -125,8 +128,8 @@ BODIES: dict[str, dict[str, Any]] = {
     ],
 )
 def test_v1_4_default_scheme(body, courant):
-    """Pressure rho c v0/2 in the mean within 0.2 %, at every step within 3 %; duration 2 L1/c within 5 %, velocities
-    and restitution L1/L2 within 1.5 %, energy kept to 1 %."""
+    """Pressure rho c v0/2 in the mean within 0.2 %, at every step within 3 %; duration 2 L1/c
+    within 5 %, velocities and restitution L1/L2 within 1.5 %, energy kept to 1 %."""
     case = TwoBars(length1=1.0, length2=2.0)
     found = collide(case, courant=courant, **BODIES[body])
     window = (found.t > 0.1 * case.duration) & (found.t < 0.9 * case.duration)
@@ -158,8 +161,8 @@ def test_v1_4_other_impedances():
 @pytest.mark.serial
 @pytest.mark.parametrize("body", BODIES)
 def test_v1_4_contact_stabilised(body):
-    """Consistent mass, Courant number 1: pressure at every step within 1.5 %, duration, velocities within 1 %; no step
-    gains energy."""
+    """Consistent mass, Courant number 1: pressure at every step within 1.5 %, duration, velocities
+    within 1 %; no step gains energy."""
     case = TwoBars(length1=1.0, length2=2.0)
     found = collide(case, courant=1.0, scheme=ContactStabilisedNewmark(), **BODIES[body])
     window = (found.t > 0.1 * case.duration) & (found.t < 0.9 * case.duration)
@@ -168,7 +171,8 @@ def test_v1_4_contact_stabilised(body):
     assert np.diff(found.energy).max() < 1e-11 * found.energy[0]
 
 
-# V2.1 -----------------------------------------------------------------------------------------------------------------
+# V2.1
+# -----------------------------------------------------------------------------------------------------------------
 
 P = 1.0e8
 STEEL, BRASS = (
@@ -193,8 +197,8 @@ def strains(material: LinearElastic, d: int) -> Array:
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("swapped", [False, True], ids=["upper-lower", "lower-upper"])
 def test_v2_1_pressure_through_an_interface(d, simplices, solver, swapped):
-    """Steel on brass, matching meshes, frictionless: both in their own uniform state, pressure p at every node of the
-    interface, to 1e-12, whichever side is the first."""
+    """Steel on brass, matching meshes, frictionless: both in their own uniform state, pressure p at
+    every node of the interface, to 1e-12, whichever side is the first."""
     mesh = blocks(d, simplices=simplices)
     low, high = strains(BRASS, d), strains(STEEL, d)
 
@@ -232,7 +236,8 @@ def test_v2_1_pressure_through_an_interface(d, simplices, solver, swapped):
     )
 
 
-# Dynamics -------------------------------------------------------------------------------------------------------------
+# Dynamics
+# -------------------------------------------------------------------------------------------------------------
 
 
 def meeting(
@@ -244,7 +249,8 @@ def meeting(
     angle: float = 0.3,
     fine: int = 1,
 ) -> ContactProblem:
-    """The upper block thrown obliquely, and turning, on the free lower one; nothing else acts on them."""
+    """The upper block thrown obliquely, and turning, on the free lower one; nothing else acts on
+    them."""
     divisions = tuple(fine * n for n in (6, 5, 4))
     mesh = blocks(d, angle=angle, gap=1e-3, upper=divisions, lower=divisions, simplices=d == 2)
     system, tags = two_blocks(comm, mesh)
@@ -269,9 +275,9 @@ frictions = pytest.mark.parametrize("friction", [None, Coulomb(0.3)], ids=["smoo
 @frictions
 @pytest.mark.parametrize("d", [2, 3])
 def test_v9_8_what_one_body_gains_the_other_loses(d, friction, scheme, mass):
-    """Momenta of the bodies change by the impulse of the contact forces and by its opposite, to 1e-12 of the largest;
-    every step is certified to 1e-9, with sliding and sticking points; without friction no energy is lost beyond the
-    work of the contact conditions."""
+    """Momenta of the bodies change by the impulse of the contact forces and by its opposite, to
+    1e-12 of the largest; every step is certified to 1e-9, with sliding and sticking points; without
+    friction no energy is lost beyond the work of the contact conditions."""
     problem = meeting(COMM, d, friction=friction, mass=mass)
     old = momenta(problem, problem.equations.v0)
     start, size, slid = old.sum(axis=0), np.abs(old).max(), []
@@ -324,8 +330,8 @@ def test_condensed_and_volume_agree(d, scheme, mass):
 @pytest.mark.parametrize("frictional", [False, True])
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_redistributed_mass_keeps_the_inertia_of_each_body(d, frictional):
-    """Mass, first and second moments: rigid motions of one body have the same kinetic energy, and none with the other
-    body, to 1e-12."""
+    """Mass, first and second moments: rigid motions of one body have the same kinetic energy, and
+    none with the other body, to 1e-12."""
     mesh = blocks(d, angle=0.3 if d > 1 else 0.0, upper=(6, 5, 4), lower=(5, 5, 4))
     lower = replace(mesh.lower, divisions=mesh.upper.divisions)
     system, tags = two_blocks(COMM, replace(mesh, lower=lower))

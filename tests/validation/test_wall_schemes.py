@@ -1,4 +1,5 @@
-"""The wall of seed 000 with every scheme: certified steps, a closed ledger, agreement where dt is fine (V4.1)."""
+"""The wall of seed 000 with every scheme: certified steps, a closed ledger, agreement where dt is
+fine (V4.1)."""
 
 from __future__ import annotations
 
@@ -69,7 +70,8 @@ def run(
     ],
 )
 def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -> None:
-    """V9.7 over the seed's 400 steps, in either case by turns; position-level schemes never penetrate."""
+    """V9.7 over the seed's 400 steps, in either case by turns; position-level schemes never
+    penetrate."""
     solution = run(wall(), case, name)
     assert solution.facts["worst_certificate"] <= 1e-9
     assert solution.facts["energy_defect"] <= 1e-10
@@ -80,8 +82,8 @@ def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -
 
 @pytest.mark.serial
 def test_creation_of_energy_is_told() -> None:
-    """A wave crosses seven elements in a step of the seed's: the default scheme gains there and says so; with an eighth
-    of the step it does not."""
+    """A wave crosses seven elements in a step of the seed's: the default scheme gains there and
+    says so; with an eighth of the step it does not."""
     coarse, fine = (run(wall(), "b", "trapezoidal", refined=refined) for refined in (1, 8))
     assert coarse.facts["energy_created"] > 0.5
     assert "WARNING: contact and time scheme created" in coarse.summary()
@@ -90,8 +92,8 @@ def test_creation_of_energy_is_told() -> None:
 
 @pytest.mark.serial
 def test_schemes_agree_when_dt_is_fine() -> None:
-    """Case b, 2½ periods with a sixteenth of the seed's dt: the extreme displacement of the top, of which five periods
-    have no other, within 10 %."""
+    """Case b, 2½ periods with a sixteenth of the seed's dt: the extreme displacement of the top, of
+    which five periods have no other, within 10 %."""
     model = wall()
     found = {
         name: run(model, "b", name, refined=16, steps=100, record=[Probe(model.probes())])

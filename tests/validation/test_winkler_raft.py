@@ -1,16 +1,19 @@
-"""V2.10: a stiff raft on Winkler's springs, in space: closed forms of pressure, settlement and rotation, with uplift.
+"""V2.10: a stiff raft on Winkler's springs, in space: closed forms of pressure, settlement and
+rotation, with uplift.
 
-On springs of modulus k [Pa/m] under a rigid raft B x L the pressure is linear, and only pushes. A load P at x = e:
+On springs of modulus k [Pa/m] under a rigid raft B x L the pressure is linear, and only pushes. A
+load P at x = e:
 
     e <= B/6:  p = P/(B L) (1 + 12 e x/B²),  settlement P/(k B L),  rotation 12 P e/(k L B³)
     e >= B/6:  a triangle over the length a = 3 (B/2 - e), p_max = 2 P/(L a),  rotation p_max/(k a)
 
-A load at a/4, b/4 from a corner along both sides leaves a triangle a x b of that corner closed, p_max = 6 P/(a b).
-Springs stand at the nodes, so that on n cells p is the closed form to O(1/n²), and for e <= B/6 the largest error is
-known: Σ w x² = (B³ L/12) (1 + 2/n²) stands for the moment of inertia. The raft is a free block of finite elements that
-springs alone hold. Under its load as a beam on two ends it would sag by (60/384) k B⁴/(E H³) = 1e-4 of its settlement;
-the springs oppose the load where it acts, so that it bends by less than a hundredth of that while all of it is pressed,
-and by a twentieth when it is lifted off.
+A load at a/4, b/4 from a corner along both sides leaves a triangle a x b of that corner closed,
+p_max = 6 P/(a b). Springs stand at the nodes, so that on n cells p is the closed form to O(1/n²),
+and for e <= B/6 the largest error is known: Σ w x² = (B³ L/12) (1 + 2/n²) stands for the moment of
+inertia. The raft is a free block of finite elements that springs alone hold. Under its load as a
+beam on two ends it would sag by (60/384) k B⁴/(E H³) = 1e-4 of its settlement; the springs oppose
+the load where it acts, so that it bends by less than a hundredth of that while all of it is
+pressed, and by a twentieth when it is lifted off.
 """
 
 import numpy as np
@@ -28,7 +31,8 @@ SAG = (
 
 
 class Standing:
-    """The equilibrium under P at (x, z) = load on n x m cells: x (k, 2), weights, pressures and displacements down."""
+    """The equilibrium under P at (x, z) = load on n x m cells: x (k, 2), weights, pressures and
+    displacements down."""
 
     def __init__(self, n, m, load):
         mesh, tags = fem.build_mesh(
@@ -55,7 +59,8 @@ class Standing:
 
     @property
     def plane(self):
-        """Settlement of the middle, rotations along x and z: the plane through the displacements."""
+        """Settlement of the middle, rotations along x and z: the plane through the
+        displacements."""
         A = np.column_stack([np.ones(len(self.x)), self.x])
         found = np.linalg.lstsq(A, self.down, rcond=None)[0]
         assert np.abs(A @ found - self.down).max() < 0.2 * SAG * np.abs(self.down).max()
@@ -63,7 +68,8 @@ class Standing:
 
 
 def test_v2_10_whole_raft_pressed_off_its_middle():
-    """Both ways at once, inside the kern: the closed form on springs at nodes to what the raft bends."""
+    """Both ways at once, inside the kern: the closed form on springs at nodes to what the raft
+    bends."""
     n, m, load = 6, 4, (1.0, 0.6)
     found = Standing(n, m, load)
     whole = np.array([B**3 * L * (1.0 + 2.0 / n**2), L**3 * B * (1.0 + 2.0 / m**2)]) / 12.0
@@ -75,7 +81,8 @@ def test_v2_10_whole_raft_pressed_off_its_middle():
 
 @pytest.mark.parametrize("e", [2.0, 3.5])
 def test_v2_10_raft_that_lifts_off(e):
-    """At the edge of the kern and beyond: the triangle, its length and the rotation, with order 2 in the springs."""
+    """At the edge of the kern and beyond: the triangle, its length and the rotation, with order 2
+    in the springs."""
     a = 3.0 * (0.5 * B - e)
     largest = 2.0 * P / (L * a)
     errors = []
@@ -99,7 +106,8 @@ def test_v2_10_raft_that_lifts_off(e):
 
 
 def test_v2_10_raft_that_stands_on_a_corner():
-    """Off its middle both ways: a pyramid over the triangle of a corner, with about order 2 in the springs."""
+    """Off its middle both ways: a pyramid over the triangle of a corner, with about order 2 in the
+    springs."""
     a, b = 8.0, 6.0
     largest, errors = 6.0 * P / (a * b), []
     for n in (8, 16):

@@ -1,4 +1,5 @@
-"""Bounds on any field: known answers for scalar and vector Functions, linear, symmetric or not; units; failures."""
+"""Bounds on any field: known answers for scalar and vector Functions, linear, symmetric or not;
+units; failures."""
 
 from __future__ import annotations
 
@@ -78,7 +79,8 @@ def test_a_linear_problem_on_every_route(comm: Any, method: Any) -> None:
 def test_other_elements_and_forms(
     comm: Any, element: Any, cell: str, width: int, form: Any
 ) -> None:
-    """A linear F(u; v): recognised as such. On Q2 all ∫phi_i > 0; with convection nothing is minimised."""
+    """A linear F(u; v): recognised as such. On Q2 all ∫phi_i > 0; with convection nothing is
+    minimised."""
     known = Known(space(square(comm, 10, cell), element, width), form)
     result = vi.solve(known.F, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc])
     known.check(result, error=1e-11)
@@ -103,8 +105,9 @@ def test_convection_by_the_semismooth_method(comm: Any) -> None:
 
 @pytest.mark.parametrize("method", METHODS, ids=name_of)
 def test_no_load_but_what_rounding_leaves_of_it(comm: Any, method: Any) -> None:
-    """A field that is held at 1 along a line and pushed by nothing, as the crack of demos/crack.py that is alone: from
-    guesses with noise, for which J u - F(u) is round-off and tells no size of forces."""
+    """A field that is held at 1 along a line and pushed by nothing, as the crack of demos/crack.py
+    that is alone: from guesses with noise, for which J u - F(u) is round-off and tells no size of
+    forces."""
     u = fem.Function(space(square(comm, 8), ("Lagrange", 1)))
     v, lower = ufl.TestFunction(u.function_space), fem.Function(u.function_space)
     lower.interpolate(lambda x: 1.0 * (np.abs(x[0] - 0.5) < 0.01))
@@ -131,7 +134,8 @@ def test_problems_that_are_not_linear(comm: Any, form: Any) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(("tiny", "force"), [(1e-9, 1e6), (1e7, 1e-5)])
 def test_units_change_nothing(comm: Any, tiny: float, force: float) -> None:
-    """PETSc's own zero tolerance, 1e-8 in the unit of u, leaves the active set to chance in the first."""
+    """PETSc's own zero tolerance, 1e-8 in the unit of u, leaves the active set to chance in the
+    first."""
     for method in (None, ReducedNewton()):
         known = Known(space(square(comm, 12), ("Lagrange", 1)), laplace, tiny=tiny, force=force)
         known.check(
@@ -158,8 +162,9 @@ def test_at_the_solution_nothing_is_left_to_do(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_projection_of_constants_on_cells(comm: Any) -> None:
-    """DG0 without conditions: every cell by itself, u = mid(-0.1, target, 0.1), also with bounds given as numbers,
-    Constants and infinity; and a bound that nobody reaches, as wide as users write it, disturbs nothing."""
+    """DG0 without conditions: every cell by itself, u = mid(-0.1, target, 0.1), also with bounds
+    given as numbers, Constants and infinity; and a bound that nobody reaches, as wide as users
+    write it, disturbs nothing."""
     V = space(square(comm, 6), ("DG", 0))
     target, u = fem.Function(V), fem.Function(V)
     target.interpolate(lambda x: np.sin(9.0 * x[0]) * x[1])
@@ -194,7 +199,8 @@ def test_nothing_is_free_or_nothing_acts(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_a_string_above_a_floor(comm: Any) -> None:
-    """-u'' = -8, u(0) = u(1) = 0, u >= -¼: it lies on the floor from ¼ to ¾, and linear elements are exact at nodes."""
+    """-u'' = -8, u(0) = u(1) = 0, u >= -¼: it lies on the floor from ¼ to ¾, and linear elements
+    are exact at nodes."""
     V = space(mesh.create_interval(comm, 32, [0.0, 1.0]), ("Lagrange", 1))
     u, v = fem.Function(V), ufl.TestFunction(V)
     result = vi.solve(laplace(u, v) + 8.0 * v * ufl.dx, u, lower=-0.25, bcs=[clamped(V)])
@@ -210,7 +216,8 @@ def test_a_string_above_a_floor(comm: Any) -> None:
 
 
 def test_a_component_is_bounded_and_another_held(comm: Any) -> None:
-    """A block pushed against a wall: u_x <= 0.01 everywhere, u_y = 0, u_x = 0 on the left; bar theory."""
+    """A block pushed against a wall: u_x <= 0.01 everywhere, u_y = 0, u_x = 0 on the left; bar
+    theory."""
     V = space(square(comm, 4), ("Lagrange", 1), 2)
     on = V.mesh
     left = fem.locate_dofs_topological(
@@ -260,7 +267,8 @@ def test_a_failure_is_one_sentence_and_keeps_the_best(comm: Any) -> None:
 
 
 def test_a_linear_form_that_is_not_positive_is_told(comm: Any) -> None:
-    """Nothing has a minimum: TRON would go on for ever. The sentence speaks of F and not of a matrix."""
+    """Nothing has a minimum: TRON would go on for ever. The sentence speaks of F and not of a
+    matrix."""
     V = space(square(comm, 6), ("Lagrange", 1))
     u, v = fem.Function(V), ufl.TestFunction(V)
     F = laplace(u, v) - 400.0 * u * v * ufl.dx + v * ufl.dx
@@ -273,7 +281,8 @@ def test_a_linear_form_that_is_not_positive_is_told(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_steps_that_are_too_long_are_shortened(comm: Any) -> None:
-    """The p-Laplacian, p = 6, from a rough guess: Newton's steps are too long, and the search shortens them."""
+    """The p-Laplacian, p = 6, from a rough guess: Newton's steps are too long, and the search
+    shortens them."""
     V = space(square(comm, 8), ("Lagrange", 1))
     u, v = fem.Function(V), ufl.TestFunction(V)
     u.interpolate(lambda x: x[0] * (1 - x[0]) * np.sin(40.0 * x[1]))

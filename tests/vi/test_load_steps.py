@@ -1,4 +1,5 @@
-"""Large changes of Dirichlet data and bounds: neo-Hookean blocks, beside PETSc's SNES VI (benchmarks/load_steps.py)."""
+"""Large changes of Dirichlet data and bounds: neo-Hookean blocks, beside PETSc's SNES VI
+(benchmarks/load_steps.py)."""
 
 from __future__ import annotations
 
@@ -61,8 +62,9 @@ class Pressed:
 
 @pytest.mark.parametrize("E", [1.0, 3e9])
 def test_a_load_step_of_several_cells(comm: Any, E: float) -> None:
-    """The top goes down by a cell and a half at once, which written into u alone turns the cells below it inside out;
-    then it shears. The certificate and the number of steps do not depend on the unit of force."""
+    """The top goes down by a cell and a half at once, which written into u alone turns the cells
+    below it inside out; then it shears. The certificate and the number of steps do not depend on
+    the unit of force."""
     block = Pressed(comm, 10, 2, E)
     for by in ((0.0, -0.15), (0.1, -0.2)):
         block.move(*by)
@@ -102,7 +104,8 @@ def test_other_cells(comm: Any, d: int, n: int, element: tuple[str, int]) -> Non
 
 @pytest.mark.two_ranks
 def test_a_bound_that_moves_by_more_than_a_cell(comm: Any) -> None:
-    """The floor rises into the block: the nodes on it take the whole block along and do not turn their cells."""
+    """The floor rises into the block: the nodes on it take the whole block along and do not turn
+    their cells."""
     block = Pressed(comm, 10, 2)
     rising = block.floor.x.array == 0.0
     block.floor.x.array[rising] = 0.15
@@ -113,7 +116,8 @@ def test_a_bound_that_moves_by_more_than_a_cell(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_a_change_that_is_too_large_is_taken_in_parts(comm: Any) -> None:
-    """-(e^(10 u) u')' = 0 with 0 and 1 at the ends: at once it takes Newton's method more steps than are allowed."""
+    """-(e^(10 u) u')' = 0 with 0 and 1 at the ends: at once it takes Newton's method more steps
+    than are allowed."""
     V = space(mesh.create_interval(comm, 64, [0.0, 1.0]), ("Lagrange", 1))
     u, v, g = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
     g.interpolate(lambda x: x[0])
@@ -127,7 +131,8 @@ def test_a_change_that_is_too_large_is_taken_in_parts(comm: Any) -> None:
 
 
 def test_a_failure_gives_the_first_guess_back(comm: Any) -> None:
-    """A bar that is pressed to less than nothing: u is as before, and the sentence names no matrix."""
+    """A bar that is pressed to less than nothing: u is as before, and the sentence names no
+    matrix."""
     V = space(mesh.create_interval(comm, 8, [0.0, 1.0]), ("Lagrange", 1))
     u, g = fem.Function(V), fem.Function(V)
     g.interpolate(lambda x: -1.1 * x[0])
@@ -155,7 +160,8 @@ def loud() -> Iterator[None]:
 @pytest.mark.slow
 @pytest.mark.serial
 def test_beside_snes(comm: Any, tmp_path: Path, loud: None) -> None:
-    """vi.solve takes all steps that SNES takes, to the same u, with no more Newton steps than SNES has factors."""
+    """vi.solve takes all steps that SNES takes, to the same u, with no more Newton steps than SNES
+    has factors."""
     benchmark = loaded(ROOT / "benchmarks" / "load_steps.py")
     wanted = {
         "cells",

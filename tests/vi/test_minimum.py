@@ -30,7 +30,8 @@ def owned(f: Any) -> Any:
 @pytest.mark.parametrize("element", [("Lagrange", 1), ("Lagrange", 2)], ids=["P1", "P2"])
 @pytest.mark.parametrize("width", [0.03, 0.5])
 def test_from_the_top_of_the_hill(comm: Any, width: float, element: tuple[str, int]) -> None:
-    """u = 0 satisfies every first-order condition where nothing loads it, and is no minimum: the answer is a well."""
+    """u = 0 satisfies every first-order condition where nothing loads it, and is no minimum: the
+    answer is a well."""
     for n in (6, 12):
         u = fem.Function(space(square(comm, n), element))
         result = vi.solve(energy=double_well(u, width), u=u)
@@ -42,8 +43,8 @@ def test_from_the_top_of_the_hill(comm: Any, width: float, element: tuple[str, i
 
 @pytest.mark.two_ranks
 def test_a_load_and_bounds_choose_the_well(comm: Any) -> None:
-    """The load pushes u from 0 to the bound 0.9, below the well at 1: all nodes lie on it, and the multiplier is the
-    force that is left, 0.9 - 0.9³ + load a unit of area."""
+    """The load pushes u from 0 to the bound 0.9, below the well at 1: all nodes lie on it, and the
+    multiplier is the force that is left, 0.9 - 0.9³ + load a unit of area."""
     for load, bounds in ((0.05, (-0.8, 0.9)), (-0.05, (-0.9, 0.8))):
         u = fem.Function(space(square(comm, 8), ("Lagrange", 1)))
         result = vi.solve(energy=double_well(u, 0.1, load), u=u, lower=bounds[0], upper=bounds[1])
@@ -56,7 +57,8 @@ def test_a_load_and_bounds_choose_the_well(comm: Any) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("d", [1, 3])
 def test_a_wall_between_two_wells(comm: Any, d: int) -> None:
-    """Held at -1 and 1 at its ends, u is tanh(x / (√2 width)) between them, whatever it begins from."""
+    """Held at -1 and 1 at its ends, u is tanh(x / (√2 width)) between them, whatever it begins
+    from."""
     n, width = (64, 0.15) if d == 1 else (8, 0.2)
     on = (
         mesh.create_interval(comm, n, [-0.5, 0.5])
@@ -111,7 +113,8 @@ def test_units_change_nothing(comm: Any, unit: float, force: float) -> None:
 
 @pytest.mark.two_ranks
 def test_energies_that_are_no_numbers_shorten_the_step(comm: Any) -> None:
-    """-ln u + u, with its minimum at 1, from near the edge of where it is a number, without bounds."""
+    """-ln u + u, with its minimum at 1, from near the edge of where it is a number, without
+    bounds."""
     u = fem.Function(space(square(comm, 4), ("Lagrange", 1)))
     u.x.array[:] = 20.0
     result = vi.solve(energy=(u - ufl.ln(u)) * ufl.dx, u=u)
@@ -141,8 +144,8 @@ def test_failures_are_one_sentence(comm: Any) -> None:
 def test_a_form_that_is_not_positive_offers_the_energy(
     comm: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Newton's method for F goes to the hill between the wells, where it is not far. A failure offers energy=, an
-    answer is told to be no minimum, and energy= finds one."""
+    """Newton's method for F goes to the hill between the wells, where it is not far. A failure
+    offers energy=, an answer is told to be no minimum, and energy= finds one."""
     u = fem.Function(space(square(comm, 8), ("Lagrange", 1)))
     energy = double_well(u, 0.1, 0.05)
     F = ufl.derivative(energy, u)

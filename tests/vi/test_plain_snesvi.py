@@ -1,4 +1,5 @@
-"""benchmarks/obstacle.py: its numbers, and where PETSc's own SNESVI goes wrong with its defaults."""
+"""benchmarks/obstacle.py: its numbers, and where PETSc's own SNESVI goes wrong with its
+defaults."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ KEYS = {
 def test_units_and_warm_starts(
     comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Both agree at size one. Small units give SNESVI another answer, and from the solution it does not converge."""
+    """Both agree at size one. Small units give SNESVI another answer, and from the solution it does
+    not converge."""
     spec = spec_from_file_location("benchmark_obstacle", ROOT / "benchmarks" / "obstacle.py")
     assert spec is not None and spec.loader is not None
     benchmark = module_from_spec(spec)

@@ -1,4 +1,5 @@
-"""Values that differ by rounding from what is allowed are taken, those that differ by more are refused."""
+"""Values that differ by rounding from what is allowed are taken, those that differ by more are
+refused."""
 
 from __future__ import annotations
 
@@ -56,7 +57,8 @@ def hill(x: Any) -> Any:
 @pytest.mark.parametrize("unit", [1.0, 1e-9, 1e6])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_an_obstacle_that_is_zero_at_the_rim(comm: Any, degree: int, unit: float) -> None:
-    """The rim is held at 0, which misses the obstacle there by rounding: the prescribed value wins."""
+    """The rim is held at 0, which misses the obstacle there by rounding: the prescribed value
+    wins."""
     V, u, F = membrane(comm, degree)
     lower = fem.Function(V)
     lower.interpolate(lambda x: unit * hill(x))
@@ -90,7 +92,8 @@ def test_a_billionth_of_the_field_is_no_rounding(comm: Any, sign: float) -> None
 
 @pytest.mark.two_ranks
 def test_bounds_that_cross_by_rounding(comm: Any) -> None:
-    """Two ways to compute one field: where they cross by rounding the unknown is held at lower; else it is refused."""
+    """Two ways to compute one field: where they cross by rounding the unknown is held at lower;
+    else it is refused."""
     V, u, F = membrane(comm, 1)
     lower, upper = fem.Function(V), fem.Function(V)
     lower.interpolate(hill)
@@ -107,8 +110,8 @@ def test_bounds_that_cross_by_rounding(comm: Any) -> None:
 @pytest.mark.parametrize("shift", [0.0, 1e-17, -1e-17, 1e-16])
 @pytest.mark.parametrize("load", [0.0, 1e-9, 1e-3])
 def test_a_body_that_rests_on_its_floor(comm: Any, shift: float, load: float) -> None:
-    """An elastic block of finite strains touches a floor whose height is rounded: no load, no displacement, and a small
-    load is not lost in the rounding."""
+    """An elastic block of finite strains touches a floor whose height is rounded: no load, no
+    displacement, and a small load is not lost in the rounding."""
     V = space(square(comm, 4), ("Lagrange", 1), 2)
     u, v, floor = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
     F = ufl.Identity(2) + ufl.grad(u)

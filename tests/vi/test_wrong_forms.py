@@ -1,4 +1,5 @@
-"""What ``vi.solve`` refuses, in one sentence on all ranks and before any work: forms, bounds, conditions, methods."""
+"""What ``vi.solve`` refuses, in one sentence on all ranks and before any work: forms, bounds,
+conditions, methods."""
 
 from __future__ import annotations
 
@@ -203,7 +204,8 @@ def test_complex_numbers_have_no_order(comm: Any, monkeypatch: pytest.MonkeyPatc
 
 
 def test_mixed_elements_are_refused(comm: Any) -> None:
-    """Their unknowns are of several fields; DOLFINx 0.5 ends in a segmentation fault when asked what they are."""
+    """Their unknowns are of several fields; DOLFINx 0.5 ends in a segmentation fault when asked
+    what they are."""
     on = mesh.create_unit_square(comm, 2, 2)
     if hasattr(ufl, "MixedElement"):
         one = ufl.FiniteElement("Lagrange", on.ufl_cell(), 1)

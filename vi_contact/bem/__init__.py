@@ -1,4 +1,5 @@
-"""Solve plane elastodynamics by space-time boundary elements (Aimi, Di Credico, Gimperlein 2024), without DOLFINx.
+"""Solve plane elastodynamics by space-time boundary elements (Aimi, Di Credico, Gimperlein 2024),
+without DOLFINx.
 
 In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``BoundaryProblem``, ``BoundaryContact``,
 ``march_contact``. Theory and an example: docs/theory/bem.md; four problems: ``demos/problems/boundary_elements.py``.

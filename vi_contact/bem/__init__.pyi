@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .boundary_mesh import BoundaryMesh as BoundaryMesh
 from .boundary_mesh import circle as circle
 from .boundary_mesh import polygon as polygon

@@ -1,10 +1,13 @@
-"""Describe a plane body's boundary by closed loops of straight elements, with its two spaces and mass matrices.
+"""Describe a plane body's boundary by closed loops of straight elements, with its two spaces and
+mass matrices.
 
-The body lies to the left of its boundary: outer loops run counter-clockwise, holes clockwise, and the normal points out
-of the body. `exterior=True` means the unbounded outside of the loops: everything reversed. Element i starts at node i.
+The body lies to the left of its boundary: outer loops run counter-clockwise, holes clockwise, and
+the normal points out of the body. `exterior=True` means the unbounded outside of the loops:
+everything reversed. Element i starts at node i.
 
-Displacements: continuous P1, values (2, n) (component, node). Tractions: discontinuous P1, values (2, n, 2) (component,
-element, end), so that a corner carries two tractions. Flattened in that order they are the unknowns of the matrices."""
+Displacements: continuous P1, values (2, n) (component, node). Tractions: discontinuous P1, values
+(2, n, 2) (component, element, end), so that a corner carries two tractions. Flattened in that order
+they are the unknowns of the matrices."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -27,9 +30,10 @@ class BoundaryMesh:
     """Describe closed loops of straight elements.
 
     points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
-    loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the boundary.
-    exterior: the body is the unbounded outside. Raises InputError for fewer than three nodes in a loop, elements of no
-    length, a boundary that crosses or touches itself or runs the wrong way round."""
+    loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the
+    boundary. exterior: the body is the unbounded outside. Raises InputError for fewer than three
+    nodes in a loop, elements of no length, a boundary that crosses or touches itself or runs the
+    wrong way round."""
 
     points: Array
     loop_sizes: tuple[int, ...] = ()
@@ -54,7 +58,8 @@ class BoundaryMesh:
             object.__setattr__(self, name, value)
         if self.lengths.min() <= 1e-12 * self.size:
             raise InputError(
-                f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled points"
+                f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled "
+                "points"
             )
         check_size(points, sizes)
         check_simple(points, self.after)
@@ -65,7 +70,8 @@ class BoundaryMesh:
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """Return (n,) the node (and element) that follows each; element i goes from node i to node after[i]."""
+        """Return (n,) the node (and element) that follows each; element i goes from node i to node
+        after[i]."""
         after = np.arange(1, len(self.points) + 1)
         ends = np.cumsum(self.loop_sizes)
         after[ends - 1] = ends - self.loop_sizes
@@ -108,7 +114,8 @@ class BoundaryMesh:
 
     @cached_property
     def mass(self) -> Array:
-        """Return (4n, 2n) <u, psi>: continuous displacements tested with discontinuous tractions [m]."""
+        """Return (4n, 2n) <u, psi>: continuous displacements tested with discontinuous tractions
+        [m]."""
         n = len(self)
         mass = np.zeros((2, n, 2, 2, n))
         for a in range(2):
@@ -143,7 +150,8 @@ class BoundaryMesh:
         return half + np.bincount(self.after, half, len(self))
 
     def node_normals(self, elements: ArrayLike) -> Array:
-        """Return (n, 2) unit normals at nodes, the mean of the masked elements by their lengths; else zero."""
+        """Return (n, 2) unit normals at nodes, the mean of the masked elements by their lengths;
+        else zero."""
         weighted = self.normals * (self.lengths * self._mask(elements))[:, None]
         sums = weighted + np.stack(
             [np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1
@@ -152,7 +160,8 @@ class BoundaryMesh:
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
 
     def node_turns(self, elements: ArrayLike) -> Array:
-        """Return (n,) angle [rad] by which the boundary turns at each node between two masked elements; else zero."""
+        """Return (n,) angle [rad] by which the boundary turns at each node between two masked
+        elements; else zero."""
         chosen, before = self._mask(elements), np.empty(len(self), dtype=np.int64)
         before[self.after] = np.arange(len(self))
         one, other = self.normals[before], self.normals
@@ -166,10 +175,11 @@ class BoundaryMesh:
 def polygon(
     corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False
 ) -> BoundaryMesh:
-    """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
+    """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i +
+    1.
 
-    corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
-    number of elements of every side."""
+    corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element
+    length [m], or the number of elements of every side."""
     start = array("polygon", "corners", corners, (None, 2), unit="m")
     if len(start) < 3:
         raise InputError(f"polygon: corners has {len(start)} points; give three or more")
@@ -194,7 +204,8 @@ def polygon(
 def circle(
     radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False
 ) -> BoundaryMesh:
-    """Return a disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
+    """Return a disk of `count` chords, starting at its lowest point; exterior: the space around a
+    round hole."""
     middle = array("circle", "centre", centre, (2,), unit="m")
     number("circle", "radius", radius, positive=True, unit="m")
     counted(

@@ -1,7 +1,8 @@
-"""Build the Galerkin matrices of the four boundary operators from radial kernels of either domain, density 1.
+"""Build the Galerkin matrices of the four boundary operators from radial kernels of either domain,
+density 1.
 
-With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in docs/theory/bem.md; nothing
-is worse than a logarithm on a closed curve):
+With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in
+docs/theory/bem.md; nothing is worse than a logarithm on a closed curve):
 
     V p  = ∫ G p                                                                                  single layer
     K u  = ∫ dPhi_S/dn_y u - Phi_S M u + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u              double layer
@@ -40,7 +41,8 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
     instance(owner, "orders", orders, Orders, "give numbers of points, Orders()")
     if material.xi:
         raise InputError(
-            f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are elastic "
+            f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are "
+            "elastic "
             "without damping; leave xi out"
         )
 
@@ -57,7 +59,8 @@ class OperatorMatrices:
 class Galerkin:
     """Integrate radial kernels over all pairs of elements of one mesh.
 
-    kernels(r (m,)) -> KernelSet: of density 1, speeds (c_p, c_s); fronts: distances [m] of kinks, the last their end.
+    kernels(r (m,)) -> KernelSet: of density 1, speeds (c_p, c_s); fronts: distances [m] of kinks,
+    the last their end.
     """
 
     def __init__(self, mesh: BoundaryMesh, c_s: float, orders: Orders = Orders()) -> None:
@@ -76,7 +79,8 @@ class Galerkin:
         return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper))
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
-        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
+        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x)
+        phi_b(y)."""
         total: NDArray = np.empty(0)
         for points in point_sets(self.pairs, fronts, self.orders):
             values = integrands(kernels(points.r), points.d, points.r)
@@ -117,7 +121,8 @@ class Galerkin:
         )
 
     def _hyper_local(self, m: NDArray) -> NDArray:
-        """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
+        """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair,
+        shape of v, of u."""
         mesh, e, f = self.mesh, self.pairs.first, self.pairs.second
         n_x, n_y = mesh.normals[e].T[:, :, None, None], mesh.normals[f].T[:, :, None, None]
         t_x, t_y = mesh.tangents[e].T[:, :, None, None], mesh.tangents[f].T[:, :, None, None]
@@ -145,7 +150,8 @@ class Galerkin:
 
 
 def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int64]) -> NDArray:
-    """Return (2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on the elements y (p,).
+    """Return (2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on
+    the elements y (p,).
 
     m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S²."""
     normal, slopes = mesh.normals[y].T[:, :, None, None], SLOPE / mesh.lengths[y][:, None, None]
@@ -162,7 +168,8 @@ def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int
 
 
 def joined_at_nodes(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
-    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes; the end axis goes."""
+    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes; the end axis
+    goes."""
     start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
     before = np.empty_like(mesh.after)
     before[mesh.after] = np.arange(len(before))
@@ -175,7 +182,8 @@ def tensor(m: NDArray) -> NDArray:
 
 
 def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
-    """Return (k, m) integrands of the operators at d = x - y, in the order their methods read them."""
+    """Return (k, m) integrands of the operators at d = x - y, in the order their methods read
+    them."""
     xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
     g1, g2 = kernels.single
     rows = [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]

@@ -1,14 +1,17 @@
-"""Describe contact of a body condensed by boundary elements: what it may touch, how it rubs, its steps.
+"""Describe contact of a body condensed by boundary elements: what it may touch, how it rubs, its
+steps.
 
-The condensed body is u_c[k] = sum_(l<=k) W[k-l] lam[l] + u_free[k] (CondensedCompliance). In the frames of its nodes,
-v = N u with the contact direction n and the tangent as rows of N, lam = -Nᵀ r, it is a row of the project's contract
-(step.py): force scheme, gap at the end of the step, history on the right-hand side,
+The condensed body is u_c[k] = sum_(l<=k) W[k-l] lam[l] + u_free[k] (CondensedCompliance). In the
+frames of its nodes, v = N u with the contact direction n and the tangent as rows of N, lam = -Nᵀ r,
+it is a row of the project's contract (step.py): force scheme, gap at the end of the step, history
+on the right-hand side,
 
     A v_k = b_k - r_k,   A = (N W[0] Nᵀ)⁻¹,   b_k = A N (u_free[k] + sum_(l<k) W[k-l] lam[l])
     0 <= r_n  ⊥  gap - v_n >= 0,    |r_t| <= limit(r_n), along the slip v_t[k] - v_t[k-1]
 
-so that every method for the small problem and the certificate of a step serve here too. Reactions r = (r_n, r_t) are
-those of the body on its support, nodal forces [N/m] held during a step; traction = force / length."""
+so that every method for the small problem and the certificate of a step serve here too. Reactions r
+= (r_n, r_t) are those of the body on its support, nodal forces [N/m] held during a step; traction =
+force / length."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -46,9 +49,11 @@ SUPPORTED = 1e-12  # of the largest flexibility: supported unknowns
 
 @dataclass(frozen=True)
 class Conditions:
-    """Hold one contact condition per row: the contact node (row of CondensedCompliance), outward normal, length.
+    """Hold one contact condition per row: the contact node (row of CondensedCompliance), outward
+    normal, length.
 
-    nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a box in a notch."""
+    nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a
+    box in a notch."""
 
     nodes: Indices
     normals: Array
@@ -64,7 +69,8 @@ class Conditions:
         lengths = array("Conditions", "lengths", self.lengths, (len(nodes),), unit="m")
         if not len(nodes) or np.bincount(nodes).max() > 2 or lengths.min() <= 0.0:
             raise InputError(
-                "Conditions: give one condition or more, at most two at a node, and positive lengths"
+                "Conditions: give one condition or more, at most two at a node, and positive "
+                "lengths"
             )
         for name, value in (("nodes", nodes), ("normals", normals), ("lengths", lengths)):
             object.__setattr__(self, name, value)
@@ -73,9 +79,11 @@ class Conditions:
 def conditions_on(
     mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike
 ) -> Conditions:
-    """Return the conditions of several sides, masks of elements (n,): a node of two sides gets one for each.
+    """Return the conditions of several sides, masks of elements (n,): a node of two sides gets one
+    for each.
 
-    Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node."""
+    Raises InputError for a side with nodes that were not condensed, and for more than two sides at
+    a node."""
     owner = "conditions_on"
     instance(owner, "mesh", mesh, BoundaryMesh, "give the BoundaryMesh of the body")
     instance(owner, "compliance", compliance, CondensedCompliance, "give what condensed() returns")
@@ -87,7 +95,8 @@ def conditions_on(
     nodes = place[np.concatenate(chosen)]
     if (nodes < 0).any() or np.bincount(nodes).max() > 2:
         raise InputError(
-            "conditions_on: sides must belong to the contact boundary, and at most two may share a node"
+            "conditions_on: sides must belong to the contact boundary, and at most two may share a "
+            "node"
         )
     normals = [mesh.node_normals(side)[found] for side, found in zip(sides, chosen, strict=True)]
     lengths = [mesh.node_lengths(side)[found] for side, found in zip(sides, chosen, strict=True)]
@@ -98,13 +107,15 @@ def conditions_on(
 class BoundaryContact:
     """Describe a condensed body and its support.
 
-    obstacle: its gaps and directions, a fitting rigid support by default; friction: the law; towards, along: how far
-    the obstacle has moved towards the body and along its tangents at time t [m]; bilateral: every point is held on the
-    obstacle; conditions: None for one per contact node. Points with two conditions do not rub.
+    obstacle: its gaps and directions, a fitting rigid support by default; friction: the law;
+    towards, along: how far the obstacle has moved towards the body and along its tangents at time t
+    [m]; bilateral: every point is held on the obstacle; conditions: None for one per contact node.
+    Points with two conditions do not rub.
 
-    Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows it and no conditions
-    are given, for a symmetric compliance W[0] that is not positive definite and any that is singular, supports that
-    hold a contact direction, and bodies that penetrate their obstacle."""
+    Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows
+    it and no conditions are given, for a symmetric compliance W[0] that is not positive definite
+    and any that is singular, supports that hold a contact direction, and bodies that penetrate
+    their obstacle."""
 
     compliance: CondensedCompliance
     obstacle: Obstacle = field(default_factory=Touching)
@@ -152,13 +163,15 @@ class BoundaryContact:
             )
             if self.conditions.nodes.max(initial=0) >= self.count:
                 raise InputError(
-                    f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} contact "
+                    f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} "
+                    "contact "
                     "nodes; make them with conditions_on for this compliance"
                 )
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:
-        """Refuse one condition along a mean normal at a node at which the contact boundary turns."""
+        """Refuse one condition along a mean normal at a node at which the contact boundary
+        turns."""
         turns, points = self.compliance.turns, self.compliance.points
         if (
             self.conditions is not None
@@ -172,8 +185,10 @@ class BoundaryContact:
             np.max(np.abs(directions - normals)) <= 1e-9
         ):  # the obstacle follows the boundary; a plane has one direction
             raise InputError(
-                f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees "
-                f"at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, one side, "
+                f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} "
+                "degrees "
+                f"at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, one "
+                "side, "
                 "other side), a condition on each"
             )
 
@@ -208,7 +223,8 @@ class BoundaryContact:
 
     @cached_property
     def frames(self) -> Array:
-        """Return N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or second directions."""
+        """Return N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or
+        second directions."""
         m, rows, second, directions = self.count, self._rows, self._second, self._facing[0]
         frames = np.tile(np.eye(2), (m, 1, 1))
         frames[rows.nodes[~second]] = nodal_frames(directions[~second]).swapaxes(1, 2)
@@ -242,7 +258,8 @@ class BoundaryContact:
         owned = number[rows.nodes + self.count * second]
         if (owned < 0).any():
             raise InputError(
-                "BoundaryContact: a support holds a contact node in its contact direction; leave the node "
+                "BoundaryContact: a support holds a contact node in its contact direction; leave "
+                "the node "
                 "out of the contact boundary, or free that direction"
             )
         tangents = np.where(
@@ -271,7 +288,8 @@ class BoundaryContact:
 
     @cached_property
     def p_matrix(self) -> PMatrix:
-        """Tell whether the step matrix, W[0] of contact, is one: steps then have one solution, see there."""
+        """Tell whether the step matrix, W[0] of contact, is one: steps then have one solution, see
+        there."""
         rows = np.arange(self.free.sum()) if self.frictional else self.surface.owned
         found = p_matrix(self.W[0][np.ix_(rows, rows)])
         if not (self.frictional and self.friction.slope(self.surface.weights).any()):
@@ -304,13 +322,15 @@ class BoundaryContact:
         first = 0.5 * (first + first.T)
         if np.linalg.eigvalsh(first)[0] <= SUPPORTED * first.max():
             raise InputError(
-                "BoundaryContact: the compliance of one step is not positive definite; use the symmetric "
+                "BoundaryContact: the compliance of one step is not positive definite; use the "
+                "symmetric "
                 "Poincaré-Steklov operator, and supports along contact directions or tangents only"
             )
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
 
     def step(self, k: int, loads: Array, before: Array, active: Mask) -> StepProblem:
-        """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps; before: v at its start."""
+        """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps;
+        before: v at its start."""
         dt, surface = self.compliance.dt, self.surface
         past = (
             self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0]
@@ -324,7 +344,8 @@ class BoundaryContact:
             bound=surface.gap((k + 1) * dt),
             surface=surface,
             scale=1.0,
-            guess=past,  # the size that rounding is measured by, also where contact holds all points at zero
+            # the size that rounding is measured by, also where contact holds all points at zero
+            guess=past,
             active=active,
             t=(k + 1) * dt,
             k=k + 1,
@@ -338,5 +359,6 @@ class BoundaryContact:
         return -self.surface.reaction_load(r_n, int(self.free.sum()), r_t)
 
     def cartesian(self, loads: Array) -> Array:
-        """Return (steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads (steps, f)."""
+        """Return (steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads
+        (steps, f)."""
         return np.asarray(loads @ self.frames[self.free])

@@ -25,10 +25,11 @@ log = logging.getLogger(__name__)
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
 ) -> "ContactRun":
-    """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by default ActiveSet,
-    or Lemke where the compliance is not symmetric.
+    """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by
+    default ActiveSet, or Lemke where the compliance is not symmetric.
 
-    Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals."""
+    Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and
+    residuals."""
     instance("march_contact", "contact", contact, BoundaryContact, "give a BoundaryContact")
     hint = "give Condensed() with any of its methods, or None"
     optional(instance, "march_contact", "solver", solver, Condensed, hint)
@@ -36,7 +37,8 @@ def march_contact(
     default = Condensed() if contact.symmetric else Condensed(Lemke())
     if not contact.symmetric and not contact.p_matrix.holds:
         log.warning(
-            f"boundary elements: W[0] {contact.p_matrix.sentence}; other runs may be as right as this one"
+            f"boundary elements: W[0] {contact.p_matrix.sentence}; other runs may be as right as "
+            "this one"
         )
     prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
 
@@ -45,7 +47,8 @@ def march_contact(
         certificate = kkt_residual(step, result)
         if not certificate.worst <= tolerance:
             raise StepFailure(
-                f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the certificate "
+                f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the "
+                "certificate "
                 f"tolerance {tolerance:g} ({certificate}): try Condensed() with another method"
             )
         return result
@@ -57,11 +60,12 @@ def march_contact(
 class ContactRun:
     """Hold the histories of c conditions at m contact nodes over all steps.
 
-    times: (steps,) ends of the steps [s]; r_n: (steps, c), r_t: (steps, c) reactions [N/m] on the support during each
-    step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip: (steps, c) in each step [m];
-    displacement: (steps, 2m) of the contact nodes at the ends and forces: (steps, 2m) on the body [N/m] in the order of
-    CondensedCompliance; active: (steps, c). certificates: of each step; iterations: (steps,) of the method in a step,
-    or one per window of a method for many steps; history: what such a method logs."""
+    times: (steps,) ends of the steps [s]; r_n: (steps, c), r_t: (steps, c) reactions [N/m] on the
+    support during each step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip:
+    (steps, c) in each step [m]; displacement: (steps, 2m) of the contact nodes at the ends and
+    forces: (steps, 2m) on the body [N/m] in the order of CondensedCompliance; active: (steps, c).
+    certificates: of each step; iterations: (steps,) of the method in a step, or one per window of a
+    method for many steps; history: what such a method logs."""
 
     contact: BoundaryContact
     times: Array
@@ -108,7 +112,8 @@ class ContactRun:
 
     @property
     def friction_loss(self) -> Array:
-        """Return (steps,) energy that friction has taken, sum r_t slip, never negative in a step [J/m]."""
+        """Return (steps,) energy that friction has taken, sum r_t slip, never negative in a step
+        [J/m]."""
         return np.cumsum((self.r_t * self.slip).sum(axis=1))
 
 

@@ -1,4 +1,5 @@
-"""Pair boundary elements, each pair once, with the distances that decide how they are integrated."""
+"""Pair boundary elements, each pair once, with the distances that decide how they are
+integrated."""
 
 from copy import copy
 
@@ -11,19 +12,24 @@ from .boundary_mesh import BoundaryMesh
 from .loops import distances
 
 NEAR_LENGTHS = 3.0  # pairs closer than this many element lengths get the finer rule
-CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
+# pairs whose elements are this share of the longer one's length apart are integrated with their
+# feet
+CLOSE = 0.9
 LEAST = 0.05  # of the longer element: nearer ones are refused, for nothing is known of the answers
 
 
 class ElementPairs:
-    """Hold all pairs first <= second: x = point + a xi on the first, y on the second, x - y = offset + a xi - b eta.
+    """Hold all pairs first <= second: x = point + a xi on the first, y on the second, x - y =
+    offset + a xi - b eta.
 
-    offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element [m];
-    width: what is between them over h; of two elements with a common corner, the distance of a free end from the other.
-    same, corner, near, close: boolean masks; shares_end: the common corner is the end of the first element.
+    offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element
+    [m]; width: what is between them over h; of two elements with a common corner, the distance of a
+    free end from the other. same, corner, near, close: boolean masks; shares_end: the common corner
+    is the end of the first element.
 
-    Raises InputError for elements that are nearer than a twentieth of the longer one's length, and for corners of two
-    elements so sharp, or of lengths so different, that an end of one is as near to the other."""
+    Raises InputError for elements that are nearer than a twentieth of the longer one's length, and
+    for corners of two elements so sharp, or of lengths so different, that an end of one is as near
+    to the other."""
 
     def __init__(self, mesh: BoundaryMesh) -> None:
         instance(
@@ -86,7 +92,8 @@ class ElementPairs:
             )
         raise InputError(
             f"boundary elements: the boundary {near} at {at(mesh.points[second])}, where elements "
-            f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer "
+            f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the "
+            "longer "
             f"one; {remedy}"
         )
 

@@ -1,14 +1,17 @@
-"""Solve boundary value problems of many steps on a circle of frequencies: a dense system each, no march.
+"""Solve boundary value problems of many steps on a circle of frequencies: a dense system each, no
+march.
 
-With û(z) = sum_j z^j u_j for increments u_j, and so on, the march of energetic.py is a product of series in z,
+With û(z) = sum_j z^j u_j for increments u_j, and so on, the march of energetic.py is a product of
+series in z,
 
     p̂ = V̂⁻¹ R̂ û,    R̂ = K̂ + M / (2 (1 - z)),    Ŝ û = F̂
     Ŝ = (1 - z) R̂ᵀ V̂⁻¹ R̂ - D̂     symmetric,    Ŝ = Mᵀ V̂⁻¹ R̂     unsymmetric
 
-whose coefficients are those of a Fourier transform on |z| = R < 1. With L points step j + L adds R^L to step j, and
-rounding is magnified by R^-N in the last of N: 1e-12 and 1e6 for L = 2 N. Ch. Lubich, Numer. Math. 52 (1988) 413. What
-is added is the motion in steps N to 3 N: it stays small as long as the blocks reach that far, and grows where they are
-cut off at N. Growth from N to 2 N says what wraps around; the equations of the march are asked in two steps."""
+whose coefficients are those of a Fourier transform on |z| = R < 1. With L points step j + L adds
+R^L to step j, and rounding is magnified by R^-N in the last of N: 1e-12 and 1e6 for L = 2 N. Ch.
+Lubich, Numer. Math. 52 (1988) 413. What is added is the motion in steps N to 3 N: it stays small as
+long as the blocks reach that far, and grows where they are cut off at N. Growth from N to 2 N says
+what wraps around; the equations of the march are asked in two steps."""
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve
@@ -20,7 +23,8 @@ from .compressed import CompressedBlocks
 BALANCE = 1e-18  # R^(L + N)
 BATCH = 12  # frequencies whose sums over all steps are one product
 DRIFT = 1e-2  # of the momentum of a free body: what rounding may add
-SHARE = 1e-6  # of displacements and of forces: what may wrap around, what the equations of the march may miss
+# of displacements and of forces: what may wrap around, what the equations of the march may miss
+SHARE = 1e-6
 
 
 def on_circle(
@@ -31,15 +35,17 @@ def on_circle(
     units: Indices,
     symmetric: bool,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return W (steps, m, m), the displacements of m unknowns after unit nodal forces on them during step 0, and as
-    ``marched`` does displacements (steps, 2n), tractions (steps, 4n), nodal forces (steps, 2n) of one right-hand side:
-    forces and prescribed, of fixed unknowns (2n,), both (steps, 2n). Raises InputError for more steps than the blocks
-    are for and where rounding of D moves a free body, StepFailure where much wraps around, and where the right-hand
-    side or a unit force misses the equations of the march."""
+    """Return W (steps, m, m), the displacements of m unknowns after unit nodal forces on them
+    during step 0, and as ``marched`` does displacements (steps, 2n), tractions (steps, 4n), nodal
+    forces (steps, 2n) of one right-hand side: forces and prescribed, of fixed unknowns (2n,), both
+    (steps, 2n). Raises InputError for more steps than the blocks are for and where rounding of D
+    moves a free body, StepFailure where much wraps around, and where the right-hand side or a unit
+    force misses the equations of the march."""
     steps, m, mass, free = len(forces), len(units), blocks.mesh.mass, ~fixed
     if steps > blocks.steps:
         raise InputError(
-            f"boundary elements: blocks of {blocks.steps} steps for {steps}; assemble it with more steps"
+            f"boundary elements: blocks of {blocks.steps} steps for {steps}; assemble it with more "
+            "steps"
         )
     if symmetric and not fixed.any():
         _check_drift(blocks, steps)
@@ -92,7 +98,8 @@ def on_circle(
 
 
 def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetric: bool) -> None:
-    """Raise StepFailure unless a motion satisfies the equations of the march in the middle and at the end."""
+    """Raise StepFailure unless a motion satisfies the equations of the march in the middle and at
+    the end."""
     steps, mass = len(u), 0.5 * blocks.mesh.mass
     changes, jumps = np.diff(u, axis=0, prepend=0.0), np.diff(p, axis=0, prepend=0.0)
     for k in sorted({steps // 2, steps - 1}):
@@ -109,7 +116,8 @@ def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetri
 
 
 def _around(values: Array, radius: float) -> float:
-    """Return what wraps around onto the last of N steps, as a share, if growth from N to 2 N goes on to 3 N."""
+    """Return what wraps around onto the last of N steps, as a share, if growth from N to 2 N goes
+    on to 3 N."""
     size = np.abs(values.reshape(len(values), -1)).max(1, initial=0.0) / radius ** np.arange(
         len(values)
     )
@@ -120,15 +128,18 @@ def _around(values: Array, radius: float) -> float:
 def _refusal(what: str, symmetric: bool) -> str:
     """Return the sentence that names the fault and the remedies."""
     return (
-        f"boundary elements: the compressed operator {what}, and {SHARE:.0e} is the limit; assemble with "
+        f"boundary elements: the compressed operator {what}, and {SHARE:.0e} is the limit; "
+        "assemble with "
         "compressed=False, take fewer steps" + ("" if symmetric else " or the symmetric form")
     )
 
 
 def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
-    """Raise InputError where rounding of the second differences D changes the momentum of a drifting body.
+    """Raise InputError where rounding of the second differences D changes the momentum of a
+    drifting body.
 
-    Behind the last wave the sum of D^j over steps j of a translation vanishes like t^-3; what it has instead is force.
+    Behind the last wave the sum of D^j over steps j of a translation vanishes like t^-3; what it
+    has instead is force.
     """
     n = len(blocks.mesh)
     if steps < 4 * max(part.smooth for part in blocks.stretches):
@@ -140,6 +151,7 @@ def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
     ).max()
     if force * steps * blocks.dt**2 > DRIFT * abs(blocks.mesh.area):
         raise InputError(
-            f"boundary elements: in {steps} steps rounding errors move a free body; take fewer steps, "
+            f"boundary elements: in {steps} steps rounding errors move a free body; take fewer "
+            "steps, "
             "hold the body, or take the unsymmetric form"
         )

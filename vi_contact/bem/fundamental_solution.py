@@ -1,15 +1,18 @@
-"""Evaluate radial functions of the fundamental solution of plane-strain elastodynamics in time, density 1.
+"""Evaluate radial functions of the fundamental solution of plane-strain elastodynamics in time,
+density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S (Laplace domain),
 
     G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,        r̂ = (x - y)/r.
 
-For another density rho divide G by rho; the functions Phi do not depend on it. In the time domain everything is
-integrated n times in time and closed (square roots, logarithms): F_n = n-fold integral of H(t - r/c)/sqrt(t² - r²/c²),
+For another density rho divide G by rho; the functions Phi do not depend on it. In the time domain
+everything is integrated n times in time and closed (square roots, logarithms): F_n = n-fold
+integral of H(t - r/c)/sqrt(t² - r²/c²),
 
     F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),   R = sqrt(t² - r²/c²).
 
-Zero ahead of its front (r >= c t). See docs/theory/bem.md; n = 0: Achenbach, Wave Propagation in Elastic Solids, 3.10.
+Zero ahead of its front (r >= c t). See docs/theory/bem.md; n = 0: Achenbach, Wave Propagation in
+Elastic Solids, 3.10.
 """
 
 from dataclasses import dataclass
@@ -28,9 +31,9 @@ TWO_PI = 2.0 * np.pi
 class KernelSet(NamedTuple):
     """Hold what the Galerkin layer integrates, arrays of the shape of r.
 
-    single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi = Phi_S'/r, ddiff =
-    (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p, inertia_s), inertia_a = s² Phi_a (in time:
-    Phi_a integrated twice less)."""
+    single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi =
+    Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p,
+    inertia_s), inertia_a = s² Phi_a (in time: Phi_a integrated twice less)."""
 
     single: tuple[NDArray, ...]
     double: tuple[NDArray, ...]
@@ -42,14 +45,16 @@ def check_speeds(kernels: Any) -> None:
     attributes(kernels, positive=("c_p", "c_s"))
     if kernels.c_p <= kernels.c_s:
         raise InputError(
-            f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; give "
+            f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; "
+            "give "
             "c_p above c_s: pressure waves are faster than shear waves"
         )
 
 
 @dataclass(frozen=True)
 class TimeKernels:
-    """Evaluate kernels at a time t [s]: G integrated once (single layer), twice (double), three times (hypersingular).
+    """Evaluate kernels at a time t [s]: G integrated once (single layer), twice (double), three
+    times (hypersingular).
 
     That is what functions constant in time (traction) and linear in time (displacement) need."""
 
@@ -73,8 +78,8 @@ class TimeKernels:
         dq3 = 0.5 * (f1_s * slow - f1_p * fast + t * dq2)
         single = tensor(f1_s * slow, f1_p * fast, dq3)
         f2_s, f2_p = t * f1_s - root_s, t * f1_p - root_p
-        # (n-1)² dQ_n = (2n-3) t dQ_(n-1) - t² dQ_(n-2) + [(r F'_(n-2) + 2 F_(n-2))/c²] S minus P, where
-        # r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
+        # (n-1)² dQ_n = (2n-3) t dQ_(n-1) - t² dQ_(n-2) + [(r F'_(n-2) + 2 F_(n-2))/c²] S minus P,
+        # where r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
         dq4 = (
             5.0 * t * dq3
             - t**2 * dq2

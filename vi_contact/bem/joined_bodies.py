@@ -1,16 +1,19 @@
-"""Join two bodies with matching boundary nodes: contact on one part of their interface, welds on another.
+"""Join two bodies with matching boundary nodes: contact on one part of their interface, welds on
+another.
 
-Each body has its own mesh, material and operator; only the condensed motion of interface nodes meets. With the forces
-lam on body 1 and -lam on body 2 the relative displacement is
+Each body has its own mesh, material and operator; only the condensed motion of interface nodes
+meets. With the forces lam on body 1 and -lam on body 2 the relative displacement is
 
     w = u_1 - u_2 = (W_1 + W_2) * lam + (u_1,free - u_2,free)
 
-the condensed motion of one body on a rigid support. Welded nodes have w = g in both directions at the end of every
-step; their forces are eliminated, and what is left is a CondensedCompliance of the contact nodes alone.
+the condensed motion of one body on a rigid support. Welded nodes have w = g in both directions at
+the end of every step; their forces are eliminated, and what is left is a CondensedCompliance of the
+contact nodes alone.
 
-Jumps may be given on the whole interface, with n the normal of body 1: welded nodes have u_1 - u_2 = g, contact nodes
-(u_1 - u_2 - g).n <= 0 and slip u_t,1 - u_t,2 - g_t; p_1 + p_2 = f everywhere, where lam is p_1 and f - p_1 acts on
-body 2: friction limits p_1. The source has u_perp = -u.n, so that g_perp = -g.n.
+Jumps may be given on the whole interface, with n the normal of body 1: welded nodes have u_1 - u_2
+= g, contact nodes (u_1 - u_2 - g).n <= 0 and slip u_t,1 - u_t,2 - g_t; p_1 + p_2 = f everywhere,
+where lam is p_1 and f - p_1 acts on body 2: friction limits p_1. The source has u_perp = -u.n, so
+that g_perp = -g.n.
 """
 
 from collections.abc import Callable
@@ -36,15 +39,16 @@ OfPlace = Callable[[Array, float], Array]
 
 @dataclass(frozen=True, eq=False)
 class TwoBodies:
-    """Describe two boundary value problems whose ``contact`` elements face each other, node on node.
+    """Describe two boundary value problems whose ``contact`` elements face each other, node on
+    node.
 
-    welded: (n_1,) elements of body 1 on the transmission interface, part of its ``contact``; nodes that touch one of
-    them are welded. jump: g [m], a function of (points (m, 2), t) that returns (m, 2), or (steps, 2, m) at the
-    interface nodes of body 1, ascending, at the ends of steps; traction: f likewise, [Pa] from a function or nodal
-    forces [N/m], means over steps; None: zero.
+    welded: (n_1,) elements of body 1 on the transmission interface, part of its ``contact``; nodes
+    that touch one of them are welded. jump: g [m], a function of (points (m, 2), t) that returns
+    (m, 2), or (steps, 2, m) at the interface nodes of body 1, ascending, at the ends of steps;
+    traction: f likewise, [Pa] from a function or nodal forces [N/m], means over steps; None: zero.
 
-    Raises InputError for nodes without a partner, different steps, welds outside the interface, and histories of other
-    shapes.
+    Raises InputError for nodes without a partner, different steps, welds outside the interface, and
+    histories of other shapes.
     """
 
     one: BoundaryProblem
@@ -66,7 +70,8 @@ class TwoBodies:
         steps = [len(body.forces) for body in (self.one, self.two)]
         if steps[0] != steps[1]:
             raise InputError(
-                f"TwoBodies: one has forces of {steps[0]} steps and two of {steps[1]}; give both as many"
+                f"TwoBodies: one has forces of {steps[0]} steps and two of {steps[1]}; give both "
+                "as many"
             )
         for name in ("jump", "traction"):
             if not callable(getattr(self, name)):
@@ -74,7 +79,8 @@ class TwoBodies:
                 optional(array, "TwoBodies", name, getattr(self, name), shape)
 
     def jumps(self, t: float) -> Array:
-        """Return g (2, m) at the interface nodes of body 1 at time t; histories are linear in a step."""
+        """Return g (2, m) at the interface nodes of body 1 at time t; histories are linear in a
+        step."""
         nodes = self.one.contact_nodes
         if self.jump is None:
             return np.zeros((2, len(nodes)))
@@ -146,7 +152,8 @@ class TwoBodies:
         )
         if (elements & ~interface).any():
             raise InputError(
-                "TwoBodies: `welded` has elements of body 1 that are not in its `contact`; add them there"
+                "TwoBodies: `welded` has elements of body 1 that are not in its `contact`; add "
+                "them there"
             )
         mesh = self.one.operator.mesh
         contact = interface & ~elements
@@ -160,7 +167,8 @@ class TwoBodies:
         return Weld(relative, mesh.nodes_of(elements)[relative.nodes], jumps)
 
     def condensed(self) -> CondensedCompliance:
-        """Return the compliance of the contact nodes, for BoundaryContact; ``normals`` point from body 1 to body 2."""
+        """Return the compliance of the contact nodes, for BoundaryContact; ``normals`` point from
+        body 1 to body 2."""
         return self._weld.contact
 
     def contact(
@@ -170,8 +178,9 @@ class TwoBodies:
         conditions: Conditions | None = None,
         bilateral: bool = False,
     ) -> BoundaryContact:
-        """Set up contact of the nodes that are not welded, with the given jump: its normal part is how far body 2
-        has moved towards body 1 beforehand, its tangential part how far it has slid."""
+        """Set up contact of the nodes that are not welded, with the given jump: its normal part is
+        how far body 2 has moved towards body 1 beforehand, its tangential part how far it has
+        slid."""
         compliance = self.condensed()
         chosen = np.arange(len(compliance.nodes)) if conditions is None else conditions.nodes
         frames = nodal_frames(compliance.normals if conditions is None else conditions.normals)
@@ -190,7 +199,8 @@ class TwoBodies:
         )
 
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
-        """Return the motions of both bodies under loads, contact forces (steps, 2m_c) on body 1, and the welds."""
+        """Return the motions of both bodies under loads, contact forces (steps, 2m_c) on body 1,
+        and the welds."""
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])
         forces = (
@@ -207,29 +217,32 @@ class TwoBodies:
 
 
 def matching(points: Array, others: Array) -> Indices:
-    """Return (m,) number of the point of ``others`` (m, 2) at each of ``points`` (m, 2), or raise InputError."""
+    """Return (m,) number of the point of ``others`` (m, 2) at each of ``points`` (m, 2), or raise
+    InputError."""
     distance = np.hypot(*(points[:, None] - others).transpose(2, 0, 1))
     nearest = distance.argmin(axis=1)
     away = distance.min(axis=1)
     worst = int(away.argmax())
     if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
         raise InputError(
-            f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give both "
+            f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give "
+            "both "
             "interfaces the same nodes"
         )
     return nearest
 
 
 def inverse(matrix: Array) -> Callable[[Array], Array]:
-    """Return b -> matrix⁻¹ b, by Cholesky's factors or, of a matrix of the unsymmetric form, by LU factors."""
+    """Return b -> matrix⁻¹ b, by Cholesky's factors or, of a matrix of the unsymmetric form, by LU
+    factors."""
     if max_abs(matrix - matrix.T) > ASYMMETRIC * max_abs(matrix):
         return partial(lu_solve, lu_factor(matrix))
     return partial(cho_solve, cho_factor(0.5 * (matrix + matrix.T)))
 
 
 class Weld:
-    """Hold the relative displacement of masked nodes (m,) at given jumps (steps, 2m): ``contact`` is what is left of a
-    compliance when the weld forces are eliminated."""
+    """Hold the relative displacement of masked nodes (m,) at given jumps (steps, 2m): ``contact``
+    is what is left of a compliance when the weld forces are eliminated."""
 
     def __init__(self, compliance: CondensedCompliance, nodes: Mask, jumps: Array) -> None:
         W, steps = compliance.W, len(compliance.W)
@@ -242,7 +255,8 @@ class Weld:
             W[:, touching][:, :, welded],
         )
         known = np.concatenate([cross, (compliance.u_free - jumps)[:, welded, None]], axis=2)
-        # (steps, |I|, 2m_c + 1) weld forces after unit contact forces in step 0, in the last column without any
+        # (steps, |I|, 2m_c + 1) weld forces after unit contact forces in step 0, in the last column
+        # without any
         self._responses = responses = np.zeros_like(known)
         left = np.concatenate(
             [W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2
@@ -261,7 +275,8 @@ class Weld:
         self.contact = replace(compliance, W=W, u_free=u_free, **kept)
 
     def forces(self, contact_forces: Array) -> Array:
-        """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
+        """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with
+        them."""
         everything = np.zeros((len(contact_forces), len(self._welded)))
         everything[:, self._touching] = contact_forces
         if self._welded.any():

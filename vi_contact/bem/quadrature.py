@@ -1,15 +1,19 @@
-"""Place points and weights for double integrals over pairs of elements, split where a wave front cuts through.
+"""Place points and weights for double integrals over pairs of elements, split where a wave front
+cuts through.
 
-A kernel at time t has square-root kinks at r = c_S t and r = c_P t and a logarithm at r = 0. Pairs of elements that do
-not touch are integrated with products of Gauss rules, or, where a front crosses, with both integrals split at the
-front. Touching pairs use coordinates in which r is a product, so that the singularity and the fronts lie at ends of the
-inner integral: z = xi - eta on one element, Duffy's (u, u w) at a common corner.
+A kernel at time t has square-root kinks at r = c_S t and r = c_P t and a logarithm at r = 0. Pairs
+of elements that do not touch are integrated with products of Gauss rules, or, where a front
+crosses, with both integrals split at the front. Touching pairs use coordinates in which r is a
+product, so that the singularity and the fronts lie at ends of the inner integral: z = xi - eta on
+one element, Duffy's (u, u w) at a common corner.
 
-Elements that face each other at a fraction of their length have peaks of that width: the inner integral is split and
-stretched about the foot of x on the second element, the outer one about the feet of that element's ends, the integral
-over w about the foot of one end on the other element (rules.placed).
+Elements that face each other at a fraction of their length have peaks of that width: the inner
+integral is split and stretched about the foot of x on the second element, the outer one about the
+feet of that element's ends, the integral over w about the foot of one end on the other element
+(rules.placed).
 
-Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends harmless."""
+Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends
+harmless."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -32,7 +36,8 @@ CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
 class Orders:
     """Hold counts of Gauss points.
 
-    Far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of close pairs."""
+    Far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of
+    close pairs."""
 
     far: int = 4
     near: int = 8
@@ -48,10 +53,12 @@ class Orders:
 
 @dataclass(frozen=True)
 class PointSet:
-    """Hold points of some element pairs: x on the first element at xi, y on the second at eta, both in [0, 1].
+    """Hold points of some element pairs: x on the first element at xi, y on the second at eta, both
+    in [0, 1].
 
-    pairs: (p,) numbers of the pairs; owner: (m,) which of them a point belongs to, or None when the points come in
-    equal blocks of len(weight); d: (2, m) x - y [m]; r: (m,) its length; xi, eta, weight: (m,), or one block of them.
+    pairs: (p,) numbers of the pairs; owner: (m,) which of them a point belongs to, or None when the
+    points come in equal blocks of len(weight); d: (2, m) x - y [m]; r: (m,) its length; xi, eta,
+    weight: (m,), or one block of them.
     """
 
     pairs: Indices
@@ -63,13 +70,15 @@ class PointSet:
     weight: Array
 
     def integrate(self, values: NDArray) -> NDArray:
-        """Return (k, p, 4) integrals of (k, m) values times phi_a(xi) phi_b(eta), [2 a + b], phi = 1 - x, x."""
+        """Return (k, p, 4) integrals of (k, m) values times phi_a(xi) phi_b(eta), [2 a + b], phi =
+        1 - x, x."""
         if self.owner is None:
             return values.reshape(len(values), len(self.pairs), -1) @ self._weighted
         return np.asarray(self.shapes() @ values.T).T.reshape(len(values), len(self.pairs), 4)
 
     def shapes(self) -> csc_matrix:
-        """Return (4 p, m) weighted shape functions: their product with values at the points integrates them."""
+        """Return (4 p, m) weighted shape functions: their product with values at the points
+        integrates them."""
         count = len(self.pairs)
         owner = np.repeat(np.arange(count), len(self.weight)) if self.owner is None else self.owner
         weighted = np.tile(self._weighted, (count, 1)) if self.owner is None else self._weighted
@@ -86,7 +95,8 @@ class PointSet:
 
 
 def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
-    """Return (k count, m) that adds up values at m points times k weighted shape functions (m, k) of their owners."""
+    """Return (k count, m) that adds up values at m points times k weighted shape functions (m, k)
+    of their owners."""
     k = weighted.shape[1]
     rows, columns = k * owner[:, None] + np.arange(k), np.arange(0, weighted.size + 1, k)
     return csc_matrix((weighted.ravel(), rows.ravel(), columns), shape=(k * count, len(owner)))
@@ -95,7 +105,8 @@ def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
 def point_sets(
     pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()
 ) -> Iterator[PointSet]:
-    """Return all points for kernels with kinks at r in `fronts` [m], zero beyond the greatest of them; () is smooth."""
+    """Return all points for kernels with kinks at r in `fronts` [m], zero beyond the greatest of
+    them; () is smooth."""
     reach = max(fronts, default=np.inf)
     crossed = np.zeros(len(pairs), bool)
     behind_soon = np.zeros(len(pairs), bool)
@@ -160,8 +171,8 @@ def _split(
     *,
     close: bool = False,
 ) -> Iterator[PointSet]:
-    """Split the outer integral where fronts reach the second element's ends or graze it, the inner one at the fronts;
-    ``close``: both about the feet as well, and stretched there."""
+    """Split the outer integral where fronts reach the second element's ends or graze it, the inner
+    one at the fronts; ``close``: both about the feet as well, and stretched there."""
     for start in range(0, len(chosen), 200):
         part = chosen[start : start + 200]
         owner, xi, weight = _outer(pairs, part, fronts, outer, close)
@@ -196,7 +207,8 @@ def _inner(
     rule: Rule,
     close: bool,
 ) -> tuple[Indices, Array, Array]:
-    """Return (row of ``xi``, eta, weight) of the points on the second elements that the last front has reached."""
+    """Return (row of ``xi``, eta, weight) of the points on the second elements that the last front
+    has reached."""
     d, b = pairs.offset[:, pair] + pairs.a[:, pair] * xi, pairs.b[:, pair]
     b2, projection, d2 = (b**2).sum(0), (d * b).sum(0), (d**2).sum(0)
     breaks = [roots(b2, -2.0 * projection, d2 - front**2) for front in fronts]
@@ -210,7 +222,8 @@ def _inner(
 
 
 def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
-    """Return (p, 2) xi of the feet of the second element's ends on the line of the first, and their heights over it."""
+    """Return (p, 2) xi of the feet of the second element's ends on the line of the first, and their
+    heights over it."""
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
     ends = (-offset, b - offset)
@@ -220,7 +233,8 @@ def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
 
 
 def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -> Array:
-    """Return (p, 6 per front) xi where the first element is a front away from an end of the second, or its line."""
+    """Return (p, 6 per front) xi where the first element is a front away from an end of the second,
+    or its line."""
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
     normal = np.stack([b[1], -b[0]]) / np.hypot(*b)
@@ -238,7 +252,8 @@ def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -
 def _on_one_element(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int
 ) -> Iterator[PointSet]:
-    """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points across are exact."""
+    """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points
+    across are exact."""
     row, low, length = _reached(np.hypot(*pairs.a[:, chosen]), fronts)
     x, w = graded(order)
     across, across_weight = gauss(2)
@@ -258,7 +273,8 @@ def _on_one_element(
 
 
 def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
-    """Return the pieces, as of ``pieces``, that the last front has reached, of [0, 1] where r is x times a distance."""
+    """Return the pieces, as of ``pieces``, that the last front has reached, of [0, 1] where r is x
+    times a distance."""
     row, low, length = pieces(np.array(fronts, float) / distance[:, None])
     heard = (low + 0.5 * length) * distance[row] < max(fronts, default=np.inf)
     return row[heard], low[heard], length[heard]
@@ -267,8 +283,9 @@ def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, 
 def _at_corners(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int, *, sharp: bool
 ) -> Iterator[PointSet]:
-    """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split at fronts/R(w);
-    sharp: R(w) falls to a small share of its greatest value at the foot of one end on the other element."""
+    """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split
+    at fronts/R(w); sharp: R(w) falls to a small share of its greatest value at the foot of one end
+    on the other element."""
     if not len(chosen):
         return
     at_end = pairs.shares_end[

@@ -1,13 +1,15 @@
-"""Iterate on the whole space-time problem: Uzawa's algorithm of Aimi, Di Credico, Gimperlein (2024), with FFT.
+"""Iterate on the whole space-time problem: Uzawa's algorithm of Aimi, Di Credico, Gimperlein
+(2024), with FFT.
 
     solve     v = v_free + W * lam                      all steps at once
     project   r <- Pr_C(r + rho (v_n - gap, slip)),     Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
     until     |Pr_C(r + rho_1 (v_n - gap, slip)) - r| <= tolerance |r|,   rho_1 = 1/lambda_max(W[0]), whatever rho is
 
-The normal multiplier meets the gap at the end of each step, the tangential one the slip of the step; F is Tresca's
-threshold or Coulomb's limit of the r_n just found. rho = 1/lambda_max(W[0]) by default: that of one step. The operator
-of all steps is not normal, so that changes grow before they shrink, the more the more steps there are, until rounding
-errors win: long runs are cut into windows, one after the other, the past of which is known."""
+The normal multiplier meets the gap at the end of each step, the tangential one the slip of the
+step; F is Tresca's threshold or Coulomb's limit of the r_n just found. rho = 1/lambda_max(W[0]) by
+default: that of one step. The operator of all steps is not normal, so that changes grow before they
+shrink, the more the more steps there are, until rounding errors win: long runs are cut into
+windows, one after the other, the past of which is known."""
 
 from dataclasses import dataclass, replace
 
@@ -32,10 +34,11 @@ LOOSE = 10.0  # times the tolerance: certificates of a run, which were up to 1.1
 class SpaceTimeUzawa:
     """Solve the whole history at once, or window by window.
 
-    tolerance: relative change of the multiplier to stop at (the source's 1e-n), that of a step of the default rho;
-    rho > 0 [N/m²] or None: 1/lambda_max(W[0]); window: steps that are solved at once, all of them if None. The run's
-    ``iterations`` has one entry per window, ``history`` the relative changes. Its certificates measure each step by the
-    largest forces and motions of the run, which is what this method solves for.
+    tolerance: relative change of the multiplier to stop at (the source's 1e-n), that of a step of
+    the default rho; rho > 0 [N/m²] or None: 1/lambda_max(W[0]); window: steps that are solved at
+    once, all of them if None. The run's ``iterations`` has one entry per window, ``history`` the
+    relative changes. Its certificates measure each step by the largest forces and motions of the
+    run, which is what this method solves for.
 
     Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate."""
 
@@ -49,8 +52,8 @@ class SpaceTimeUzawa:
         attributes(self, positive=("tolerance", *rho), counts=("max_iterations", *window))
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
-        """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance, or certificates are not
-        within LOOSE times the tolerance."""
+        """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance, or
+        certificates are not within LOOSE times the tolerance."""
         instance("SpaceTimeUzawa", "contact", contact, BoundaryContact, "give a BoundaryContact")
         if (
             contact.frictional
@@ -72,13 +75,16 @@ class SpaceTimeUzawa:
         run = problem.run(r, np.array(counts), tuple(history))
         if not run.worst <= LOOSE * self.tolerance:
             raise StepFailure(
-                f"{self}: the worst certificate is {run.worst:.1e}, of the run's largest numbers, and "
-                f"{LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or march_contact"
+                f"{self}: the worst certificate is {run.worst:.1e}, of the run's largest numbers, "
+                "and "
+                f"{LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or "
+                "march_contact"
             )
         return run
 
     def _window(self, problem: "_SpaceTime", r: Array) -> tuple[Array, list[float]]:
-        """Return the multipliers (steps, 2, c) of the window that was entered, and the relative changes on the way."""
+        """Return the multipliers (steps, 2, c) of the window that was entered, and the relative
+        changes on the way."""
         rho, unit = self.rho or problem.default_rho, float(norm(problem.violation(r).ravel()))
         changes: list[float] = []
         while len(changes) < self.max_iterations:

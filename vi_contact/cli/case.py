@@ -1,4 +1,5 @@
-"""``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``: options and what the commands do."""
+"""``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``: options and what the
+commands do."""
 
 import argparse
 import gc
@@ -73,7 +74,8 @@ def _run(options: argparse.Namespace) -> str:
     short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
     with ExitStack() as after:
         after.callback(gc.enable if gc.isenabled() else gc.disable)
-        gc.disable()  # modules are no garbage: looking for it takes a tenth of the way to the first step
+        # modules are no garbage: looking for it takes a tenth of the way to the first step
+        gc.disable()
         case = read_case(
             path, short.settings(read_toml(path), options.settings), allow=options.allow
         )
@@ -86,7 +88,8 @@ def _run(options: argparse.Namespace) -> str:
         )
         if vain is not None:
             raise InputError(
-                f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of the "
+                f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of "
+                "the "
                 "two out"
             )
         return _checked(case, comm, Path(out))
@@ -102,7 +105,8 @@ def _run(options: argparse.Namespace) -> str:
 
 
 def _checked(case: "Case", comm: Any, folder: Path) -> str:
-    """Describe and draw the model of a case; InputError for what is wrong with it, once all the rest is told."""
+    """Describe and draw the model of a case; InputError for what is wrong with it, once all the
+    rest is told."""
     from ..core.files import on_root
     from ..core.own_files import inner_folder
     from ..plots.histories import write_picture  # late: matplotlib

@@ -1,4 +1,5 @@
-"""Tell errors in one sentence, those of the machine and of libraries too, and end a command on all its ranks."""
+"""Tell errors in one sentence, those of the machine and of libraries too, and end a command on all
+its ranks."""
 
 import argparse
 import os
@@ -17,13 +18,15 @@ from ..core.files import sentence
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
 OUT_OF_MEMORY = (
-    "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a run "
+    "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a "
+    "run "
     "keeps what it has written, and --restart continues it"
 )
 
 
 def check_words(arguments: Sequence[str]) -> None:
-    """Raise InputError for words that no shell can give or file can have as a name, and for empty names of outputs."""
+    """Raise InputError for words that no shell can give or file can have as a name, and for empty
+    names of outputs."""
     for word in arguments:
         if "\0" in word:
             raise InputError(f"{shown(word)} contains the character NUL: leave it out")
@@ -50,7 +53,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
-    """Return what the call returns; ViContactError of one sentence for errors of memory, files and sizes of numbers.
+    """Return what the call returns; ViContactError of one sentence for errors of memory, files and
+    sizes of numbers.
 
     spelling: argument -> option: what sentences call units= is --units here."""
     try:
@@ -74,15 +78,16 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
 
 
 def printable(text: str) -> str:
-    """Return the text without what standard output cannot write, such as names of files that are no UTF-8, and without
-    characters that steer a terminal."""
+    """Return the text without what standard output cannot write, such as names of files that are no
+    UTF-8, and without characters that steer a terminal."""
     text = re.sub("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]", lambda found: ascii(found[0])[1:-1], text)
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def say(text: str) -> None:
-    """Print a text. Where nobody reads it any more (head has ended), it and all that follows is dropped."""
+    """Print a text. Where nobody reads it any more (head has ended), it and all that follows is
+    dropped."""
     try:
         print(printable(text), flush=True)
     except BrokenPipeError:
@@ -118,12 +123,14 @@ def _sentence(error: Exception) -> str | None:
 
 
 def world() -> Any:
-    """Return MPI's communicator of all ranks; that of this process alone where MPI has not been started."""
+    """Return MPI's communicator of all ranks; that of this process alone where MPI has not been
+    started."""
     return sys.modules["mpi4py.MPI"].COMM_WORLD if "mpi4py.MPI" in sys.modules else SerialComm()
 
 
 def fail_together(text: str) -> None:
-    """Return when all ranks come here; else say what stopped this one and end the others, which wait. Collective."""
+    """Return when all ranks come here; else say what stopped this one and end the others, which
+    wait. Collective."""
     ranks = world()
     if ranks.size == 1:
         return

@@ -78,7 +78,8 @@ def _read(options: argparse.Namespace, path: str) -> Record:
                 raise ValueError(words[1])
         except (argparse.ArgumentTypeError, ValueError):
             raise InputError(
-                f"--psa {' '.join(words)}: give an acceleration such as 0.5g, and a period in seconds"
+                f"--psa {' '.join(words)}: give an acceleration such as 0.5g, and a period in "
+                "seconds"
             ) from None
     return Processing(**asked)(
         read_record(
@@ -97,7 +98,8 @@ def _info(options: argparse.Namespace) -> str:
 
 
 def _told(record: Record) -> str:
-    """Return the table of a record, and where its units, its time step and its number of samples come from."""
+    """Return the table of a record, and where its units, its time step and its number of samples
+    come from."""
     spelled = {
         "units": record.units_from.replace("option", "--units"),
         "dt": record.dt_from.replace("option", "--dt"),
@@ -118,12 +120,14 @@ def _convert(options: argparse.Namespace) -> str:
         record, options.out, units
     )
     lines = [
-        f"{options.out}: {form}, {record.acceleration.size} samples, dt = {record.dt:.10g} s, in {units}, "
+        f"{options.out}: {form}, {record.acceleration.size} samples, dt = {record.dt:.10g} s, in "
+        f"{units}, "
         f"PGA = {pga(record):.4g} m/s2"
     ]
     if form == "path":
         lines.append(
-            f"OpenSees: timeSeries Path 1 -dt {record.dt:.10g} -filePath {options.out} -factor 1.0  "
+            f"OpenSees: timeSeries Path 1 -dt {record.dt:.10g} -filePath {options.out} -factor 1.0 "
+            " "
             f"# -factor: your unit of acceleration per {units}"
         )
     lines += [f"doubt: {doubt}" for doubt in record.doubts]
@@ -161,7 +165,8 @@ def _spectrum(options: argparse.Namespace) -> str:
     picture = output_file(options.png or f"{stem}_spectrum.png", reads=options.file, picture=True)
     if table == picture:
         raise InputError(
-            f"{table}: the table would be overwritten by its picture; give --csv and --png two names"
+            f"{table}: the table would be overwritten by its picture; give --csv and --png two "
+            "names"
         )
     _write_csv(table, spectra, target)
     plot_spectra(spectra, picture, target=target, steps=steps, units=units)

@@ -25,7 +25,8 @@ def add_command(
     *parts: str,
     words: Mapping[str, Any] | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a command, or an action of one such as "motion info", with these parts of options.toml; return its parser.
+    """Add a command, or an action of one such as "motion info", with these parts of options.toml;
+    return its parser.
 
     run: what it calls. words: what the texts there, and the names of types, are looked up in."""
     known, command = {"float": float, "int": int} | dict(words or {}), _TOLD[name]
@@ -70,11 +71,13 @@ def _add(place: Any, table: Mapping[str, Any], known: Mapping[str, Any]) -> None
 
 
 def spaced(option: str, values: Sequence[float]) -> Any:
-    """Read FROM, TO, N as N logarithmically spaced numbers; InputError for others, before memory is taken."""
+    """Read FROM, TO, N as N logarithmically spaced numbers; InputError for others, before memory is
+    taken."""
     first, last, count = values
     if not (0.0 < first < last < math.inf and 2 <= count < math.inf and count == int(count)):
         raise InputError(
-            f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from 2 on"
+            f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from "
+            "2 on"
         )
     return np.geomspace(
         first, last, counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
@@ -86,8 +89,9 @@ def output_file(
 ) -> Path:
     """Return the file that a command is about to write, checked before any work is done.
 
-    reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture.
-    InputError for a folder, a file in no folder, one of ``reads``, or a name without the ending of a picture."""
+    reads: files of its input, which it must not overwrite; picture: whether its name says the
+    format of a picture. InputError for a folder, a file in no folder, one of ``reads``, or a name
+    without the ending of a picture."""
     out = Path(path)
     try:
         with suppress(FileNotFoundError):
@@ -100,14 +104,17 @@ def output_file(
         fits = False
     if not fits:
         raise InputError(
-            f"{shown(str(path))}: cannot be written; give the name of a file in a folder that exists"
+            f"{shown(str(path))}: cannot be written; give the name of a file in a folder that "
+            "exists"
         )
     if picture and out.suffix.lower() not in PICTURES:
         raise InputError(
-            f"{out}: a picture ends in {', '.join(PICTURES[:-1])} or {PICTURES[-1]}; give it such a name"
+            f"{out}: a picture ends in {', '.join(PICTURES[:-1])} or {PICTURES[-1]}; give it such "
+            "a name"
         )
     if out.exists() and any(Path(one).exists() and out.samefile(one) for one in reads):
         raise InputError(
-            f"{out} is read by this command, which would overwrite it: give another name for the output"
+            f"{out} is read by this command, which would overwrite it: give another name for the "
+            "output"
         )
     return out

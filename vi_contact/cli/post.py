@@ -170,14 +170,16 @@ def _checks(options: argparse.Namespace) -> str:
 
 
 def _table_path(options: argparse.Namespace) -> Path:
-    """Return the table that a command is about to write, a picture of the same name beside it; InputError."""
+    """Return the table that a command is about to write, a picture of the same name beside it;
+    InputError."""
     folder = Path(options.folder)
     out = output_file(
         options.out or folder / f"{options.action}.csv", reads=[folder / name for name in FILES]
     )
     if out.suffix.lower() in PICTURES:
         raise InputError(
-            f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv"
+            f"{out}: the table would be overwritten by its picture; give a name such as "
+            f"{out.stem}.csv"
         )
     output_file(out.with_suffix(PICTURES[0]))
     return out

@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .certificate import Certificate as Certificate
 from .errors import InputError as InputError
 from .errors import Interrupted as Interrupted

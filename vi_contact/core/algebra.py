@@ -1,9 +1,10 @@
 """Do linear algebra on distributed vectors, seen as numpy arrays of the entries this rank owns.
 
-Everything above this file (schemes, condensed solver, recorders) is written against the protocols below and never
-asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and needs no finite element package;
-``fem.petsc_algebra`` serves any number of ranks. Rules: a vector is the float64 array of its owned entries; scalars
-returned by ``dot`` and by ``Comm`` are the same number on every rank."""
+Everything above this file (schemes, condensed solver, recorders) is written against the protocols
+below and never asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and
+needs no finite element package; ``fem.petsc_algebra`` serves any number of ranks. Rules: a vector
+is the float64 array of its owned entries; scalars returned by ``dot`` and by ``Comm`` are the same
+number on every rank."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -21,7 +22,8 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN. The places are found faster than the values."""
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN. The places are found faster
+    than the values."""
     return float(max(x.item(x.argmax()), -x.item(x.argmin()))) if x.size else 0.0
 
 
@@ -43,7 +45,8 @@ class Comm(Protocol):
 
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
-    """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one rank says True."""
+    """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one
+    rank says True."""
     return float(value) if comm.size == 1 else float(comm.max(np.array([float(value)]))[0])
 
 
@@ -58,7 +61,8 @@ def from_each(comm: Comm, value: Any) -> list[Any]:
 
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
-    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers; elsewhere none. Collective."""
+    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers; elsewhere
+    none. Collective."""
     parts = comm.gather((numbers, rows))
     if parts is None:
         return rows[:0]
@@ -69,7 +73,8 @@ def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
 
 
 class Matrix(Protocol):
-    """Provide products with a square sparse matrix whose rows are distributed like the vectors it multiplies."""
+    """Provide products with a square sparse matrix whose rows are distributed like the vectors it
+    multiplies."""
 
     @property
     def rows(self) -> int:
@@ -88,12 +93,14 @@ class Factor(Protocol):
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
-        """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning
-        rank. Returns the owned rows, shape (rows, m), or only those of them that are named: the whole may not fit."""
+        """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row
+        ``owned[k]`` of the owning rank. Returns the owned rows, shape (rows, m), or only those of
+        them that are named: the whole may not fit."""
 
 
 class Algebra(Protocol):
-    """Make matrices out of matrices: of M, C, K and their combinations, all of them ``symmetric`` or not."""
+    """Make matrices out of matrices: of M, C, K and their combinations, all of them ``symmetric``
+    or not."""
 
     symmetric: bool
 
@@ -104,36 +111,44 @@ class Algebra(Protocol):
         """Return Tᵀ K T."""
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of entries between the n unknowns of one rank; those given twice add up."""
+        """Return the matrix of entries between the n unknowns of one rank; those given twice add
+        up."""
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
-        """Return A with the rows and columns of the masked unknowns replaced by those of the identity."""
+        """Return A with the rows and columns of the masked unknowns replaced by those of the
+        identity."""
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
         """Return the rows and columns of A of the masked unknowns, which their ranks own."""
 
     def first(self, n: int) -> int:
-        """Return the number, among those of all ranks, of the first of the n unknowns that this rank owns."""
+        """Return the number, among those of all ranks, of the first of the n unknowns that this
+        rank owns."""
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
-        """Return these owned rows of A, ascending, their columns numbered over all ranks. Collective."""
+        """Return these owned rows of A, ascending, their columns numbered over all ranks.
+        Collective."""
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        """Return the identity of n owned rows with some of them replaced, columns numbered over all ranks."""
+        """Return the identity of n owned rows with some of them replaced, columns numbered over all
+        ranks."""
 
     def factor(self, A: Matrix) -> Factor: ...
     def contact_last(self, A: Matrix, last: Indices) -> Any:
-        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are numbered over all
-        ranks and the same on every rank. None where ``factor`` serves better or there is none. Collective."""
+        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are
+        numbered over all ranks and the same on every rank. None where ``factor`` serves better or
+        there is none. Collective."""
 
     def dot(self, x: Array, y: Array) -> float: ...
 
 
 class EffectiveMatrix:
-    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it lives as long as dt.
+    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it
+    lives as long as dt.
 
-    ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k K. None: not known.
-    ``image(x)``: A x, made of products with M, C and K that others need too, where that is told."""
+    ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k
+    K. None: not known. ``image(x)``: A x, made of products with M, C and K that others need too,
+    where that is told."""
 
     def __init__(
         self,
@@ -152,7 +167,8 @@ class EffectiveMatrix:
         self.desk: dict[Any, tuple[list[Any], list[Any]]] = {}  # where small vectors are read
 
     def contact_last(self, last: Indices) -> Any:
-        """Return the factor with these unknowns last (see ``Algebra``), which is then ``factor`` too. Collective."""
+        """Return the factor with these unknowns last (see ``Algebra``), which is then ``factor``
+        too. Collective."""
         if self._last is None or not np.array_equal(self._last[0], last):
             self._last = last, self.algebra.contact_last(self.matrix, last)
             if self._last[1] is not None:
@@ -224,7 +240,8 @@ class SerialMatrix:
 
 
 class SerialFactor:
-    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged where they must."""
+    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged
+    where they must."""
 
     def __init__(self, matrix: SerialMatrix) -> None:
         self._lu = splu(
@@ -245,7 +262,8 @@ class SerialFactor:
 
 
 class SerialAlgebra:
-    """Combine matrices of scipy.sparse on one process; solvers that need symmetric ones ask for ``symmetric``."""
+    """Combine matrices of scipy.sparse on one process; solvers that need symmetric ones ask for
+    ``symmetric``."""
 
     def __init__(self, *, symmetric: bool = True) -> None:
         self.comm: Comm = SerialComm()
@@ -295,7 +313,8 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
-    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin at ``first``."""
+    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin
+    at ``first``."""
     counts, columns, values = (
         [np.zeros(1, dtype=np.int64)],
         [rows.indices[:0]],
@@ -303,7 +322,8 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
     )
     for start in range(0, rows.shape[0], AT_ONCE * width):
         blocks = rows[start : start + AT_ONCE * width].tobsr((width, width))
-        blocks.sort_indices()  # they come as the rows of a node name them; PETSc counts on their order on several ranks
+        # they come as the rows of a node name them; PETSc counts on their order on several ranks
+        blocks.sort_indices()
         row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
         upper = blocks.indices >= (first + start) // width + row
         counts.append(np.bincount(row[upper], minlength=len(blocks.indptr) - 1))
@@ -313,7 +333,8 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
 
 
 def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
-    """Return n rows of the identity, whose ones begin in column ``first``, with these rows replaced by the entries."""
+    """Return n rows of the identity, whose ones begin in column ``first``, with these rows replaced
+    by the entries."""
     kept = np.setdiff1d(np.arange(n), rows)
     where = np.concatenate([kept, np.repeat(rows, np.diff(entries.indptr))])
     column = np.concatenate([first + kept, entries.indices])

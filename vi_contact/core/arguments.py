@@ -1,7 +1,9 @@
-"""Check the arguments of public functions against their types, so that a wrong one is a sentence and no traceback.
+"""Check the arguments of public functions against their types, so that a wrong one is a sentence
+and no traceback.
 
-``@checked`` is for functions that users call with their own values, and that look at these before any other function
-does. Limits of numbers (positive, finite) are checked by the functions themselves."""
+``@checked`` is for functions that users call with their own values, and that look at these before
+any other function does. Limits of numbers (positive, finite) are checked by the functions
+themselves."""
 
 import os
 import types
@@ -25,7 +27,8 @@ R = TypeVar("R")
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with a check of its arguments: InputError for one that is not of its type."""
+    """Return the function with a check of its arguments: InputError for one that is not of its
+    type."""
     name, of = function.__qualname__, signature(function)
 
     @wraps(function)
@@ -43,7 +46,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def check_fields(one: Any) -> None:
-    """Raise InputError for the first field of a dataclass that is not of its type: call it in ``__post_init__``."""
+    """Raise InputError for the first field of a dataclass that is not of its type: call it in
+    ``__post_init__``."""
     kind: Any = type(one)
     hints = _hints(kind)
     for field in fields(one):

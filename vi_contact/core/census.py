@@ -1,7 +1,7 @@
 """Say what became of every node of a contact boundary: with a condition, left out, or in doubt.
 
-``vi-contact run --check``, the log, the report and the picture of a model all read this one record, so that they
-say the same.
+``vi-contact run --check``, the log, the report and the picture of a model all read this one record,
+so that they say the same.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class Census:
-    """Count the nodes of one contact boundary and hold the places of those that are not plain contact points.
+    """Count the nodes of one contact boundary and hold the places of those that are not plain
+    contact points.
 
-    Args:
-        name: the boundary, as the user named it; of a pair, that of side 1.
-        nodes: number of nodes of the boundary on all ranks.
-        points: number of contact conditions on all ranks. A node at an edge has one for each of its faces.
-        places: kind of node -> coordinates (k, d) [m] of all nodes of this kind, on all ranks alike, ordered by node
-            number. A kind says in a few words what became of the node, as in "shared by both sides", "clamped",
-            "prescribed", "in front of nothing", "partly covered".
+    Args: name: the boundary, as the user named it; of a pair, that of side 1. nodes: number of
+        nodes of the boundary on all ranks. points: number of contact conditions on all ranks. A
+        node at an edge has one for each of its faces. places: kind of node -> coordinates (k, d)
+        [m] of all nodes of this kind, on all ranks alike, ordered by node
+            number. A kind says in a few words what became of the node, as in "shared by both
+            sides", "clamped", "prescribed", "in front of nothing", "partly covered".
     """
 
     name: str
@@ -44,7 +44,8 @@ class Census:
     places: Mapping[str, Array] = field(default_factory=dict)
 
     def in_words(self) -> str:
-        """Return how many points of how many nodes there are, and the other kinds with their first places."""
+        """Return how many points of how many nodes there are, and the other kinds with their first
+        places."""
         kinds = [self._kind(kind, points) for kind, points in self.places.items()]
         return "; ".join([f"{self.points} points of {self.nodes} nodes", *kinds])
 

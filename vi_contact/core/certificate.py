@@ -1,4 +1,5 @@
-"""Judge one step: how far an answer is from solving its inequality problem. ``core.verify`` computes it."""
+"""Judge one step: how far an answer is from solving its inequality problem. ``core.verify``
+computes it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,7 +7,8 @@ from functools import cached_property
 
 @dataclass(frozen=True)
 class Certificate:
-    """Hold the dimensionless residuals of the inequality problem of one step; each is 0 for an exact solution.
+    """Hold the dimensionless residuals of the inequality problem of one step; each is 0 for an
+    exact solution.
 
     equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max, 1e-5 |A_ii|_max |x|_max). The last term matters on
     fine meshes only, where the parts of A x cancel: it keeps the rounding errors of the residual itself (1e-16 |A||x|)

@@ -1,11 +1,13 @@
 """Call what users give on all ranks together, and compare what all ranks must give alike.
 
-On several ranks a function of the user's may fail on one of them: at the points that this rank owns. The others would
-wait for it for ever in the next collective call. So there are two ways to call such a function:
+On several ranks a function of the user's may fail on one of them: at the points that this rank
+owns. The others would wait for it for ever in the next collective call. So there are two ways to
+call such a function:
 
 - ``on_all`` (core.checks) calls it and then asks all ranks: for what is called once.
-- ``together`` opens a frame. Within it ``users`` calls a function, keeps what it raises, and goes on with another
-  value; at the end of the frame all ranks are asked once, however many functions were called. This is for every step.
+- ``together`` opens a frame. Within it ``users`` calls a function, keeps what it raises, and goes
+  on with another value; at the end of the frame all ranks are asked once, however many functions
+  were called. This is for every step.
 
 On one rank a frame does nothing, and errors are raised where they happen."""
 
@@ -39,11 +41,13 @@ _OPEN: list[
 
 @contextmanager
 def together(comm: Comm) -> Iterator[None]:
-    """Open a frame: what ``users`` keeps in it, or this rank raises, is raised on all ranks at its end. Collective.
+    """Open a frame: what ``users`` keeps in it, or this rank raises, is raised on all ranks at its
+    end. Collective.
 
-    Where ``users`` kept an error, all ranks raise the first of these. Otherwise a rank raises its own error, and those
-    without one raise that of the first rank that has one. What is raised within the frame between collective calls,
-    and not by a function that ``users`` calls, may still leave the others waiting: give it a frame of its own."""
+    Where ``users`` kept an error, all ranks raise the first of these. Otherwise a rank raises its
+    own error, and those without one raise that of the first rank that has one. What is raised
+    within the frame between collective calls, and not by a function that ``users`` calls, may still
+    leave the others waiting: give it a frame of its own."""
     if comm.size == 1:
         yield
         return
@@ -61,7 +65,8 @@ def together(comm: Comm) -> Iterator[None]:
 
 
 def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
-    """Open a frame for calls of a scheme, a solver or a law of the user's own, which may raise anywhere."""
+    """Open a frame for calls of a scheme, a solver or a law of the user's own, which may raise
+    anywhere."""
     return nullcontext() if type(value).__module__.startswith("vi_contact.") else together(comm)
 
 
@@ -88,9 +93,10 @@ def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> 
 
 
 def users(name: str, call: Callable[[], T], instead: T, *, as_it_is: bool = False) -> T:
-    """Return what a user's function returns. Where it raises, InputError says so with its name and line: at once, or in
-    a frame of several ranks at its end, and ``instead`` is returned. ``as_it_is``: its own rank raises what it has
-    raised, and the other ranks alone that InputError."""
+    """Return what a user's function returns. Where it raises, InputError says so with its name and
+    line: at once, or in a frame of several ranks at its end, and ``instead`` is returned.
+    ``as_it_is``: its own rank raises what it has raised, and the other ranks alone that
+    InputError."""
     try:
         return call()
     except Exception as error:
@@ -109,7 +115,8 @@ def _input_error(name: str, error: Exception) -> ViContactError:
 
 
 def kept_error(name: str, error: Exception, instead: T) -> T:
-    """Raise what a user's function has raised, or keep it for the end of the frame and return ``instead``."""
+    """Raise what a user's function has raised, or keep it for the end of the frame and return
+    ``instead``."""
     told = _input_error(name, error)
     if not _OPEN:
         raise told from (None if told is error else error)
@@ -136,17 +143,20 @@ def slope_of(law: Any, weights: Any) -> Any:
 
 
 def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
-    """Raise InputError, on all ranks, that names the first argument which is not the same on all of them. Collective.
+    """Raise InputError, on all ranks, that names the first argument which is not the same on all of
+    them. Collective.
 
-    Numbers, texts, arrays, and lists and dataclasses of these are compared; of functions and of other objects the type
-    alone. ``Parts`` says of which argument each rank may hold its part: there lists and arrays are not compared."""
+    Numbers, texts, arrays, and lists and dataclasses of these are compared; of functions and of
+    other objects the type alone. ``Parts`` says of which argument each rank may hold its part:
+    there lists and arrays are not compared."""
     if comm.size == 1:
         return
     own = {
         name: sha256(_described(value, DEPTH).encode()).digest()[:8]
         for name, value in given.items()
     }
-    # One reduction of two numbers tells whether all are alike: the largest digest is the smallest one, too.
+    # One reduction of two numbers tells whether all are alike: the largest digest is the smallest
+    # one, too.
     whole = sha256(repr(tuple(own.items())).encode()).digest()[
         :6
     ]  # 48 bits: a whole number that a float holds
@@ -172,7 +182,8 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
 
 
 class Parts:
-    """Wrap an argument of which each rank may hold its part: its tuples, lists and arrays are not compared."""
+    """Wrap an argument of which each rank may hold its part: its tuples, lists and arrays are not
+    compared."""
 
     def __init__(self, value: Any) -> None:
         self.value = value

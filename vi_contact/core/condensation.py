@@ -1,11 +1,13 @@
-"""Condense A onto contact unknowns c: their flexibility, their motion without reactions, and the answer to reactions.
+"""Condense A onto contact unknowns c: their flexibility, their motion without reactions, and the
+answer to reactions.
 
     G = (A⁻¹)_cc,    free: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
 
-With the contact unknowns last in the factor (``contact_last``) a step costs one forward and one backward substitution,
-and G comes from the corner of the factor. Where there is no such factor it costs two whole ones, and G one for each
-contact unknown. Contact values here are those of all ranks, on every rank: the normal unknowns by the numbers of the
-conditions or, with friction, (r_n, r_t) node by node. What cannot move (a prescribed tangent) stays at zero."""
+With the contact unknowns last in the factor (``contact_last``) a step costs one forward and one
+backward substitution, and G comes from the corner of the factor. Where there is no such factor it
+costs two whole ones, and G one for each contact unknown. Contact values here are those of all
+ranks, on every rank: the normal unknowns by the numbers of the conditions or, with friction, (r_n,
+r_t) node by node. What cannot move (a prescribed tangent) stays at zero."""
 
 from typing import Any
 
@@ -21,7 +23,8 @@ from .surfaces import ContactSurface
 def condense(
     A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False
 ) -> "Last | _Twice":
-    """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns. Collective."""
+    """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns.
+    Collective."""
     mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
     if frictional:
         mine = np.hstack([mine, surface.tangents])
@@ -35,8 +38,8 @@ def condense(
 
 
 class Last:
-    """Hold A condensed onto k contact unknowns, which come last in its factor. ``free`` begins a step, ``answer`` ends
-    it; collective. ``flexibility`` (k, k); ``there`` (k,): what can move."""
+    """Hold A condensed onto k contact unknowns, which come last in its factor. ``free`` begins a
+    step, ``answer`` ends it; collective. ``flexibility`` (k, k); ``there`` (k,): what can move."""
 
     def __init__(self, factor: ContactLast, there: Mask) -> None:
         self._factor, self.there, corner = factor, there, factor.corner
@@ -58,7 +61,8 @@ class Last:
         return x if self._all else x.T[self.there].T
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
-        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it removes round-off only."""
+        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it
+        removes round-off only."""
         if np.count_nonzero(r):
             x = self._factor.free(self._y - self._factor.reduced(self._moving(r)))
         else:
@@ -72,7 +76,8 @@ class Last:
 
 
 class _Twice:
-    """Hold the same with any factor of A; ``owned`` contact unknowns of this rank and their ``places`` among all."""
+    """Hold the same with any factor of A; ``owned`` contact unknowns of this rank and their
+    ``places`` among all."""
 
     def __init__(
         self,

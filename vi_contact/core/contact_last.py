@@ -3,10 +3,12 @@
     L = (L_ii    0  )      y = L⁻¹ P b, one forward substitution:    x_c = L_cc⁻ᵀ y_c,
         (L_ci  L_cc )      and after it one backward substitution:   x_i = L_ii⁻ᵀ (y_i - L_ciᵀ x_c)
 
-L_cc L_ccᵀ is A condensed onto c (the Schur complement), so its inverse is the block c of A⁻¹, and any x_c that contact
-asks for may be put in between the two substitutions: with it the rest is in equilibrium.
+L_cc L_ccᵀ is A condensed onto c (the Schur complement), so its inverse is the block c of A⁻¹, and
+any x_c that contact asks for may be put in between the two substitutions: with it the rest is in
+equilibrium.
 
-Loads, answers and contact values may also be of several runs, a row for each: L is then read once for eight of them."""
+Loads, answers and contact values may also be of several runs, a row for each: L is then read once
+for eight of them."""
 
 import ctypes
 import weakref
@@ -23,14 +25,16 @@ from .algebra import Array, Indices
 FORWARD, BACKWARD = 4, 5  # CHOLMOD_L and CHOLMOD_Lt of cholmod.h
 FEW_ROWS = 5_000  # below, minimum degree fills as little as METIS, in a quarter of the time
 AT_ONCE = 8  # loads that are substituted together
-SHORT_COLUMNS = 120.0  # entries of L a column: 2D has fewer, and is substituted column by column, 3D by supernodes
+# entries of L a column: 2D has fewer, and is substituted column by column, 3D by supernodes
+SHORT_COLUMNS = 120.0
 
 
 class ContactLast:
-    """Hold the factor of a symmetric positive definite matrix, with the unknowns ``last`` in the last rows of L.
+    """Hold the factor of a symmetric positive definite matrix, with the unknowns ``last`` in the
+    last rows of L.
 
-    Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the owned rows. Vectors
-    of c are in the order of ``last``. ``corner``: L_cc, lower triangular."""
+    Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the
+    owned rows. Vectors of c are in the order of ``last``. ``corner``: L_cc, lower triangular."""
 
     def __init__(
         self,
@@ -80,8 +84,8 @@ class ContactLast:
         return self._c.copy()
 
     def backward(self, x_c: Array) -> Array:
-        """Return x, the owned entries, whose contact unknowns are exactly x_c and the others in equilibrium with them
-        under the load of the last ``forward``."""
+        """Return x, the owned entries, whose contact unknowns are exactly x_c and the others in
+        equilibrium with them under the load of the last ``forward``."""
         if x_c.ndim == 2:
             return self._backward_many(x_c)
         if self._columns:
@@ -186,5 +190,6 @@ def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def at(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return where an array lies in memory; ``array.ctypes`` takes several times as long to tell."""
+    """Return where an array lies in memory; ``array.ctypes`` takes several times as long to
+    tell."""
     return ctypes.c_void_p(array.__array_interface__["data"][0])

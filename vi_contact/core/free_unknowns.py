@@ -1,19 +1,23 @@
-"""Solve with a well-conditioned matrix, as mass matrices are, without a factor: conjugate gradients to round-off."""
+"""Solve with a well-conditioned matrix, as mass matrices are, without a factor: conjugate gradients
+to round-off."""
 
 import numpy as np
 
 from .algebra import Algebra, Array, Mask, Matrix
 from .errors import StepFailure
 
-ROUND_OFF = 1e-15  # of the first residual: what conjugate gradients carry along falls on where the true one stays
+# of the first residual: what conjugate gradients carry along falls on where the true one stays
+ROUND_OFF = 1e-15
 PATIENCE = 2000  # iterations; a consistent mass matrix takes some fifty
 
 
 def solve_free(algebra: Algebra, A: Matrix, b: Array, held: Mask, x: Array) -> Array:
-    """Return x of A x = b in the rows that are not held; held unknowns keep the values that ``x`` has.
+    """Return x of A x = b in the rows that are not held; held unknowns keep the values that ``x``
+    has.
 
-    A is symmetric and positive definite on the others; it is preconditioned by its diagonal. StepFailure when it takes
-    too long. Collective; a product and two reductions of one number an iteration."""
+    A is symmetric and positive definite on the others; it is preconditioned by its diagonal.
+    StepFailure when it takes too long. Collective; a product and two reductions of one number an
+    iteration."""
     diagonal = A.diagonal()
     inverse = np.divide(1.0, diagonal, out=np.zeros(len(b)), where=~held & (diagonal != 0.0))
     x, d = x.copy(), np.zeros(len(b))
@@ -34,6 +38,7 @@ def solve_free(algebra: Algebra, A: Matrix, b: Array, held: Mask, x: Array) -> A
         z = inverse * r
         before, size = size, algebra.dot(r, z)
     raise StepFailure(
-        f"conjugate gradients on a mass matrix did not end within {PATIENCE} iterations: check loads and "
+        f"conjugate gradients on a mass matrix did not end within {PATIENCE} iterations: check "
+        "loads and "
         "velocities for NaN, and materials for densities a million times as large as others"
     )

@@ -1,7 +1,9 @@
-"""Read HDF5 files of run folders: numbers that are stored in that very file, and no more than the memory can hold.
+"""Read HDF5 files of run folders: numbers that are stored in that very file, and no more than the
+memory can hold.
 
-An HDF5 file may send its reader on: by a soft or external link, by a virtual data set, by external storage. It may
-announce an array that no memory holds. Nothing of this is followed. Writing is in ``core.files``."""
+An HDF5 file may send its reader on: by a soft or external link, by a virtual data set, by external
+storage. It may announce an array that no memory holds. Nothing of this is followed. Writing is in
+``core.files``."""
 
 import os
 from collections.abc import Iterator
@@ -17,7 +19,8 @@ _NUMBERS = "fiub"  # kinds of numpy: floats, whole numbers, truth values
 
 
 class StoredGroup:
-    """Hold a group of an HDF5 file that is open to be read: ``group[name]`` is a group or a data set of numbers.
+    """Hold a group of an HDF5 file that is open to be read: ``group[name]`` is a group or a data
+    set of numbers.
 
     KeyError for a name that is not there, InputError for what does not lie in this file."""
 
@@ -54,7 +57,8 @@ class StoredGroup:
 
     def _wrong(self, name: str, what: str) -> InputError:
         return InputError(
-            f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, or "
+            f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, "
+            "or "
             "run again"
         )
 
@@ -72,7 +76,8 @@ class StoredGroup:
 
 
 class StoredFile(StoredGroup):
-    """Open an HDF5 file of a run folder to be read. OSError when it is none, InputError when it is a link."""
+    """Open an HDF5 file of a run folder to be read. OSError when it is none, InputError when it is
+    a link."""
 
     def __init__(self, path: Path) -> None:
         import h5py  # late: no step needs it

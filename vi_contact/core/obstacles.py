@@ -1,4 +1,5 @@
-"""Say where a rigid obstacle lies: contact directions and initial gaps, and what is asked of them."""
+"""Say where a rigid obstacle lies: contact directions and initial gaps, and what is asked of
+them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,24 +14,28 @@ from .errors import InputError
 ROUND_OFF = 1e-9  # cosine of a right angle
 BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
 REMEDY = (
-    "give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the body: turn "
+    "give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the "
+    "body: turn "
     "its sign)"
 )
 
 
 class Obstacle(Protocol):
-    """Say where a rigid support lies: the contact direction of each point of a boundary, and its initial gap."""
+    """Say where a rigid support lies: the contact direction of each point of a boundary, and its
+    initial gap."""
 
     def directions(self, points: Array, normals: Array) -> Array:
         """Return the unit contact directions (k, d), from the body to the obstacle.
 
-        ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d) unit outward normals
-        of the body there. Asked before ``gap``, with the same arrays; InputError when body and support do not fit."""
+        ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d)
+        unit outward normals of the body there. Asked before ``gap``, with the same arrays;
+        InputError when body and support do not fit."""
 
     def gap(self, points: Array, normals: Array) -> Array:
         """Return the initial gaps (k,) [m] along these directions, >= 0 but for round-off.
 
-        ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the point moves by u."""
+        ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the
+        point moves by u."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +51,11 @@ class Touching:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Describe a rigid half-space behind the plane through ``point``, whose ``normal`` points towards the body.
+    """Describe a rigid half-space behind the plane through ``point``, whose ``normal`` points
+    towards the body.
 
-    The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact direction is -normal."""
+    The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact
+    direction is -normal."""
 
     point: tuple[float, ...]
     normal: tuple[float, ...]
@@ -59,7 +66,8 @@ class HalfSpace:
         )
         if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
             raise InputError(
-                f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
+                f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero "
+                "normal "
                 "with the same number of components"
             )
 
@@ -78,8 +86,9 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class AnalyticGap:
-    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's outward normal. It is
-    asked for the points of each rank by themselves: let no gap depend on other points, as on their mean or lowest."""
+    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's
+    outward normal. It is asked for the points of each rank by themselves: let no gap depend on
+    other points, as on their mean or lowest."""
 
     function: Callable[[Array], Array]
 
@@ -114,17 +123,17 @@ def facing(
 ) -> tuple[Array, Array]:
     """Return the contact directions (m, d) and gaps (m,) [m] of an obstacle, checked.
 
-    The obstacle can reach facets whose outward normals do not look away from it. Of the whole boundary, the mean
-    direction must be within a right angle of the mean normal of those: else nothing of it can touch. A point whose
-    normals all look away from the direction, on the far side of a round face, cannot touch either, and is let be: its
-    gap is larger than that of every point which looks towards the obstacle, and the normals turn from theirs to its own
-    by no more than ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
+    The obstacle can reach facets whose outward normals do not look away from it. Of the whole
+    boundary, the mean direction must be within a right angle of the mean normal of those: else
+    nothing of it can touch. A point whose normals all look away from the direction, on the far side
+    of a round face, cannot touch either, and is let be: its gap is larger than that of every point
+    which looks towards the obstacle, and the normals turn from theirs to its own by no more than
+    ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
 
-    Args:
-        name: of the boundary, for the sentence.
-        alone: whether these are all its points; some of them only are refused where others might decide.
-    Raises:
-        InputError: other shapes, what are no real numbers, directions of no length, along the boundary or into the
+    Args: name: of the boundary, for the sentence. alone: whether these are all its points; some of
+        them only are refused where others might decide.
+    Raises: InputError: other shapes, what are no real numbers, directions of no length, along the
+        boundary or into the
             body."""
     owner, m = type(obstacle).__name__, len(points)
     directions = array(
@@ -133,13 +142,15 @@ def facing(
     length = np.linalg.norm(directions, axis=1)
     if not length.all():
         raise InputError(
-            f"{owner}: the contact direction at {at(points[np.argmin(length)])} has no length; {REMEDY}"
+            f"{owner}: the contact direction at {at(points[np.argmin(length)])} has no length; "
+            f"{REMEDY}"
         )
     _refuse_beside(owner, name, directions / length[:, None], normals)
     gap = np.asarray(obstacle.gap(points, normals))
     if gap.shape != (m,) or gap.dtype.kind not in "iuf":
         raise InputError(
-            f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
+            f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one "
+            "real gap "
             "per point"
         )
     cosines, places = np.sum(directions * normals, axis=1) / length, alike(points)
@@ -152,15 +163,18 @@ def facing(
     if len(wrong):
         turn = np.degrees(np.arccos(np.clip(cosines[wrong], -1.0, 1.0)).mean())
         raise InputError(
-            f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the body at "
-            f"{turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} points; leave the "
+            f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the "
+            "body at "
+            f"{turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} points; leave "
+            "the "
             f"face there out of the boundary, or {REMEDY}"
         )
     return directions, gap.astype(float)
 
 
 def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> None:
-    """Raise InputError, once for a whole boundary, for unit directions along it or into the body."""
+    """Raise InputError, once for a whole boundary, for unit directions along it or into the
+    body."""
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
@@ -173,8 +187,10 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
     angle = np.degrees(np.arccos(np.clip(way @ normal, -1.0, 1.0)))
     what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
     raise InputError(
-        f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} degrees to "
-        f"its mean outward normal {at(normal.round(6))}; choose the boundary that looks towards the "
+        f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} "
+        "degrees to "
+        f"its mean outward normal {at(normal.round(6))}; choose the boundary that looks towards "
+        "the "
         f"obstacle, or {REMEDY}"
     )
 
@@ -185,8 +201,8 @@ def _of(name: str) -> str:
 
 
 def _turned_smoothly(cosines: Array, angle: float) -> Mask:
-    """Which normals (m,), by their cosines with the direction, are reached from the one that looks towards it most by
-    turns of no more than ``angle`` from one normal to the next."""
+    """Which normals (m,), by their cosines with the direction, are reached from the one that looks
+    towards it most by turns of no more than ``angle`` from one normal to the next."""
     turns = np.arccos(np.clip(cosines, -1.0, 1.0))
     steps = np.unique(turns)
     wide = np.flatnonzero(np.diff(steps) > angle * (1.0 + 1e-9))
@@ -199,7 +215,8 @@ def _unit(vector: Array) -> Array:
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:
-    """Return the initial gap without round-off (1e-12 of the body's size); InputError where the body penetrates."""
+    """Return the initial gap without round-off (1e-12 of the body's size); InputError where the
+    body penetrates."""
     if not np.all(np.isfinite(gap)):
         raise InputError(
             "the initial gap contains NaN or infinite values: check the obstacle's gap function"
@@ -207,7 +224,8 @@ def admissible_gap(gap: Array, points: Array, size: float) -> Array:
     if len(gap) and gap.min() < -1e-12 * size:
         worst = int(np.argmin(gap))
         raise InputError(
-            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} before the "
+            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} "
+            "before the "
             "first step: move the obstacle or the mesh so that every initial gap is >= 0"
         )
     return np.maximum(gap, 0.0)

@@ -1,4 +1,5 @@
-"""State the problem that is marched: a semi-discrete system, its contact surface, and the laws of both."""
+"""State the problem that is marched: a semi-discrete system, its contact surface, and the laws of
+both."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -21,12 +22,14 @@ from .system import Load, SemiDiscreteSystem, history_value
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Pose a problem: a semi-discrete system, its contact surface, its excitation, and the laws of friction and impact.
+    """Pose a problem: a semi-discrete system, its contact surface, its excitation, and the laws of
+    friction and impact.
 
-    The system is turned into the nodal frames of the surface here, once. ``impact=None`` leaves velocities unchanged.
-    ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError is raised on all ranks for parts
-    of the wrong kind or size, and for a surface of another system. A friction law that is a dataclass may hold tuples
-    with a value for every contact point: of this rank, or of all ranks by their numbers. Collective."""
+    The system is turned into the nodal frames of the surface here, once. ``impact=None`` leaves
+    velocities unchanged. ``mass=None`` leaves the choice of the mass matrix to the time scheme.
+    InputError is raised on all ranks for parts of the wrong kind or size, and for a surface of
+    another system. A friction law that is a dataclass may hold tuples with a value for every
+    contact point: of this rank, or of all ranks by their numbers. Collective."""
 
     system: SemiDiscreteSystem
     surface: ContactSurface
@@ -49,7 +52,8 @@ class ContactProblem:
         object.__setattr__(self, "friction", own)
 
     def __repr__(self) -> str:
-        """Return unknowns, conditions and laws in a few lines, those of all ranks: not the arrays."""
+        """Return unknowns, conditions and laws in a few lines, those of all ranks: not the
+        arrays."""
         laws = {
             "friction": self.friction,
             "impact": self.impact,
@@ -83,7 +87,8 @@ class ContactProblem:
 
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
-        """Return the system that schemes see: in the rotated basis, with the inertia loads -M r a_g(t)."""
+        """Return the system that schemes see: in the rotated basis, with the inertia loads -M r
+        a_g(t)."""
         system = self.unshaken
         ways = (
             (np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations
@@ -94,8 +99,9 @@ class ContactProblem:
         return system.loaded(shaken.load)
 
     def beside(self, other: "ContactProblem") -> "ContactProblem | None":
-        """Return the same problem with the matrices of another one, and the factors made of them; None where these are
-        not its own: for another system, surface, mass or impact law, or friction where the other has none."""
+        """Return the same problem with the matrices of another one, and the factors made of them;
+        None where these are not its own: for another system, surface, mass or impact law, or
+        friction where the other has none."""
         ours, theirs = ((one.system, one.surface, one.frictional) for one in (self, other))
         if any(a is not b for a, b in zip(ours, theirs, strict=True)):
             return None
@@ -109,12 +115,14 @@ class ContactProblem:
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
-        """Return the system in the basis of the equations, without excitation: the gravity stage."""
+        """Return the system in the basis of the equations, without excitation: the gravity
+        stage."""
         return self._relative(self.turned)
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:
-        """Return the system in the nodal frames, every body in its own unknowns: one for all problems on a surface."""
+        """Return the system in the nodal frames, every body in its own unknowns: one for all
+        problems on a surface."""
         system, basis, dual = self.system, self.surface.basis, self.surface.dual
         if basis is None:
             return system
@@ -140,7 +148,8 @@ class ContactProblem:
         return not isinstance(self.friction, Frictionless)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
-        """Return B_t u plus what the obstacle slides: where the slip of a step is zero; None without friction."""
+        """Return B_t u plus what the obstacle slides: where the slip of a step is zero; None
+        without friction."""
         return self.surface.slip_origin(u, start, end) if self.frictional else None
 
     def cartesian(self, x: Array) -> Array:
@@ -160,7 +169,8 @@ class ContactProblem:
 def with_values(
     law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
 ) -> Any:
-    """Return the law with its tuples changed on several ranks, also in the laws that it is made of."""
+    """Return the law with its tuples changed on several ranks, also in the laws that it is made
+    of."""
     if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
     found: dict[str, Any] = {}
@@ -171,10 +181,12 @@ def with_values(
 
 
 def check_parts(problem: Any) -> None:
-    """Raise InputError, on all ranks, for parts of the wrong kind or size, or made for another system. Collective.
+    """Raise InputError, on all ranks, for parts of the wrong kind or size, or made for another
+    system. Collective.
 
-    Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems of that space take
-    it. Sizes are compared on all ranks together, so that all of them raise the same sentence."""
+    Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems
+    of that space take it. Sizes are compared on all ranks together, so that all of them raise the
+    same sentence."""
     owner, system, surface, excitations = (
         "ContactProblem",
         problem.system,
@@ -218,7 +230,8 @@ def check_parts(problem: Any) -> None:
         )
     if surface.space is not None and surface.space is not system.space:
         raise InputError(
-            "ContactProblem: the contact surface was made for another system with other unknowns: make "
+            "ContactProblem: the contact surface was made for another system with other unknowns: "
+            "make "
             "it for this one by fem.contact_surface(system, …)"
         )
     if surface.comm.size != system.algebra.comm.size:
@@ -237,7 +250,8 @@ def _refuse_repeated(excitations: Sequence[Any]) -> None:
     for one, other in combinations(excitations, 2):
         if one is other:
             raise InputError(
-                f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
+                f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: "
+                "leave it "
                 "out once, or scale it"
             )
 
@@ -248,7 +262,8 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
     array("ContactProblem", "the direction of an excitation", excitation.direction, (None,))
     if len(excitation.direction) != system.influence.shape[1]:
         raise InputError(
-            f"excitation direction {excitation.direction} has {len(excitation.direction)} components but "
+            f"excitation direction {excitation.direction} has {len(excitation.direction)} "
+            "components but "
             f"the body has {system.influence.shape[1]}: give one component per dimension"
         )
 
@@ -278,7 +293,8 @@ def _sizes(owner: str, values: dict[str, Any], shapes: dict[str, tuple[int, ...]
 
 
 def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int) -> Iterator[str]:
-    """What is wrong with a surface on this rank, and with its places in the unknowns of the system."""
+    """What is wrong with a surface on this rank, and with its places in the unknowns of the
+    system."""
     m, d, n = surface.count, system.influence.shape[1], system.rows
     shapes: dict[str, tuple[int, ...]] = {
         "points": (m, d),
@@ -293,7 +309,8 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int)
         values = getattr(surface, name)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < most):
             yield (
-                f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, outside {least} to "
+                f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, "
+                f"outside {least} to "
                 f"{most - 1}: make the surface for this system, which has another size"
             )
     if np.any(np.diff(surface.slots) <= 0):

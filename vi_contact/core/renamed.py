@@ -1,7 +1,7 @@
 """Hold the names that have changed since version 0.2.0, so that old programs are told the new ones.
 
-A name stays here for the versions that docs/reference/releases.md promises. ``core.lazy`` gives the thing of the new
-name with a DeprecationWarning, and case files name the new word.
+A name stays here for the versions that docs/reference/releases.md promises. ``core.lazy`` gives the
+thing of the new name with a DeprecationWarning, and case files name the new word.
 """
 
 from __future__ import annotations

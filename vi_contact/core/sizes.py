@@ -1,10 +1,12 @@
-"""Say which problems are small: those that a dense matrix on every rank, or a factor made in passing, suits."""
+"""Say which problems are small: those that a dense matrix on every rank, or a factor made in
+passing, suits."""
 
 from .algebra import Comm, total
 from .errors import InputError
 
 DENSE_ROWS = 10_000  # 0.8 GB a matrix, and its factor and a copy while it is made, on every rank
-OWN_UNKNOWNS = 50_000  # beyond it a factor of the mass matrix takes seconds, conjugate gradients a tenth of one
+# beyond it a factor of the mass matrix takes seconds, conjugate gradients a tenth of one
+OWN_UNKNOWNS = 50_000
 OWN_CONDITIONS = 1_000  # as many back-substitutions, and a dense matrix
 
 
@@ -18,10 +20,12 @@ def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which st
 
 
 def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
-    """Say whether what the package solves beside the steps is small, by unknowns and contact conditions of this rank.
+    """Say whether what the package solves beside the steps is small, by unknowns and contact
+    conditions of this rank.
 
-    Such problems are condensed with a factor of their own, whatever solves the steps; larger ones are solved by
-    conjugate gradients. ``worth``: for problems that come again and again, so many times larger. Collective."""
+    Such problems are condensed with a factor of their own, whatever solves the steps; larger ones
+    are solved by conjugate gradients. ``worth``: for problems that come again and again, so many
+    times larger. Collective."""
     return (
         total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
     )

@@ -1,4 +1,5 @@
-"""Make the state a run begins with; check that a state belongs to a problem: its time, its arrays on every rank."""
+"""Make the state a run begins with; check that a state belongs to a problem: its time, its arrays
+on every rank."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -59,7 +60,8 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
-    """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is in the obstacle."""
+    """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is
+    in the obstacle."""
     system, surface = problem.equations, problem.surface
     gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)
     sizes = np.array(
@@ -68,8 +70,10 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     behind, *size = surface.comm.max(sizes)
     if behind > 1e-9 * max(size):
         raise InputError(
-            f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or enlarge "
-            "the gap; a press fit begins in touch, and quasi_static closes it on a surface that moves, "
+            f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or "
+            "enlarge "
+            "the gap; a press fit begins in touch, and quasi_static closes it on a surface that "
+            "moves, "
             "surface.moving(towards=…)"
         )
     none = np.zeros(surface.count)

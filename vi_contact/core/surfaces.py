@@ -1,10 +1,11 @@
 """Hold the contact conditions of a surface, each on the rank that owns its node.
 
-A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to the contact
-direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is a selection of entries.
-Contact arrays (bounds, reactions, active sets, slips) have one row for every condition of this rank, and none of
-another's: what is asked of all of them (``some``, ``everywhere``) is asked on all ranks.
-Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0."""
+A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to
+the contact direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is
+a selection of entries. Contact arrays (bounds, reactions, active sets, slips) have one row for
+every condition of this rank, and none of another's: what is asked of all of them (``some``,
+``everywhere``) is asked on all ranks. Sign: the direction n points from the body to the obstacle,
+u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0."""
 
 import logging
 from collections.abc import Callable
@@ -29,13 +30,15 @@ Motion = Callable[[float], float | Array]
 
 
 class WatchedNodes(Protocol):
-    """Say where nodes of a contact boundary are that move as they are prescribed, and have no condition."""
+    """Say where nodes of a contact boundary are that move as they are prescribed, and have no
+    condition."""
 
     def smallest(self, t: float) -> float:
         """Return their smallest gap at time t [m]. Collective."""
 
     def refuse_driven(self, t: float) -> None:
-        """Raise InputError, on all ranks, for a node that is in what it faces at time t. Collective."""
+        """Raise InputError, on all ranks, for a node that is in what it faces at time t.
+        Collective."""
 
     def before_moving(self, towards: Motion | None) -> "WatchedNodes":
         """Return the same nodes before an obstacle that moves towards them, t [s] -> [m]."""
@@ -48,31 +51,40 @@ class WatchedNodes(Protocol):
 class ContactSurface:
     """Hold the m contact conditions whose unknowns this rank owns, of the ``total`` on all ranks.
 
-    Attributes:
-        comm: the ranks that share the surface.
-        points: (m, d) positions [m]; normals: (m, d) unit contact directions (towards the obstacle).
-        weights: (m,) tributary length [m] times thickness, or area [m²]: pressure = r_n / weights.
-        gap0: (m,) initial gap [m], >= 0.
-        bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either sign).
-        compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring.
-        owned: (m,) indices in û of the normal unknowns; slots: (m,) the numbers of the conditions among those of all
+    Attributes: comm: the ranks that share the surface. points: (m, d) positions [m]; normals: (m,
+        d) unit contact directions (towards the obstacle). weights: (m,) tributary length [m] times
+        thickness, or area [m²]: pressure = r_n / weights. gap0: (m,) initial gap [m], >= 0.
+        bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either
+        sign). compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring. owned: (m,)
+        indices in û of the normal unknowns; slots: (m,) the numbers of the conditions among those
+        of all
             ranks, ascending; they do not depend on the number of ranks.
-        tangents: (m, d-1) indices in û of the tangential unknowns of the same points; -1 where prescribed.
-        basis: T with u = T û, the turn into nodal frames, or None when they already point along the axes.
-        dual: T⁻ᵀ where T is not orthogonal, because some point has contact directions at oblique angles; else None.
-        coupling: R with û = R ǔ where the other side deforms too: the unknowns of a contact point are then those of its
-            displacement relative to that side; R - 1 takes from rows of other points only. None on an obstacle.
-        motion: how far the obstacle has moved towards the body at time t, (m,) [m]; None for one at rest.
-        slide: how far it has moved along the tangents at time t, (m, d-1) [m]; None for one at rest.
+        tangents: (m, d-1) indices in û of the tangential unknowns of the same points; -1 where
+            prescribed.
+        basis: T with u = T û, the turn into nodal frames, or None when they already point along the
+            axes.
+        dual: T⁻ᵀ where T is not orthogonal, because some point has contact directions at oblique
+            angles; else None.
+        coupling: R with û = R ǔ where the other side deforms too: the unknowns of a contact point
+            are then those of its displacement relative to that side; R - 1 takes from rows of other
+            points only. None on an obstacle.
+        motion: how far the obstacle has moved towards the body at time t, (m,) [m]; None for one at
+            rest.
+        slide: how far it has moved along the tangents at time t, (m, d-1) [m]; None for one at
+            rest.
         space: of the systems that it was made for; None when it was made by hand.
-        companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
-        nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
+        companions: motions of the obstacle that are marched beside the run, with its scheme and
+            time steps.
+        nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one.
+            None: one each.
         frictionless_corners: True when nodes with several conditions are allowed beside friction.
-        uncovered: (m,) True where the other side lies in front of so little around the node that r_n / weight is no
-            pressure; None: nowhere. Such points are left out of largest pressures.
-        watched: nodes of its boundaries without a condition, since they are prescribed in every component.
-        censuses: what became of the nodes of each contact boundary, in the order in which surfaces were joined; empty
-            where nothing is known of facets."""
+        uncovered: (m,) True where the other side lies in front of so little around the node that
+            r_n / weight is no pressure; None: nowhere. Such points are left out of largest
+            pressures.
+        watched: nodes of its boundaries without a condition, since they are prescribed in every
+            component.
+        censuses: what became of the nodes of each contact boundary, in the order in which surfaces
+            were joined; empty where nothing is known of facets."""
 
     comm: Comm
     points: Array
@@ -146,7 +158,8 @@ class ContactSurface:
 
     @cached_property
     def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
-        """Return (m, d - 1), where compiled functions find these arrays, None where all is plain, and the arrays."""
+        """Return (m, d - 1), where compiled functions find these arrays, None where all is plain,
+        and the arrays."""
         kept = (
             np.ascontiguousarray(self.owned, np.int64),
             np.ascontiguousarray(self.tangents, np.int64),
@@ -155,8 +168,9 @@ class ContactSurface:
         return self.tangents.shape, [None if one is None else at(one) for one in kept], kept
 
     def everywhere(self, values: NDArray[Any]) -> Any:
-        """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on every rank, of one
-        type. Collective; for output, and for small problems that every rank solves."""
+        """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on
+        every rank, of one type. Collective; for output, and for small problems that every rank
+        solves."""
         if self.comm.size == 1:
             return np.asarray(values)
         whole = np.zeros((self.total, *np.shape(values)[1:]))
@@ -168,7 +182,8 @@ class ContactSurface:
         return whole if self.comm.size == 1 else whole[self.slots]
 
     def on_first(self, values: NDArray[Any]) -> Any:
-        """Return the values (total, …) on rank 0, and none, (0, …), on the others. Collective; for output."""
+        """Return the values (total, …) on rank 0, and none, (0, …), on the others. Collective; for
+        output."""
         return on_first(self.comm, self.slots, values)
 
     @cached_property
@@ -187,7 +202,8 @@ class ContactSurface:
         return load if turn is None else turn @ load
 
     def whole(self) -> "ContactSurface":
-        """Return the places and sizes of the conditions of all ranks, by number, everywhere. Collective."""
+        """Return the places and sizes of the conditions of all ranks, by number, everywhere.
+        Collective."""
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "nodes")
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         arrays = {name: self.everywhere(values) for name, values in known.items()}
@@ -202,17 +218,20 @@ class ContactSurface:
         return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
     def slip(self, u: Array, t: float) -> Array:
-        """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points too."""
+        """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points
+        too."""
         there = self.tangential_values(u)
         return there if self.slide is None else there - self.slide(t)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array:
-        """Return B_t u plus what the obstacle slides between two times, (m, d - 1): where the slip is zero."""
+        """Return B_t u plus what the obstacle slides between two times, (m, d - 1): where the slip
+        is zero."""
         origin, sliding = self.tangential_values(u), self.sliding(start, end)
         return origin if sliding is None else origin + sliding
 
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
-        """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns [N]."""
+        """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns
+        [N]."""
         load = np.zeros((*r_n.shape[:-1], rows))
         load.T[self.owned] = r_n.T
         if r_t is not None:
@@ -221,28 +240,32 @@ class ContactSurface:
         return load
 
     def gap(self, t: float) -> Array:
-        """Return the gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle has moved."""
+        """Return the gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle
+        has moved."""
         return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
 
     def refuse_driven(self, t: float) -> None:
-        """Raise InputError, on all ranks, where a prescribed node is in what it faces at time t. Collective."""
+        """Raise InputError, on all ranks, where a prescribed node is in what it faces at time t.
+        Collective."""
         for one in self.watched:
             one.refuse_driven(t)
 
     def advance(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves towards the body between two times, (m,) [m]; None for one at rest."""
+        """Return what the obstacle moves towards the body between two times, (m,) [m]; None for one
+        at rest."""
         return None if self.motion is None else self.motion(end) - self.motion(start)
 
     def sliding(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
+        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None
+        for one at rest."""
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
     def moving(
         self, towards: Motion | None = None, along: Motion | None = None
     ) -> "ContactSurface":
-        """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m],
-        one value for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving obstacle is
-        not turned; its points face the same nodes."""
+        """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the
+        tangents, t [s] -> [m], one value for all points or arrays of shape (m,) and (m, d-1), in
+        the order of ``points``. A moving obstacle is not turned; its points face the same nodes."""
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
@@ -271,11 +294,13 @@ class ContactSurface:
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 
     def with_frictionless_corners(self) -> "ContactSurface":
-        """Let nodes, beside friction, with several conditions slide freely over their faces; else they are refused.
+        """Let nodes, beside friction, with several conditions slide freely over their faces; else
+        they are refused.
 
-        What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
-        unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition (of
-        one group: that of the face with the lowest node numbers). Collective."""
+        What such a node could rub on one face is a force across the other, which the conditions,
+        each a bound on one unknown, do not hold. In space it still rubs along its edge, with the
+        normal force of its first condition (of one group: that of the face with the lowest node
+        numbers). Collective."""
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
             log.info(
@@ -284,9 +309,11 @@ class ContactSurface:
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> "ContactSurface":
-        """Return the surface on a linearly deformable support of foundation modulus ``stiffness`` [Pa/m].
+        """Return the surface on a linearly deformable support of foundation modulus ``stiffness``
+        [Pa/m].
 
-        Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law."""
+        Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the
+        unilateral law."""
         stiffness = number(
             "on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m"
         )
@@ -301,14 +328,16 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
     ) and found.ndim <= len(shape)
     if found.dtype.kind not in "iuf" or not alike or not np.all(np.isfinite(found)):
         raise InputError(
-            f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
+            f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one "
+            "number or "
             f"an array of shape {shape}"
         )
     return np.broadcast_to(found.astype(float), shape)
 
 
 def same_node(nodes: Indices) -> tuple[Indices, ...]:
-    """Return the places of each number that stands several times in ``nodes`` (m,), in the order of the numbers."""
+    """Return the places of each number that stands several times in ``nodes`` (m,), in the order of
+    the numbers."""
     order = np.argsort(nodes, kind="stable")
     _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
     several = counts > 1
@@ -319,7 +348,8 @@ def same_node(nodes: Indices) -> tuple[Indices, ...]:
 
 
 def nodal_frames(directions: Array) -> Array:
-    """Return orthonormal frames (k, d, d) whose first column is the contact direction n, the others tangential.
+    """Return orthonormal frames (k, d, d) whose first column is the contact direction n, the others
+    tangential.
 
     2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1."""
     k, d = directions.shape
@@ -337,10 +367,11 @@ def nodal_frames(directions: Array) -> Array:
 
 
 def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
-    """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is the normal one.
+    """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is
+    the normal one.
 
-    c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
-    components that may be prescribed."""
+    c is the direction's largest component. Axes at right angles to the direction keep their own
+    columns: these are the components that may be prescribed."""
     k, d, _ = frames.shape
     directions, every = frames[:, :, 0], np.arange(k)
     size = np.abs(directions)

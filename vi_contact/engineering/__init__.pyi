@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .checks.comparison import Check as Check
 from .checks.comparison import Comparison as Comparison
 from .damping import FirstModes as FirstModes

@@ -70,7 +70,8 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
 
 
 def first_open_period(problem: ContactProblem) -> float | None:
-    """Return the first natural period [s] with the contact open; None where none of it touches at the start.
+    """Return the first natural period [s] with the contact open; None where none of it touches at
+    the start.
 
     A body that has lifted off may swing faster than with its contact closed. Collective."""
     surface = problem.surface
@@ -89,9 +90,11 @@ def _closed_at_start(problem: ContactProblem) -> Mask:
 
 
 def _matrices(problem: ContactProblem, closed: Mask) -> tuple[Any, Any, Any, Mask, int]:
-    """Return (algebra, K, M, which unknowns are free, rigid motions at most) with these conditions (m,) closed.
+    """Return (algebra, K, M, which unknowns are free, rigid motions at most) with these conditions
+    (m,) closed.
 
-    The system is that of the nodal frames, without excitation; closed conditions become supports or springs."""
+    The system is that of the nodal frames, without excitation; closed conditions become supports or
+    springs."""
     system, surface = problem.static_load, problem.surface
     held, springs = np.zeros((2, system.rows))
     rigid = closed & surface.rigid

@@ -1,4 +1,5 @@
-"""Measure the racking of a frame: the shear of four corner points, which no rigid rotation changes."""
+"""Measure the racking of a frame: the shear of four corner points, which no rigid rotation
+changes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,11 +15,13 @@ from ..core.step import Columns, Report, Row, State
 
 
 def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
-    """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m]; each (...,), in radians.
+    """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m]; each (...,),
+    in radians.
 
-    The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy + du_y/dx and rotation
-    = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean over its sides, du_y/dx over bottom and
-    top (Wang 1993: the racking ratio is this over the free field's shear strain). InputError for corners on one line.
+    The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy +
+    du_y/dx and rotation = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean
+    over its sides, du_y/dx over bottom and top (Wang 1993: the racking ratio is this over the free
+    field's shear strain). InputError for corners on one line.
     """
     x = array("racking", "corners", corners, (4, 2), unit="m")
     arms = x - x.mean(axis=0)
@@ -37,8 +40,9 @@ def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
 class Racking:
     """Record racking: label -> four corner points (x, y) [m], at the nodes nearest to them.
 
-    Columns racking_<label>, rotation_<label> [rad]: see ``racking``. A rigid motion of the frame, and of the ground,
-    leaves racking alone. InputError for corners that are not four, on one line, or outside the body."""
+    Columns racking_<label>, rotation_<label> [rad]: see ``racking``. A rigid motion of the frame,
+    and of the ground, leaves racking alone. InputError for corners that are not four, on one line,
+    or outside the body."""
 
     frames: Mapping[str, Sequence[Sequence[float]]]
 
@@ -77,7 +81,8 @@ class Racking:
         self._problem, space = problem, problem.system.space
         if space.dimension != 2:
             raise InputError(
-                f"Racking is for plane bodies and this one has {space.dimension} dimensions: leave it out"
+                f"Racking is for plane bodies and this one has {space.dimension} dimensions: leave "
+                "it out"
             )
         self._nodes = {
             k: space.find_nodes(np.asarray(corners, float)) for k, corners in self.frames.items()

@@ -1,26 +1,31 @@
-"""Sum up what a part of a contact surface does to its body: uplift, opening, slip, thrust, N, T, M and theta.
+"""Sum up what a part of a contact surface does to its body: uplift, opening, slip, thrust, N, T, M
+and theta.
 
-With the contact direction n of a point (from the body to its obstacle), its tangent t and the reactions of the body on
-the support, the force on the body at a point X is f = -r_n n - r_t t. Over the points of a part, about its centre c:
+With the contact direction n of a point (from the body to its obstacle), its tangent t and the
+reactions of the body on the support, the force on the body at a point X is f = -r_n n - r_t t. Over
+the points of a part, about its centre c:
 
     uplift = 1 - L_contact / L (by weight),    F = sum f,    M = sum (X - c) x f   (anticlockwise positive)
     N = -F·n̄ (compression positive),  T = F·t̄,  e = M / N,    height = sum r_n (X - c)·up / sum r_n
 
-n̄ is the mean direction of the part by weight, t̄ = (-n̄_y, n̄_x), up the last axis. On level ground N is the vertical
-force, T points to the right, and N acts at the distance e to the right of the centre; of a wall N is the thrust and
-``height`` the height of its line of action above the centre. Positions are those of the undeformed body. In space T and
-e are the sizes of vectors in the plane across n̄, whose components along the axes stand beside them:
+n̄ is the mean direction of the part by weight, t̄ = (-n̄_y, n̄_x), up the last axis. On level
+ground N is the vertical force, T points to the right, and N acts at the distance e to the right of
+the centre; of a wall N is the thrust and ``height`` the height of its line of action above the
+centre. Positions are those of the undeformed body. In space T and e are the sizes of vectors in the
+plane across n̄, whose components along the axes stand beside them:
 
     T = F + N n̄,    e = M x n̄ / N   (from the centre to where N acts)
 
-The rotation theta and the settlement u·n̄ of the centre are those of the smallest rigid motion u + theta x (X - c) whose
-normal displacements fit those of the part best, by weight; nan for what they say nothing about: a level base does not
-tell how it turns about the vertical. ``Resultants`` adds what a report asks of a part:
+The rotation theta and the settlement u·n̄ of the centre are those of the smallest rigid motion u +
+theta x (X - c) whose normal displacements fit those of the part best, by weight; nan for what they
+say nothing about: a level base does not tell how it turns about the vertical. ``Resultants`` adds
+what a report asks of a part:
 
     level = h / H,    sliding = (sum w slip / sum w)·t̄,    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
 
-h is the height of the thrust above the lowest point of the part, H the height of the part; pressure_low and
-pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's base."""
+h is the height of the thrust above the lowest point of the part, H the height of the part;
+pressure_low and pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's
+base."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -40,8 +45,10 @@ from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import ContactSurface
 
 Where = Callable[[Array, Array], Mask]
-Geometry = Any  # with points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder
-DETERMINED = 1e-9  # of the largest singular value of the rigid modes of a part: less says nothing about a motion
+# with points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder
+Geometry = Any
+# of the largest singular value of the rigid modes of a part: less says nothing about a motion
+DETERMINED = 1e-9
 
 
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
@@ -54,12 +61,14 @@ def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
 
 
 class Part:
-    """Hold the points of a contact surface that a mask picks, with the directions of its resultants.
+    """Hold the points of a contact surface that a mask picks, with the directions of its
+    resultants.
 
-    ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a part without points,
-    a centre of other dimension, or directions that cancel (a closed ring), unless ``normal`` says which N is meant.
-    ``centre`` None: the middle of the part by weight, at the level of its lowest point.
-    ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None."""
+    ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a
+    part without points, a centre of other dimension, or directions that cancel (a closed ring),
+    unless ``normal`` says which N is meant. ``centre`` None: the middle of the part by weight, at
+    the level of its lowest point. ``slots``: the numbers of the conditions whose share in it is
+    held; those of one rank, all when None."""
 
     def __init__(
         self,
@@ -115,14 +124,16 @@ class Part:
         return np.asarray(direction / size)
 
     def _ends(self, points: Array) -> Array:
-        """Return rows (2, k) that make the pressures at the low and the high end of r_n, along the longest axis."""
+        """Return rows (2, k) that make the pressures at the low and the high end of r_n, along the
+        longest axis."""
         along = points[:, np.argmax(np.ptp(points, axis=0))]
         slack = DETERMINED * np.ptp(along)
         ends = np.stack([along <= along.min() + slack, along >= along.max() - slack])
         return np.asarray(ends / (ends @ self.weights)[:, None])
 
     def _fit(self) -> Array:
-        """Return rows (q + 1, k) that make theta and settlement of normal displacements; nan what is not determined."""
+        """Return rows (q + 1, k) that make theta and settlement of normal displacements; nan what
+        is not determined."""
         size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
         turns = [one / size for one in turning(self.arms, self.normals)]
         root, modes = np.sqrt(self.weights), np.column_stack([self.normals, *turns])
@@ -134,8 +145,8 @@ class Part:
         return np.where(told[:, None], asked @ inverse, np.nan)
 
     def sums(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
-        """Return (rows, …) F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions, (rows, m),
-        (rows, m, d - 1) or None, and closed conditions (rows, m)."""
+        """Return (rows, …) F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions,
+        (rows, m), (rows, m, d - 1) or None, and closed conditions (rows, m)."""
         r_n = r_n[:, self.mask]
         at_points = -r_n[:, :, None] * self.normals
         if r_t is not None:
@@ -147,14 +158,16 @@ class Part:
         )
 
     def tops(self, gap: Array, slip: Array | None) -> Array:
-        """Return (rows, 1 or 2) the largest gap and slip of rows (rows, m), (rows, m, d - 1) or None."""
+        """Return (rows, 1 or 2) the largest gap and slip of rows (rows, m), (rows, m, d - 1) or
+        None."""
         found = [gap[:, self.mask]]
         if slip is not None and slip.shape[2]:
             found.append(np.linalg.norm(slip[:, self.mask], axis=2))
         return np.column_stack([one.max(axis=1, initial=-np.inf) for one in found])
 
     def quantities(self, sums: Array, tops: Array) -> dict[str, Array]:
-        """Return quantity -> (rows,) of sums and tops of all its points; nan where N or Σ r_n is zero."""
+        """Return quantity -> (rows,) of sums and tops of all its points; nan where N or Σ r_n is
+        zero."""
         d = self.dimension
         force, moment, (thrust, raised, lifted) = 0.0 + sums[:, :d], sums[:, d:-3], sums.T[-3:]
         compression = 0.0 - force @ self.normal
@@ -185,7 +198,8 @@ class Part:
 
 
 def turning(arms: Array, vectors: Array) -> list[Array]:
-    """Return the components (…) of arms x vectors (…, d): x, y, z in space, z in the plane, none on a line."""
+    """Return the components (…) of arms x vectors (…, d): x, y, z in space, z in the plane, none on
+    a line."""
     pairs = {1: (), 2: ((0, 1),), 3: ((1, 2), (2, 0), (0, 1))}[arms.shape[-1]]
     return [arms[..., i] * vectors[..., j] - arms[..., j] * vectors[..., i] for i, j in pairs]
 
@@ -203,21 +217,23 @@ _MEANING = tomllib.loads(
 class Resultants:
     """Record columns <quantity>_<name> of a named part of the contact surface, such as N_base.
 
-    The quantities are uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta, settlement (relative to the
-    support), level, sliding, pressure_low, pressure_high and, with friction, margin. In space there are also force_z
-    and the components of T and e, and those of M and theta take the place of M and theta, as M_x. What has slid in the
-    end is the last ``sliding`` less the first.
+    The quantities are uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta,
+    settlement (relative to the support), level, sliding, pressure_low, pressure_high and, with
+    friction, margin. In space there are also force_z and the components of T and e, and those of M
+    and theta take the place of M and theta, as M_x. What has slid in the end is the last
+    ``sliding`` less the first.
 
-    Args:
-        name: names the columns; that of the group ``part`` when left out. centre: (d,) the point of reference, of a
-            footing the middle of its base, of a wall a point at the level from which ``height`` counts [m]; the middle
-            of the part at the level of its lowest point when None.
-        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces too: a node belongs
-            wholly, with all its force and weight, to each part that it is in;
-            where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both are None.
+    Args: name: names the columns; that of the group ``part`` when left out. centre: (d,) the point
+        of reference, of a
+            footing the middle of its base, of a wall a point at the level from which ``height``
+            counts [m]; the middle of the part at the level of its lowest point when None.
+        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces
+            too: a node belongs wholly, with all its force and weight, to each part that it is in;
+            where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both
+            are None.
         normal: direction of N towards the support; the part's mean contact direction when None.
-    Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on a held support.
-    InputError for both part and where, and for a part of no contact points."""
+    Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on
+    a held support. InputError for both part and where, and for a part of no contact points."""
 
     name: str = ""
     centre: Sequence[float] | None = None
@@ -252,7 +268,8 @@ class Resultants:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Find the part once, and return the row of the state, a static one or the start of a run. Collective."""
+        """Find the part once, and return the row of the state, a static one or the start of a run.
+        Collective."""
         self._surface, self._problem = problem.surface, problem
         whole = problem.surface.whole()
         where = self.where if self.part is None else self._chosen(whole)
@@ -278,7 +295,8 @@ class Resultants:
             )
             if not largest(self._surface.comm, touching.all(axis=1).any()):
                 raise InputError(
-                    f"part '{self.name}': its group has no whole facet in contact: give a group of the "
+                    f"part '{self.name}': its group has no whole facet in contact: give a group of "
+                    "the "
                     "contact, or a box"
                 )
             alone = found.copy()
@@ -342,10 +360,12 @@ def contact_summary(
     where: Where | None = None,
     normal: Sequence[float] | None = None,
 ) -> dict[str, Array]:
-    """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta and settlement.
+    """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without
+    theta and settlement.
 
-    ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``. Slip and friction count
-    where they were recorded, with friction. InputError without arrays of the contact points."""
+    ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``.
+    Slip and friction count where they were recorded, with friction. InputError without arrays of
+    the contact points."""
     instance("contact_summary", "history", history, Mapping, "give the history of a solution")
     provides(
         "contact_summary",

@@ -1,4 +1,5 @@
-"""Assemble bodies with finite elements on DOLFINx: meshes, systems, contact surfaces, output of fields.
+"""Assemble bodies with finite elements on DOLFINx: meshes, systems, contact surfaces, output of
+fields.
 
 In this order: ``build_mesh`` or ``read_mesh``, ``assemble``, ``contact_surface`` or ``contact_pair``: README.md.
 >>> from mpi4py import MPI
@@ -14,8 +15,10 @@ from ..core.lazy import lazy
 
 if find_spec("dolfinx") is None:
     raise ModuleNotFoundError(
-        "vi_contact.fem needs DOLFINx, which is missing here and which pip does not have: install it by apt (on Debian "
-        "python3-dolfinx-real, and make virtual environments with --system-site-packages) or by conda (fenics-dolfinx "
+        "vi_contact.fem needs DOLFINx, which is missing here and which pip does not have: install "
+        "it by apt (on Debian "
+        "python3-dolfinx-real, and make virtual environments with --system-site-packages) or by "
+        "conda (fenics-dolfinx "
         "of conda-forge), see docs/start/install.md",
         name="dolfinx",
     )

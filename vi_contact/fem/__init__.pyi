@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .assembly import assemble as assemble
 from .contact.joined import joined_surfaces as joined_surfaces
 from .contact.matching import NodeToNode as NodeToNode

@@ -1,9 +1,10 @@
-"""Assemble the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (boundary method, eqs. 7-10a).
+"""Assemble the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (boundary
+method, eqs. 7-10a).
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
-integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u = P u_free + U(t),
-so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'')."""
+integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u =
+P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'')."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -39,7 +40,8 @@ Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
 
 LIGHTER = (
-    "inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave out "
+    "inertia load of the ground motion: the convention of the catalogue's reference numbers, which "
+    "leave out "
     "the mass that elements share with the base"
 )
 
@@ -68,31 +70,39 @@ def assemble(
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
-    Args:
-        mesh: DOLFINx mesh (``read_mesh``) with cells of first order or, with degree 2, of second order too.
-        degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
-        material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that cover the mesh.
-        forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density where they have no
+    Args: mesh: DOLFINx mesh (``read_mesh``) with cells of first order or, with degree 2, of second
+        order too. degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2
+        (docs/guide/second_order.md). material: LinearElastic, Orthotropic or fem.Heterogeneous, or
+        (cells, material) pairs that cover the mesh. forms: the user's own weak forms,
+        ``fem.Forms``; a material beside them gives the density where they have no
             mass, and the wave speeds that dashpots and free fields need.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
-        space: the user's own DOLFINx space V of the displacement, which sets the degree. bcs: ``dirichletbc`` objects
-            on V, a space like it, or V.sub(i). They keep their present values; where two meet, the last one counts.
-        clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
-        dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
-        tied: boundaries whose opposite nodes move together; damping: NoDamping() by default, MassProportional(c)
-            (eq. 7), Rayleigh, KelvinVoigt, or DampingRatio, which alone reads the xi of materials.
+        space: the user's own DOLFINx space V of the displacement, which sets the degree. bcs:
+            ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
+            values; where two meet, the last one counts.
+        clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some
+            components.
+        dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts
+            as damping.
+        tied: boundaries whose opposite nodes move together; damping: NoDamping() by default,
+            MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or DampingRatio, which alone reads
+            the xi of materials.
         loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
-        base_inertia: whether the inertia load of a ground motion counts the mass that elements share with prescribed
-            nodes. True is right for motions relative to the ground; False is the load of docs/start/first_wall.md.
-        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra, where each
-            cell has one mean value of tr eps (``fem.dilatation``).
-        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
-            pairs for several bodies. Where cells meet, the later pair counts; cells without a pair start from zero.
-        quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with parallel sides.
-    Raises:
-        InputError: cells without a material, of an order that does not fit the degree, or folded; NaN in data,
-            components that do not exist, a damping law that damps nothing, ratios xi that no law reads, dashpots on
-            held facets, groups without facets or cells, of another mesh or kind, contradictions."""
+        base_inertia: whether the inertia load of a ground motion counts the mass that elements
+            share with prescribed nodes. True is right for motions relative to the ground; False is
+            the load of docs/start/first_wall.md.
+        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
+            hexahedra, where each cell has one mean value of tr eps (``fem.dilatation``).
+        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a),
+            or (cells, value) pairs for several bodies. Where cells meet, the later pair counts;
+            cells without a pair start from zero.
+        quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with
+            parallel sides.
+    Raises: InputError: cells without a material, of an order that does not fit the degree, or
+        folded; NaN in data,
+            components that do not exist, a damping law that damps nothing, ratios xi that no law
+            reads, dashpots on held facets, groups without facets or cells, of another mesh or kind,
+            contradictions."""
     if hasattr(mesh, "comm"):
         agree(
             MpiComm(mesh.comm),
@@ -203,7 +213,8 @@ def _stated(
 
 
 def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
-    """C of materials and absorbing boundaries, before elimination (PETSc); None where nothing damps."""
+    """C of materials and absorbing boundaries, before elimination (PETSc); None where nothing
+    damps."""
     terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     if not terms:
         return None
@@ -215,7 +226,8 @@ def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
 def _reduced(
     full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
-    """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is destroyed."""
+    """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is
+    destroyed."""
     pull: tuple[Callable[[float], Array], ...] = ()
     if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
         matrix, held = (
@@ -229,7 +241,8 @@ def _reduced(
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
-    """Assemble f(t) on the free unknowns: tractions, body forces, linear forms and initial strains."""
+    """Assemble f(t) on the free unknowns: tractions, body forces, linear forms and initial
+    strains."""
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
@@ -247,7 +260,8 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 
 
 def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
-    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its own."""
+    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its
+    own."""
     if isinstance(load, InitialStrain):
         return lambda t: space.forms.initial.forces(t, only=load)
     if isinstance(load, LinearForm):

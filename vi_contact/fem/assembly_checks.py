@@ -1,4 +1,5 @@
-"""Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not contradict."""
+"""Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not
+contradict."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -53,7 +54,8 @@ def check_body(
     degree: Any = 1,
     integration: Any = "full",
 ) -> tuple[Section, Damping]:
-    """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
+    """Return (section, damping), the usual for None; InputError for objects of another kind, cells
+    of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(
@@ -91,7 +93,8 @@ def check_body(
     )
     if mesh.geometry.dim == 3 and isinstance(section, PlaneStrain | PlaneStress):
         raise InputError(
-            f"assemble: {section} is a section of a plane body and this one has three dimensions; give "
+            f"assemble: {section} is a section of a plane body and this one has three dimensions; "
+            "give "
             "Solid(), or leave it out"
         )
     if mesh.geometry.dim == 2 and isinstance(section, Solid):
@@ -115,7 +118,8 @@ def check_body(
         )
     if isinstance(section, PlaneStress) and any(getattr(damping, "viscosities", ())):
         raise InputError(
-            f"assemble: {damping} does not go with PlaneStress, where the strain across the panel would "
+            f"assemble: {damping} does not go with PlaneStress, where the strain across the panel "
+            "would "
             "need its own motion; give Rayleigh(0, beta), or another section"
         )
     flag(OWNER, "base_inertia", base_inertia)
@@ -134,58 +138,68 @@ def check_body(
 
 
 def check_ratios(body: ElasticForms, of_materials: bool) -> None:
-    """Raise InputError, on all ranks, for a damping law that damps nothing, and for damping ratios that no law reads.
+    """Raise InputError, on all ranks, for a damping law that damps nothing, and for damping ratios
+    that no law reads.
 
-    body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are those of materials,
-    and not the user's own forms."""
+    body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
+    those of materials, and not the user's own forms."""
     law, ratio = body.damping, body.largest_ratio
     if isinstance(law, DampingRatio) and not any(
         callable(one.xi) or one.xi for _, one in body.materials
     ):
         raise InputError(
-            f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; give "
+            f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; "
+            "give "
             "LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)"
         )
     rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
     damps = body.damped if of_materials else rayleigh or body.viscous is not None
     if not isinstance(law, NoDamping | DampingRatio) and not damps:
         raise InputError(
-            f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above zero, "
+            f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above "
+            "zero, "
             "or leave damping out"
         )
     if ratio and isinstance(law, BLIND_TO_RATIOS):
         raise InputError(
-            f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not read; give "
+            f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not "
+            "read; give "
             "damping=DampingRatio(frequency), or leave xi out"
         )
     _refuse_ratio_behind(body)
 
 
 def _refuse_ratio_behind(body: ElasticForms) -> None:
-    """Raise InputError for a ratio of a material that only dashpots have: they have no damping but their own."""
+    """Raise InputError for a ratio of a material that only dashpots have: they have no damping but
+    their own."""
     inside = [one for _, one in body.materials]
     for boundary in body.boundaries:
         behind = boundary.material
         if behind is not None and behind.xi and behind not in inside:
             raise InputError(
-                f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' has the "
+                f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' "
+                "has the "
                 f"damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out there"
             )
 
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:
-    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell, as parts of meshes may leave."""
+    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell, as parts of
+    meshes may leave."""
     own = np.arange(mesh.geometry.index_map().size_local)
     lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
     if lonely:
         raise InputError(
-            f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, as "
-            "create_submesh may leave them; write the part to a file and read it, or use fewer ranks"
+            f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, "
+            "as "
+            "create_submesh may leave them; write the part to a file and read it, or use fewer "
+            "ranks"
         )
 
 
 def _check_degree(mesh: Mesh, degree: Any) -> None:
-    """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not folded. Collective."""
+    """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not
+    folded. Collective."""
     if isinstance(degree, bool) or degree not in (1, 2):
         raise InputError(
             f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
@@ -201,7 +215,8 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
         != compat.cell_blocks(compat.vector_space(mesh, 2)).shape[1]
     ):
         raise InputError(
-            "assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it with "
+            "assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it "
+            "with "
             "complete cells of first or second order"
         )
     size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
@@ -212,7 +227,8 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
     folded = mesh.comm.allreduce(int(np.sum(np.abs(signed) < (1.0 - 1e-9) * whole)))
     if folded:
         raise InputError(
-            f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its sign; "
+            f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its "
+            "sign; "
             "mesh them finer, or with straight sides"
         )
 
@@ -225,18 +241,21 @@ def _check_integration(
     degree: int,
     integration: Any,
 ) -> None:
-    """Raise InputError for a word that is none, and where cells cannot or need not be integrated selectively."""
+    """Raise InputError for a word that is none, and where cells cannot or need not be integrated
+    selectively."""
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":
         return
     if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
         raise InputError(
-            "assemble: integration='selective' needs quadrilaterals or hexahedra, because other cells "
+            "assemble: integration='selective' needs quadrilaterals or hexahedra, because other "
+            "cells "
             "lock with it too; take degree=2"
         )
     if degree == 2 or isinstance(section, PlaneStress):
         raise InputError(
-            "assemble: integration='selective' is for degree=1 in plane strain or in space: neither "
+            "assemble: integration='selective' is for degree=1 in plane strain or in space: "
+            "neither "
             "degree=2 nor plane stress locks; leave it out"
         )
     if any(getattr(damping, "viscosities", ())) or not all(
@@ -253,7 +272,8 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     stiff = max((one.nu for one in materials), default=0.0)
     if stiff > LOCKING:
         log.warning(
-            "Poisson's ratio %.10g locks first-order cells, so displacements are too small: give at most %g, "
+            "Poisson's ratio %.10g locks first-order cells, so displacements are too small: give "
+            "at most %g, "
             "integration='selective' (quadrilaterals and hexahedra) or degree=2",
             stiff,
             LOCKING,
@@ -263,8 +283,9 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
 def check_boundaries(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
-    """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of another mesh, and for
-    prescribed displacements that contradict each other on the same facets. Collective. All are tuples."""
+    """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of
+    another mesh, and for prescribed displacements that contradict each other on the same facets.
+    Collective. All are tuples."""
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
@@ -293,7 +314,8 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
         for one, other in combinations(items, 2):
             if one is other:
                 raise InputError(
-                    f"assemble: {name} names one {type(one).__name__} twice, which would act twice; leave "
+                    f"assemble: {name} names one {type(one).__name__} twice, which would act "
+                    "twice; leave "
                     "it out once, or give one of twice the size"
                 )
 
@@ -301,7 +323,8 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
 def _refuse_empty(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and loads nothing."""
+    """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and
+    loads nothing."""
     own = {
         "clamped": clamped,
         "prescribed": prescribed,
@@ -322,7 +345,8 @@ def _refuse_empty(
     for (name, group), count in zip(found, counts, strict=True):
         if not count:
             raise InputError(
-                f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has no "
+                f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has "
+                "no "
                 "effect; correct the group, or leave it out"
             )
 
@@ -330,18 +354,21 @@ def _refuse_empty(
 def _contradictions(
     held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
 ) -> Iterator[str]:
-    """Pairs of conditions on the same facets of this rank: other values of one component, ties and dashpots."""
+    """Pairs of conditions on the same facets of this rank: other values of one component, ties and
+    dashpots."""
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
             yield (
-                f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share facets on which "
+                f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share "
+                "facets on which "
                 "different displacements are prescribed: leave out one of the two"
             )
     sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]
     for side, absorbing in product(sides, damped):
         if len(np.intersect1d(side.indices, absorbing.facets.indices)):
             yield (
-                f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the waves through "
+                f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the "
+                "waves through "
                 "the ties: leave out one of the two"
             )
 

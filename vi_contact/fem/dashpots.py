@@ -1,16 +1,19 @@
-"""Let the ground go on behind boundaries: dashpots that absorb waves, and a base that lets waves in from below.
+"""Let the ground go on behind boundaries: dashpots that absorb waves, and a base that lets waves in
+from below.
 
 Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877: on facets with outward normal n
 
     sigma_n = -normal rho c_P v_n,    tau = -tangential rho c_S v_t
 
-with factors 1 exact for waves that arrive at right angles. The tractions are integrated with the shape functions and
-the section's thickness into C: their loss is in the damping column of the energy ledger. They hold no static load.
-A compliant base adds the traction of an upgoing wave v_up, whatever its direction:
+with factors 1 exact for waves that arrive at right angles. The tractions are integrated with the
+shape functions and the section's thickness into C: their loss is in the damping column of the
+energy ledger. They hold no static load. A compliant base adds the traction of an upgoing wave v_up,
+whatever its direction:
 
     sigma_n += 2 rho c_P v_up_n,    tau += 2 rho c_S v_up_t.
 
-The wave that comes back down passes through the dashpots: the record of the base is not the input, but up + down."""
+The wave that comes back down passes through the dashpots: the record of the base is not the input,
+but up + down."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -38,7 +41,8 @@ NO_RESISTANCE = 1e-12  # of the resistance of all dashpots: a smaller share is n
 class BoundaryLoads:
     """Hold what a boundary puts on the body: functions t [s] -> (n,) [N] on the free unknowns.
 
-    ``elastic`` and ``viscous``: general and viscous parts of the load; ``companions``: motions marched beside the run.
+    ``elastic`` and ``viscous``: general and viscous parts of the load; ``companions``: motions
+    marched beside the run.
     """
 
     elastic: tuple[Callable[[float], Array], ...] = ()
@@ -48,9 +52,11 @@ class BoundaryLoads:
 
 @dataclass(frozen=True)
 class Dashpots:
-    """Put absorbing dashpots on facets. ``material``: of the adjacent cells when None, or of the half-space behind.
+    """Put absorbing dashpots on facets. ``material``: of the adjacent cells when None, or of the
+    half-space behind.
 
-    ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out. InputError when negative.
+    ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out.
+    InputError when negative.
     """
 
     facets: Facets
@@ -75,7 +81,8 @@ class Dashpots:
         attributes(self, not_negative=("normal", "tangential"))
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
-        """Return what acts on the body here besides the dashpots: nothing. ``forms``: ``ElasticForms``. Collective."""
+        """Return what acts on the body here besides the dashpots: nothing. ``forms``:
+        ``ElasticForms``. Collective."""
         return BoundaryLoads()
 
     @property
@@ -86,7 +93,8 @@ class Dashpots:
 
 @dataclass(frozen=True, kw_only=True)
 class CompliantBase(Dashpots):
-    """Put dashpots and an upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop's (``upgoing``)."""
+    """Put dashpots and an upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop's
+    (``upgoing``)."""
 
     motion: Callable[[float], Array] = field(repr=False)
     lets_waves_in: ClassVar[bool] = True
@@ -114,15 +122,18 @@ class CompliantBase(Dashpots):
 class DashpotMatrix:
     """Assemble the full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
 
-    InputError for facets that are not on the outer boundary, or prescribed in a direction that the dashpots resist."""
+    InputError for facets that are not on the outer boundary, or prescribed in a direction that the
+    dashpots resist."""
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
         self.space, self.dashpots = space, dashpots
         own = dashpots.material is not None
         if not own and not forms.fields:
             raise InputError(
-                f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… have "
-                f"none: give {type(dashpots).__name__}(…, material=), or a material beside the forms"
+                f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… "
+                "have "
+                f"none: give {type(dashpots).__name__}(…, material=), or a material beside the "
+                "forms"
             )
         cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
         moduli = (
@@ -154,12 +165,14 @@ class DashpotMatrix:
         name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
         if np.isnan(total):
             raise InputError(
-                f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several speeds: "
+                f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several "
+                "speeds: "
                 f"give {type(self.dashpots).__name__}(…, material=)"
             )
         if total == 0.0:
             raise InputError(
-                f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
+                f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a "
+                "positive "
                 "factor"
             )
         for condition in self.space.prescribed:
@@ -194,8 +207,8 @@ class DashpotMatrix:
 def impedances(
     dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any
 ) -> tuple[Any, Any]:
-    """Return thickness · (normal rho c_P, tangential rho c_S): of the ground beside the dashpots, whose constants given
-    here hold the thickness already, or of their own material."""
+    """Return thickness · (normal rho c_P, tangential rho c_S): of the ground beside the dashpots,
+    whose constants given here hold the thickness already, or of their own material."""
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho
         lame, shear = (

@@ -1,4 +1,5 @@
-"""Take Dirichlet data as a user of DOLFINx has them: ``dirichletbc`` objects on the displacement's space, or parts."""
+"""Take Dirichlet data as a user of DOLFINx has them: ``dirichletbc`` objects on the displacement's
+space, or parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +20,11 @@ REMEDY = "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V
 
 @dataclass(frozen=True, eq=False)
 class GivenValues:
-    """Hold components of nodes as a ``Prescribed`` at rest does: those of a ``dirichletbc``, as they were when given.
+    """Hold components of nodes as a ``Prescribed`` at rest does: those of a ``dirichletbc``, as
+    they were when given.
 
-    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not zero."""
+    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not
+    zero."""
 
     name: str
     mask: Mask
@@ -44,11 +47,13 @@ class GivenValues:
 
 
 def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any, int]:
-    """Return (the user's space, or that of the conditions without one; its degree); (None, degree) without both."""
+    """Return (the user's space, or that of the conditions without one; its degree); (None, degree)
+    without both."""
     counts = mesh.comm.allgather(len(bcs)) if hasattr(mesh, "comm") else [0]
     if min(counts) < max(counts):
         raise InputError(
-            f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give all "
+            f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give "
+            "all "
             "ranks the same list, also where a rank has none of its unknowns"
         )
     for bc in bcs:
@@ -85,14 +90,15 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
         ):
             return V, k
     raise InputError(
-        f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 with "
+        f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 "
+        "with "
         f"{mesh.geometry.dim} components, not a part of another space"
     )
 
 
 def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
-    """Return what conditions hold of a displacement's space. InputError, on all ranks, for one of another space, one
-    that holds nothing, and values that are not finite. Collective."""
+    """Return what conditions hold of a displacement's space. InputError, on all ranks, for one of
+    another space, one that holds nothing, and values that are not finite. Collective."""
     comm, d, found = MpiComm(mesh.comm), mesh.geometry.dim, []
     for k, bc in enumerate(bcs):
         name, block = f"bcs[{k}]", _block_of(V, bc.function_space)
@@ -115,16 +121,17 @@ def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
         refuse([defect], comm)
         if not largest(comm, len(dofs)):
             raise InputError(
-                f"assemble: {name} prescribes no unknown on any rank; check how its dofs were located"
+                f"assemble: {name} prescribes no unknown on any rank; check how its dofs were "
+                "located"
             )
         found.append(GivenValues(name, mask > 0.0, given, bool(largest(comm, max_abs(values)))))
     return tuple(found)
 
 
 def refuse_contradictions(space: Any) -> None:
-    """Raise InputError, on all ranks, where a dirichletbc and a ``Prescribed`` hold the same components of nodes, or
-    one those of the other and more, at different values, as every function of time may become. Conditions that only
-    meet do not contradict. Collective."""
+    """Raise InputError, on all ranks, where a dirichletbc and a ``Prescribed`` hold the same
+    components of nodes, or one those of the other and more, at different values, as every function
+    of time may become. Conditions that only meet do not contradict. Collective."""
     given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
     held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
     for values, one in zip(held, space.prescribed, strict=False):
@@ -144,8 +151,9 @@ def refuse_contradictions(space: Any) -> None:
 
 
 def _block_of(V: Any, S: Any) -> Indices | None:
-    """The block of V that each block of a space is, of S = V or V.sub(i), -1 without cells; None, on all ranks, where
-    S is of another kind. Spaces made twice may be numbered differently. Collective."""
+    """The block of V that each block of a space is, of S = V or V.sub(i), -1 without cells; None,
+    on all ranks, where S is of another kind. Spaces made twice may be numbered differently.
+    Collective."""
     d, theirs, mine, rows = (
         V.mesh.geometry.dim,
         S.dofmap.index_map,

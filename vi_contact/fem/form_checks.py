@@ -1,4 +1,5 @@
-"""Check the forms that a user gives for a body: functions, bilinear, of this mesh; matrices finite, masses positive."""
+"""Check the forms that a user gives for a body: functions, bilinear, of this mesh; matrices finite,
+masses positive."""
 
 from collections.abc import Callable
 from inspect import signature
@@ -22,10 +23,12 @@ PROBES = 4
 
 
 def refuse_complex(owner: str) -> None:
-    """Raise InputError where PETSc computes with complex numbers: inequalities have no meaning there."""
+    """Raise InputError where PETSc computes with complex numbers: inequalities have no meaning
+    there."""
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
         raise InputError(
-            f"{owner}: this PETSc computes with complex numbers, of which none is less than another; use "
+            f"{owner}: this PETSc computes with complex numbers, of which none is less than "
+            "another; use "
             "DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)"
         )
 
@@ -45,8 +48,8 @@ def takes(name: str, call: Any, *arguments: str) -> None:
 
 
 def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
-    """Return call(*arguments), a form linear in all of them on the mesh of the space; InputError, which begins with
-    ``said``, on all ranks otherwise. Collective."""
+    """Return call(*arguments), a form linear in all of them on the mesh of the space; InputError,
+    which begins with ``said``, on all ranks otherwise. Collective."""
     form = on_all(space.comm, said, lambda: call(*arguments))
     instance(
         said,
@@ -57,7 +60,8 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     )
     if set(on_all(space.comm, said, form.arguments)) != set(arguments):
         raise InputError(
-            f"{said} is not a form in the given trial and test functions; return one that is not zero and "
+            f"{said} is not a form in the given trial and test functions; return one that is not "
+            "zero and "
             "is linear in each of them"
         )
     on_all(space.comm, said, lambda: refuse_not_linear(said, form))
@@ -74,7 +78,8 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
         nodes, cells = space.comm.sum(np.array([one.num_ghosts for one in maps]))
         if nodes and not cells:  # no rank knows both cells of a facet between ranks
             raise InputError(
-                f"{said} integrates over interior facets (dS), which on several ranks needs a mesh with "
+                f"{said} integrates over interior facets (dS), which on several ranks needs a mesh "
+                "with "
                 "ghost_mode=shared_facet"
             )
     return form
@@ -110,7 +115,8 @@ def is_symmetric(matrix: Any, space: FemSpace) -> bool:
 
 
 def refuse_masses(matrix: Any, space: FemSpace) -> None:
-    """Raise InputError unless a full mass matrix is symmetric and positive, as its diagonal and some products tell."""
+    """Raise InputError unless a full mass matrix is symmetric and positive, as its diagonal and
+    some products tell."""
     M = PetscMatrix(matrix)
     if not is_symmetric(matrix, space):
         raise InputError(
@@ -132,7 +138,8 @@ def _numbers(space: FemSpace) -> Any:
 
 
 def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
-    """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3). Collective."""
+    """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3).
+    Collective."""
     d, u = space.dimension, compat.function(space.V)
     stress = on_all(space.comm, "Forms: stress", lambda: call(u))
     shape = getattr(stress, "ufl_shape", None)

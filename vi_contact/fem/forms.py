@@ -29,17 +29,21 @@ KINDS = (LinearElastic, Orthotropic, Heterogeneous)
 
 
 class ElasticForms:
-    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all materials.
+    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all
+    materials.
 
-    Attributes:
-        fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta: functions of DG0, of DG1
+    Attributes: fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and
+        beta: functions of DG0, of DG1
             where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
-        damping: the law of C, as it was given; largest_ratio: the largest xi of the materials, on all ranks.
-        damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping, cell by cell.
+        damping: the law of C, as it was given; largest_ratio: the largest xi of the materials, on
+            all ranks.
+        damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping,
+            cell by cell.
         materials: (local cells, material) as they were given.
-        dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in K, in C = beta K
-            and in stresses (``fem.dilatation``); None otherwise.
-        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where;
+        dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in
+            K, in C = beta K and in stresses (``fem.dilatation``); None otherwise.
+        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what
+            comes from where;
         own_damping: whether the user gave a form of C."""
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
@@ -101,25 +105,29 @@ class ElasticForms:
         return np.asarray(field.x.array[compat.cell_blocks(field.function_space)].mean(axis=1))
 
     def own(self, system: SemiDiscreteSystem) -> None:
-        """Remember the matrices of a system as made of these materials; the forms are then those of its space."""
+        """Remember the matrices of a system as made of these materials; the forms are then those of
+        its space."""
         self.space.forms = self
         for name, known in self._matrices.items():
             if getattr(system, name) is not None:
                 known.add(getattr(system, name))
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
-        """Return the letters of ``names`` whose matrices in a system were not made of these materials."""
+        """Return the letters of ``names`` whose matrices in a system were not made of these
+        materials."""
         return "".join(
             name for name in names if getattr(system, name) not in (None, *self._matrices[name])
         )
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains. With these, or with
-        selective integration: ``follow`` when its values or the time have changed since."""
+        """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains.
+        With these, or with selective integration: ``follow`` when its values or the time have
+        changed since."""
         return self.stresses(u)[0]
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
-        """Return the stress and sigma_zz(u) times the thickness of a body in the plane, 0 in plane stress and else."""
+        """Return the stress and sigma_zz(u) times the thickness of a body in the plane, 0 in plane
+        stress and else."""
         eps, trace = ufl.sym(ufl.grad(u)), self._trace(u)
         if self.initial is None or u is self.u:
             return self.hooke(eps, 0.0, trace)
@@ -127,7 +135,8 @@ class ElasticForms:
         return self.hooke(eps - own, -across, trace - ufl.tr(own))
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        """Return (sigma (d, d), sigma_zz) times the thickness of a strain, that across the plane, and its trace."""
+        """Return (sigma (d, d), sigma_zz) times the thickness of a strain, that across the plane,
+        and its trace."""
         d, fields = self.space.dimension, self.fields
         if self._anisotropic is None:
             sigma = fields["lame"] * trace * ufl.Identity(d) + 2 * fields["shear"] * eps
@@ -142,20 +151,23 @@ class ElasticForms:
         return sigma, flat[3] if d == 2 else 0.0 * trace
 
     def _trace(self, u: Any) -> Any:
-        """tr eps or, of a Function, its mean over each cell; none in bilinear forms where ``dilatation`` adds it."""
+        """tr eps or, of a Function, its mean over each cell; none in bilinear forms where
+        ``dilatation`` adds it."""
         if self.dilatation is None:
             return ufl.tr(ufl.sym(ufl.grad(u)))
         return 0.0 if u is self.u else self.dilatation.of(u)
 
     def follow(self, u: Any, t: float | None = None) -> None:
-        """Bring stresses of a Function up to its values, and initial strains up to a time. Collective."""
+        """Bring stresses of a Function up to its values, and initial strains up to a time.
+        Collective."""
         if self.dilatation is not None:
             self.dilatation.update(u)
         if self.initial is not None and t is not None:
             self.initial.follow(t)
 
     def bilinear(self, name: str) -> Any:
-        """Return the form of M, K, or C of the materials in the trial function ``u`` and the test function ``v``."""
+        """Return the form of M, K, or C of the materials in the trial function ``u`` and the test
+        function ``v``."""
         u, v, fields = self.u, self.v, self.fields
         if name == "M":  # forms=… without a stress take the mass from here
             return fields["rho"] * ufl.inner(u, v) * ufl.dx
@@ -166,8 +178,8 @@ class ElasticForms:
         return form + self._viscous_form() if self.viscous else form
 
     def against(self, name: str, r: Any, inside: Any) -> Any:
-        """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r as test function.
-        ``follow`` when the values of the Function r have changed since."""
+        """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r
+        as test function. ``follow`` when the values of the Function r have changed since."""
         form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
         if self.dilatation is None or name == "M":
             return form
@@ -194,7 +206,8 @@ class ElasticForms:
 
 
 def cell_constants(space: Any, material: Materials) -> Array:
-    """Return E, nu, rho and xi of the local cells, (4, cells), NaN where Orthotropic has none; DG0. Collective."""
+    """Return E, nu, rho and xi of the local cells, (4, cells), NaN where Orthotropic has none; DG0.
+    Collective."""
     place = compat.cell_blocks(space)[:, 0]
     found = np.empty((4, len(place)))
     for where, one in cell_materials(space.mesh, material):
@@ -205,8 +218,8 @@ def cell_constants(space: Any, material: Materials) -> Array:
 
 
 def _constants(space: Any, cells: Any, material: Material) -> Any:
-    """The material, or its values at all unknowns of the space where it is given by functions or has no Lamé constants.
-    Collective."""
+    """The material, or its values at all unknowns of the space where it is given by functions or
+    has no Lamé constants. Collective."""
     if isinstance(material, Heterogeneous):
         return material.at(space, cells)
     if isinstance(material, Orthotropic):
@@ -266,7 +279,8 @@ def _anisotropic(
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:
-    """Return (local cells, material) pairs that cover every local cell once; InputError for cells with none or two."""
+    """Return (local cells, material) pairs that cover every local cell once; InputError for cells
+    with none or two."""
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts
     if isinstance(material, KINDS):
@@ -282,7 +296,8 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
     for (cells, _), count in zip(material, counts, strict=True):
         if not count:
             raise InputError(
-                f"the cell group '{cells.name}' of a material has no cells: correct the group, or leave "
+                f"the cell group '{cells.name}' of a material has no cells: correct the group, or "
+                "leave "
                 "its (cells, material) pair out"
             )
     if twice:
@@ -291,6 +306,7 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
         )
     if missing:
         raise InputError(
-            f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh"
+            f"{missing} cells have no material: give a (cells, material) pair for every cell group "
+            "of the mesh"
         )
     return [(cells.indices, one) for cells, one in material]

@@ -1,6 +1,8 @@
-"""Check groups of facets and cells where they are given: the right kind, of the mesh they are used on.
+"""Check groups of facets and cells where they are given: the right kind, of the mesh they are used
+on.
 
-Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would name other places."""
+Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would
+name other places."""
 
 from typing import Any, cast
 
@@ -14,12 +16,14 @@ KINDS: dict[type[Group], str] = {Facets: "boundary group", Cells: "cell group"}
 
 
 def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
-    """Return the boundary group, of this mesh if one is given; InputError, with the remedy, for anything else."""
+    """Return the boundary group, of this mesh if one is given; InputError, with the remedy, for
+    anything else."""
     return cast(Facets, _group(owner, meaning, group, mesh, Facets))
 
 
 def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
-    """Return the cell group, of this mesh if one is given; InputError, with the remedy, for anything else."""
+    """Return the cell group, of this mesh if one is given; InputError, with the remedy, for
+    anything else."""
     return cast(Cells, _group(owner, meaning, group, mesh, Cells))
 
 
@@ -29,7 +33,8 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
         if mesh is None or group.mesh is mesh:
             return group
         raise InputError(
-            f"{owner}: {meaning} is the {kind} '{group.name}' of another mesh; give one of this mesh"
+            f"{owner}: {meaning} is the {kind} '{group.name}' of another mesh; give one of this "
+            "mesh"
         )
     if isinstance(group, Group):
         raise InputError(
@@ -41,13 +46,15 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
             f"fem.{wanted.__name__}.tagged(name, tags, value, mesh) with the value that is meant"
         )
     raise InputError(
-        f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of fem.read_mesh or "
+        f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of "
+        "fem.read_mesh or "
         f"fem.{wanted.__name__}(name, numbers, mesh)"
     )
 
 
 def field_given(owner: str, meaning: str, value: Any) -> None:
-    """Raise InputError unless it is a function or a vector of numbers (size and NaN are told where it is used)."""
+    """Raise InputError unless it is a function or a vector of numbers (size and NaN are told where
+    it is used)."""
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
         return
@@ -59,7 +66,8 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
 
 
 def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -> tuple[int, ...]:
-    """Return the components that are given, all of them for None; InputError for one that does not exist."""
+    """Return the components that are given, all of them for None; InputError for one that does not
+    exist."""
     for c in given or ():
         if not 0 <= c < dimension:
             raise InputError(
@@ -69,7 +77,8 @@ def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -
 
 
 def components_given(owner: str, value: Any) -> None:
-    """Raise InputError unless it is None or a tuple of whole numbers (whose range is told where they are used)."""
+    """Raise InputError unless it is None or a tuple of whole numbers (whose range is told where
+    they are used)."""
     for one in (
         ()
         if value is None

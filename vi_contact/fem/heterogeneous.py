@@ -32,19 +32,23 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
 
 @dataclass(frozen=True)
 class Heterogeneous:
-    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³], and xi(x), which DampingRatio damps by.
+    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³], and xi(x), which
+    DampingRatio damps by.
 
-    Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there, or a function of
-    points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes it.
+    Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there,
+    or a function of points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes
+    it.
 
-    A Function that is constant on every cell is taken as it is. Of all others the Lamé constants and rho are taken at
-    the vertices of every cell and are linear in it (DG1), so that E and rho may be linear exactly. Where the material
-    jumps inside of a function, at a side of a cell, vertices cannot tell which side is meant: give (cells, material)
-    pairs or a Function of DG0. The body keeps the values of the moment when it is assembled. Columns of free fields and
-    section forces through elements take means over cells.
+    A Function that is constant on every cell is taken as it is. Of all others the Lamé constants
+    and rho are taken at the vertices of every cell and are linear in it (DG1), so that E and rho
+    may be linear exactly. Where the material jumps inside of a function, at a side of a cell,
+    vertices cannot tell which side is meant: give (cells, material) pairs or a Function of DG0. The
+    body keeps the values of the moment when it is assembled. Columns of free fields and section
+    forces through elements take means over cells.
 
-    Raises InputError: neither number nor function; and when a body is assembled, values outside E > 0, -1 < nu < 1/2,
-    rho > 0, 0 <= xi < 1, with the first place of them, and Functions or expressions of another mesh."""
+    Raises InputError: neither number nor function; and when a body is assembled, values outside E >
+    0, -1 < nu < 1/2, rho > 0, 0 <= xi < 1, with the first place of them, and Functions or
+    expressions of another mesh."""
 
     E: Values
     nu: Values
@@ -57,7 +61,8 @@ class Heterogeneous:
             if isinstance(value, Expr):
                 if value.ufl_shape:
                     raise InputError(
-                        f"Heterogeneous: {words} has values of shape {value.ufl_shape}; give one that is "
+                        f"Heterogeneous: {words} has values of shape {value.ufl_shape}; give one "
+                        "that is "
                         "scalar"
                     )
                 continue
@@ -75,8 +80,8 @@ class Heterogeneous:
         )
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
-        """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for values on these
-        cells that no material has. Collective."""
+        """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for
+        values on these cells that no material has. Collective."""
         comm = MpiComm(space.mesh.comm)
         mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
         mine[compat.cell_blocks(space)[cells]] = True
@@ -109,7 +114,8 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
             (1, *x.shape[1:]),
         ):  # DOLFINx reads beyond values that are too few
             raise InputError(
-                f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} points; give "
+                f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} "
+                "points; give "
                 "a function of points x (3, k) that returns (k,)"
             )
         return np.asarray(values)

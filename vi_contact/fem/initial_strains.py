@@ -1,4 +1,5 @@
-"""Strain a body before it has stresses: temperature, swelling, given dislocations (boundary method, eq. 25)."""
+"""Strain a body before it has stresses: temperature, swelling, given dislocations (boundary method,
+eq. 25)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,22 +22,25 @@ from .mesh import Cells
 
 @dataclass(frozen=True)
 class InitialStrain(ActingLoad):
-    """Apply an initial strain eps_0(x, t): sigma = C (eps(u) - eps_0), as the load ∫ C eps_0 : eps(v).
+    """Apply an initial strain eps_0(x, t): sigma = C (eps(u) - eps_0), as the load ∫ C eps_0 :
+    eps(v).
 
-    Warming by T - T_0 is alpha (T - T_0) in all directions. A dislocation, a given jump b [m] across a surface with the
-    normal n, is the tensor b⊗n / h in a layer of cells of height h (Mura, Micromechanics of Defects in Solids, 1987,
-    ch. 1). In a cell eps_0 is interpolated as ``as_function`` projects stresses, by a constant in P1 and where the
-    integration is selective: what displacements of this degree can follow leaves a free body without stress. Stresses,
+    Warming by T - T_0 is alpha (T - T_0) in all directions. A dislocation, a given jump b [m]
+    across a surface with the normal n, is the tensor b⊗n / h in a layer of cells of height h (Mura,
+    Micromechanics of Defects in Solids, 1987, ch. 1). In a cell eps_0 is interpolated as
+    ``as_function`` projects stresses, by a constant in P1 and where the integration is selective:
+    what displacements of this degree can follow leaves a free body without stress. Stresses,
     reactions, section forces and the energy ledger go by eps(u) - eps_0, damping by the rates of u.
 
-    Args:
-        value: the strain of all directions, across the plane too, or a tensor, of which the symmetric part counts,
-            (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] -> (k,), (k, d, d) or in
-            the plane (k, 3, 3), which is asked at t = 0 s when a body is assembled. A bar is held sideways: warming
-            then lengthens it by (1 + nu)/(1 - nu) alpha (T - T_0); nu = 0 is a bar with free sides.
+    Args: value: the strain of all directions, across the plane too, or a tensor, of which the
+        symmetric part counts,
+            (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] ->
+            (k,), (k, d, d) or in the plane (k, 3, 3), which is asked at t = 0 s when a body is
+            assembled. A bar is held sideways: warming then lengthens it by (1 + nu)/(1 - nu) alpha
+            (T - T_0); nu = 0 is a bar with free sides.
         history: factor s(t) of the value at t = 0 s; cells: the part of the body that is strained.
-    Raises:
-        InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell C."""
+    Raises: InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not
+        tell C."""
 
     value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]  # as given
     history: Callable[[float], float] | None = None
@@ -56,7 +60,8 @@ class InitialStrain(ActingLoad):
             _tensors("InitialStrain", self.value, (), dimensions)
 
     def at(self, points: Array, room: Array, t: float) -> Array:
-        """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the room."""
+        """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the
+        room."""
         value: Any = (
             self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
         )
@@ -66,7 +71,8 @@ class InitialStrain(ActingLoad):
         whole[:, : found.shape[-1], : found.shape[-1]] = found
         if points.shape[1] == 2 and (whole + whole.swapaxes(1, 2))[:, 2, :2].any():
             raise InputError(
-                "InitialStrain: value shears across the plane (xz or yz), where a body in the plane does "
+                "InitialStrain: value shears across the plane (xz or yz), where a body in the "
+                "plane does "
                 "not move; give zero there, or a body in space"
             )
         return whole.reshape(room.shape)
@@ -75,7 +81,8 @@ class InitialStrain(ActingLoad):
 def _tensors(
     owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
 ) -> Array:
-    """Return strains, one or one at each point, as tensors; InputError unless one of these dimensions has the shape."""
+    """Return strains, one or one at each point, as tensors; InputError unless one of these
+    dimensions has the shape."""
     shape = shape_of(value)
     if shape != leading and shape not in {
         (*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)
@@ -92,7 +99,8 @@ def _tensors(
 
 
 class InitialStrains:
-    """Hold the sum of the initial strains of a body at a time, as tensors (3, 3), its load and energy. Collective."""
+    """Hold the sum of the initial strains of a body at a time, as tensors (3, 3), its load and
+    energy. Collective."""
 
     def __init__(self, body: ElasticForms, given: Sequence[InitialStrain]) -> None:
         self._space, self._body, self._given, mesh = body.space, body, given, body.space.mesh
@@ -126,7 +134,8 @@ class InitialStrains:
         ), 0.0 if free else eps[2, 2]
 
     def against(self, r: Any, inside: Any) -> Any:
-        """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what ``follow`` returns."""
+        """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what
+        ``follow`` returns."""
         own, across = self._split(ufl.TestFunction(self.tensors))
         return (
             -inside
@@ -135,7 +144,8 @@ class InitialStrains:
         )
 
     def follow(self, t: float, *, only: InitialStrain | None = None) -> Array:
-        """Sum up the strains at a time, or one of them less its history; return the owned values."""
+        """Sum up the strains at a time, or one of them less its history; return the owned
+        values."""
         points, blocks = self.tensors.tabulate_dof_coordinates(), compat.cell_blocks(self.tensors)
         values = self._field.x.array.reshape(-1, 9)
         values[:] = 0.0

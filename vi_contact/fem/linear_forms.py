@@ -1,4 +1,5 @@
-"""Take loads as a user of UFL writes them: as linear forms, the virtual work of the load on a displacement v."""
+"""Take loads as a user of UFL writes them: as linear forms, the virtual work of the load on a
+displacement v."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -22,22 +23,27 @@ NAME = "LinearForm"
 
 @dataclass(frozen=True)
 class LinearForm:
-    """Apply the load whose virtual work is L(v), as UFL with measures: v -> ufl.Form, such as ∫ f·v dx + ∫ g·v ds.
+    """Apply the load whose virtual work is L(v), as UFL with measures: v -> ufl.Form, such as ∫ f·v
+    dx + ∫ g·v ds.
 
-    f in N/m³ and g in Pa push along +v; what the form gives is multiplied by the section's thickness, as other loads
-    are. The form may hold DOLFINx Functions and Constants of this mesh, gradients of v and Measures with the user's own
-    MeshTags: LinearForm(lambda v: ufl.inner(g, v) * ds(3)).
+    f in N/m³ and g in Pa push along +v; what the form gives is multiplied by the section's
+    thickness, as other loads are. The form may hold DOLFINx Functions and Constants of this mesh,
+    gradients of v and Measures with the user's own MeshTags: LinearForm(lambda v: ufl.inner(g, v) *
+    ds(3)).
 
-    Args:
-        form: called once, with a test function of the displacement's space.
-        history: factor f(t) of the form, which is assembled once, as it is without one; t in seconds.
-        update: function of the time alone that sets Constants and Functions of the form to their values at t, on every
-            rank (``f.x.scatter_forward()`` where it writes to arrays). The form is then assembled anew at every time
-            that a step asks for: one sweep over its cells or facets, where a history costs one vector update. Whether
-            a restart goes on with the same update is looked at in the first steps only.
-    Raises:
-        InputError: history and update together; from ``assemble``, on all ranks: what is no linear form in v on this
-            mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an error."""
+    Args: form: called once, with a test function of the displacement's space. history: factor f(t)
+        of the form, which is assembled once, as it is without one; t in seconds. update: function
+        of the time alone that sets Constants and Functions of the form to their values at t, on
+        every
+            rank (``f.x.scatter_forward()`` where it writes to arrays). The form is then assembled
+            anew at every time
+            that a step asks for: one sweep over its cells or facets, where a history costs one
+            vector update. Whether a restart goes on with the same update is looked at in the first
+            steps only.
+    Raises: InputError: history and update together; from ``assemble``, on all ranks: what is no
+        linear form in v on this
+            mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an
+            error."""
 
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None
@@ -70,7 +76,8 @@ class LinearForm:
         return self.update is None
 
     def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
-        """Return t -> the forces (owned full,), less the history; without update as once assembled. Collective."""
+        """Return t -> the forces (owned full,), less the history; without update as once assembled.
+        Collective."""
         if space in self._once:
             return lambda t: np.asarray(self._once[space])
         name, v = f"{NAME}: form", ufl.TestFunction(space.V)

@@ -1,7 +1,8 @@
 """Distribute meshes with named groups, read from a file or built in memory by a Gmsh script.
 
-Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are
-recognised on each rank by the vertices of their members, numbered as in the input: a facet may be in several."""
+Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError.
+Groups are recognised on each rank by the vertices of their members, numbered as in the input: a
+facet may be in several."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -52,7 +53,8 @@ class Group:
             defect = f"{owner}: indices is {shown(self.indices)}; give local numbers, such as tags.find(value) returns"
         elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
             defect = (
-                f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but the mesh has "
+                f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but "
+                "the mesh has "
                 f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh"
             )
         refuse([defect], MpiComm(mesh.comm))
@@ -60,9 +62,11 @@ class Group:
 
     @classmethod
     def tagged(cls, name: str, meshtags: Any, value: int, mesh: Mesh) -> Self:
-        """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags. Collective.
+        """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags.
+        Collective.
 
-        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of any rank has."""
+        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
+        any rank has."""
         owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
         instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
@@ -77,7 +81,8 @@ class Group:
             )
         elif meshtags.dim != dim:
             defect = (
-                f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of this mesh have "
+                f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of "
+                "this mesh have "
                 f"dimension {dim}; give the tags of its {things}"
             )
         refuse([defect], MpiComm(mesh.comm))
@@ -87,16 +92,18 @@ class Group:
                 ", …" if len(found) > MOST_NAMED else ""
             )
             raise InputError(
-                f"{owner}: no {things} have the value {value} of '{name}'; give one of {there or 'none'}"
+                f"{owner}: no {things} have the value {value} of '{name}'; give one of "
+                f"{there or 'none'}"
             )
         return cls(name, chosen, mesh)
 
     @classmethod
     def where(cls, name: str, mesh: Mesh, marker: Callable[[npt.NDArray[np.float64]], Any]) -> Self:
-        """Return the group of the facets of the boundary, or of the cells, whose vertices are all marked. Collective.
+        """Return the group of the facets of the boundary, or of the cells, whose vertices are all
+        marked. Collective.
 
-        ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when it fails or marks
-        none on any rank."""
+        ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
+        it fails or marks none on any rank."""
         owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
         instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
         function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
@@ -116,7 +123,8 @@ class Group:
         if not mesh.comm.allreduce(len(chosen)):
             of = "facets of the boundary" if cls.codimension else "cells"
             raise InputError(
-                f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some {things}, "
+                f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some "
+                f"{things}, "
                 "coordinates compared with np.isclose"
             )
         return cls(name, chosen, mesh)
@@ -124,10 +132,11 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Facets(Group):
-    """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
+    """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept
+    ascending. Collective.
 
-    ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks points.
-    InputError, on all ranks, for numbers that are no facets of this mesh."""
+    ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks
+    points. InputError, on all ranks, for numbers that are no facets of this mesh."""
 
     codimension: ClassVar[int] = 1
 
@@ -136,8 +145,8 @@ class Facets(Group):
 class Cells(Group):
     """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
-    ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks points.
-    InputError, on all ranks, for numbers that are no cells of this mesh."""
+    ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks
+    points. InputError, on all ranks, for numbers that are no cells of this mesh."""
 
     codimension: ClassVar[int] = 0
 
@@ -151,15 +160,18 @@ def local_count(mesh: Mesh, codimension: int) -> int:
 
 
 class Tags(dict[str, Any]):
-    """Hold the groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks; InputError for others."""
+    """Hold the groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks;
+    InputError for others."""
 
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
         cells = [key for key, group in self.items() if isinstance(group, Cells)]
         near = " or ".join(get_close_matches(str(name), self, cutoff=0.5))
         raise InputError(
-            f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, its cell "
-            f"groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it in Gmsh as a "
+            f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, "
+            "its cell "
+            f"groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it in Gmsh "
+            "as a "
             "physical group"
         )
 
@@ -170,17 +182,20 @@ def alone() -> MPI.Comm:
 
 
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Read a mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
+    """Read a mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical
+    groups.
 
-    Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in metres. The file is
-    in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on every rank if the file is missing, is a
-    script, or is not a usable mesh (`vi_contact.meshes.extract.extract` lists the reasons). Collective."""
+    Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in
+    metres. The file is in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on
+    every rank if the file is missing, is a script, or is not a usable mesh
+    (`vi_contact.meshes.extract.extract` lists the reasons). Collective."""
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
 
 
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with `build(gmsh)`.
+    """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with
+    `build(gmsh)`.
 
     It raises the errors of `read_mesh`. Collective."""
     if isinstance(comm, MPI.Comm):
@@ -196,9 +211,11 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use.
+    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among
+    the nodes in use.
 
-    Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order."""
+    Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is
+    numbered in their order."""
     instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
     if (

@@ -1,4 +1,5 @@
-"""Say what unknowns mean that are displacements of nodes: where the nodes are, which rank has them, what is a body."""
+"""Say what unknowns mean that are displacements of nodes: where the nodes are, which rank has them,
+what is a body."""
 
 from typing import Any
 
@@ -15,14 +16,17 @@ MEANT = (
 
 
 class NodalSpace:
-    """Hold nodes, of which every rank owns some, and the unknowns that are components of their displacements.
+    """Hold nodes, of which every rank owns some, and the unknowns that are components of their
+    displacements.
 
-    Attributes:
-        algebra: of the matrices of its systems; comm: its ranks; dimension: d; size: diagonal of the bounding box [m].
-        nodes: (k,) numbers of the owned nodes; points: their coordinates (k, d) [m].
-        free_index: (k d,) the owned unknown that a component is, -1 where it is none; numbers: (k, d) the same among
-            those of all ranks, also of a component that follows another; held: (k, d) components that are given.
-        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how many on all ranks."""
+    Attributes: algebra: of the matrices of its systems; comm: its ranks; dimension: d; size:
+        diagonal of the bounding box [m]. nodes: (k,) numbers of the owned nodes; points: their
+        coordinates (k, d) [m]. free_index: (k d,) the owned unknown that a component is, -1 where
+        it is none; numbers: (k, d) the same among
+            those of all ranks, also of a component that follows another; held: (k, d) components
+            that are given.
+        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how
+            many on all ranks."""
 
     algebra: Algebra
     comm: Comm
@@ -38,16 +42,19 @@ class NodalSpace:
 
     @property
     def hierarchy(self) -> Any:
-        """Return the change to unknowns of a hierarchy, where contact conditions need one; None elsewhere."""
+        """Return the change to unknowns of a hierarchy, where contact conditions need one; None
+        elsewhere."""
         return None
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
-        """Expand a vector of unknowns (n,) at time t -> displacements of owned nodes (k, d), or their derivatives."""
+        """Expand a vector of unknowns (n,) at time t -> displacements of owned nodes (k, d), or
+        their derivatives."""
         where = self.free_index.reshape(-1, self.dimension)
         return np.where(where >= 0, u.take(where, mode="clip") if len(u) else 0.0, 0.0)
 
     def leaders(self, nodes: Indices) -> Indices:
-        """Return these node numbers, of nodes that follow another that of the other; -1 for those tied in part."""
+        """Return these node numbers, of nodes that follow another that of the other; -1 for those
+        tied in part."""
         return nodes
 
     def blocks_of(self, nodes: Indices) -> Indices:
@@ -59,7 +66,8 @@ class NodalSpace:
         return np.where(self.nodes[blocks] == nodes, blocks, -1)
 
     def at_nodes(self, numbers: Indices, values: Array) -> Array:
-        """Return owned nodal values (k, c) at node numbers, on every rank; zero for nodes of nobody. Collective."""
+        """Return owned nodal values (k, c) at node numbers, on every rank; zero for nodes of
+        nobody. Collective."""
         found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
@@ -69,9 +77,11 @@ class NodalSpace:
         return self.at_nodes(nodes, self.expand(u, t, derivative))
 
     def find_nodes(self, points: Array) -> Indices:
-        """Find the numbers of the nodes nearest to the points (k, d), equal on all ranks. Collective.
+        """Find the numbers of the nodes nearest to the points (k, d), equal on all ranks.
+        Collective.
 
-        InputError for a point farther from every node than the body is large (5 % of its diagonal)."""
+        InputError for a point farther from every node than the body is large (5 % of its
+        diagonal)."""
         found = np.empty(len(points), dtype=np.int64)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
@@ -82,7 +92,8 @@ class NodalSpace:
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > MEANT * self.size:
                 raise InputError(
-                    f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a point of "
+                    f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a "
+                    "point of "
                     "the body"
                 )
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
@@ -100,9 +111,10 @@ def bounding_box(comm: Comm, points: Array) -> float:
 
 
 def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indices) -> Indices:
-    """Return the part (0, 1, ..., in the order of least numbers) that each of the numbers (n,) of this rank belongs to
-    when ``first`` and ``second``, places among them, are joined; ``shared``: places of those that other ranks have too,
-    where parts of different ranks meet and are one. Collective."""
+    """Return the part (0, 1, ..., in the order of least numbers) that each of the numbers (n,) of
+    this rank belongs to when ``first`` and ``second``, places among them, are joined; ``shared``:
+    places of those that other ranks have too, where parts of different ranks meet and are one.
+    Collective."""
     part = _smallest(first, second, numbers)
     meeting = np.column_stack([numbers[shared], part[shared]])
     meeting = np.unique(np.concatenate(from_each(comm, meeting)), axis=0)

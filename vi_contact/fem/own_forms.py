@@ -20,25 +20,28 @@ ROLES = {"K": "stiffness", "C": "damping", "M": "mass"}
 
 @dataclass(frozen=True, kw_only=True)
 class Forms:
-    """State a body by weak forms: functions (u, v) -> UFL form, u the trial and v the test function.
+    """State a body by weak forms: functions (u, v) -> UFL form, u the trial and v the test
+    function.
 
         M_ij = mass(phi_j, phi_i),   K_ij = stiffness(phi_j, phi_i),   C_ij = damping(phi_j, phi_i)
 
-    With E, a stiffness, a prestress, … in Functions, Constants and expressions of the user's own. The forms are
-    integrated as they are, ``ufl.dx`` and other measures included: where a section has a thickness other than 1 m it
-    belongs into them, for contact weights, loads and dashpots are multiplied by that of the section. What they hold
-    must keep its values while the system is used: reactions and section forces integrate them again.
+    With E, a stiffness, a prestress, … in Functions, Constants and expressions of the user's own.
+    The forms are integrated as they are, ``ufl.dx`` and other measures included: where a section
+    has a thickness other than 1 m it belongs into them, for contact weights, loads and dashpots are
+    multiplied by that of the section. What they hold must keep its values while the system is used:
+    reactions and section forces integrate them again.
 
-    Args:
-        stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for Volume() and Lemke().
-        mass: the form of M [kg], symmetric and positive; None: the density of ``assemble(…, material)``.
-        damping: the form of C [N s/m]; None: that of ``assemble(…, damping=)``, Rayleigh on these M and K, or
+    Args: stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for
+        Volume() and Lemke(). mass: the form of M [kg], symmetric and positive; None: the density of
+        ``assemble(…, material)``. damping: the form of C [N s/m]; None: that of ``assemble(…,
+        damping=)``, Rayleigh on these M and K, or
             KelvinVoigt; both add up.
-        stress: u -> stress tensor [Pa], (d, d), or in the plane (3, 3) with sigma_zz; von Mises stresses and stresses
-            as Functions need it.
-    Raises:
-        InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms that are not bilinear in
-            u and v or on another mesh, masses that are not positive, and entries that are not finite."""
+        stress: u -> stress tensor [Pa], (d, d), or in the plane (3, 3) with sigma_zz; von Mises
+            stresses and stresses as Functions need it.
+    Raises: InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms
+        that are not bilinear in
+            u and v or on another mesh, masses that are not positive, and entries that are not
+            finite."""
 
     stiffness: Bilinear
     mass: Bilinear | None = None
@@ -53,7 +56,8 @@ class Forms:
 
 
 class OwnForms(ElasticForms):
-    """Hold the user's forms of one body; ``fields`` are those of the material beside them, empty where there is none.
+    """Hold the user's forms of one body; ``fields`` are those of the material beside them, empty
+    where there is none.
 
     Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective."""
 
@@ -68,7 +72,8 @@ class OwnForms(ElasticForms):
         super().__init__(space, materials, section, damping)
         if given.mass is None and not materials:
             raise InputError(
-                "assemble: forms=… have no mass; give Forms(…, mass=), or a material for its density"
+                "assemble: forms=… have no mass; give Forms(…, mass=), or a material for its "
+                "density"
             )
         self._given, self.tells_stress = given, given.stress is not None
         self.own_damping = given.damping is not None
@@ -114,12 +119,14 @@ class OwnForms(ElasticForms):
             "the material beside them" if material else "no material",
         )
         notes = [
-            f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave speeds at "
+            f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave "
+            "speeds at "
             f"boundaries by {waves}"
         ]
         if not self.symmetric:
             notes.append(
-                "its matrices are not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu is no energy"
+                "its matrices are not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu "
+                "is no energy"
             )
         if (
             self.tells_stress

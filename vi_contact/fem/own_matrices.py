@@ -1,8 +1,10 @@
-"""Make the system of matrices that come from anywhere: a user's own elements, another program, beams and frames.
+"""Make the system of matrices that come from anywhere: a user's own elements, another program,
+beams and frames.
 
     M u'' + C u' + K u = f(t),   M symmetric and positive (semi)definite
 
-Rows that stand still are eliminated here, so that weight and ground motion count the mass that they share with others.
+Rows that stand still are eliminated here, so that weight and ground motion count the mass that they
+share with others.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,23 +46,27 @@ def system_from_arrays(
     u0: Any = None,
     v0: Any = None,
 ) -> SemiDiscreteSystem:
-    """Make the system M u'' + C u' + K u = f of scipy or dense matrices, on one process, by numpy and scipy alone.
+    """Make the system M u'' + C u' + K u = f of scipy or dense matrices, on one process, by numpy
+    and scipy alone.
 
-    ``contact_points`` makes contact for it. All that asks for no material works: every scheme and impact law, friction,
-    solvers, static stages, ``Energy``, ``Contact``, ``Probe``, checkpoints, ``fem.XDMF``. Bodies are what K joins.
+    ``contact_points`` makes contact for it. All that asks for no material works: every scheme and
+    impact law, friction, solvers, static stages, ``Energy``, ``Contact``, ``Probe``, checkpoints,
+    ``fem.XDMF``. Bodies are what K joins.
 
-    Args:
-        M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None; stiffness [N/m]. C and
+    Args: M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None;
+        stiffness [N/m]. C and
             K that are not symmetric are for Volume() and Condensed(Lemke()).
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
-        unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no displacement of a point
-            (a rotation); None: row node * d + c is component c of the node. Components without a row stand still.
-        clamped: numbers of rows that stand still. They are left out: later vectors have ``system.rows`` entries.
-        load: f, a Load or (n,) constant forces [N]; histories also by ``system.with_load``. Ground motion acts on the
-            unit translation of all displacements.
+        unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no
+            displacement of a point (a rotation); None: row node * d + c is component c of the node.
+            Components without a row stand still.
+        clamped: numbers of rows that stand still. They are left out: later vectors have
+            ``system.rows`` entries.
+        load: f, a Load or (n,) constant forces [N]; histories also by ``system.with_load``. Ground
+            motion acts on the unit translation of all displacements.
         u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
-    Raises:
-        InputError: matrices that are not real, finite, square and of one size, M that is not symmetric or has masses
+    Raises: InputError: matrices that are not real, finite, square and of one size, M that is not
+        symmetric or has masses
             below zero; coordinates, unknowns or vectors that do not fit them."""
     matrices = {
         name: _serial(name, A)
@@ -71,7 +77,8 @@ def system_from_arrays(
     for name, one in matrices.items():
         if one.csr.shape != (n, n):
             raise InputError(
-                f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square matrices of "
+                f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square "
+                "matrices of "
                 "one size"
             )
     given = {
@@ -103,8 +110,9 @@ def own_system(
     matrices: Mapping[str, Matrix],
     given: Mapping[str, Any],
 ) -> SemiDiscreteSystem:
-    """Return the system of matrices M, K and perhaps C of one size and of what is given of this rank's rows and nodes,
-    which is checked here. ``unsymmetric``: the algebra for C or K that are not symmetric. Collective."""
+    """Return the system of matrices M, K and perhaps C of one size and of what is given of this
+    rank's rows and nodes, which is checked here. ``unsymmetric``: the algebra for C or K that are
+    not symmetric. Collective."""
     comm, n = algebra.comm, matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
@@ -159,11 +167,13 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     k, d = points.shape
     if d not in (1, 2, 3):
         raise InputError(
-            f"{owner}: coordinates has shape {points.shape}; give 1, 2 or 3 coordinates of every node"
+            f"{owner}: coordinates has shape {points.shape}; give 1, 2 or 3 coordinates of every "
+            "node"
         )
     if given["unknowns"] is None and n != k * d:
         raise InputError(
-            f"{owner}: K has {n} rows, and {k} nodes have {k * d} components; give unknowns=, the node "
+            f"{owner}: K has {n} rows, and {k} nodes have {k * d} components; give unknowns=, the "
+            "node "
             "and the component of every row"
         )
     table = np.column_stack(np.divmod(np.arange(n), d))
@@ -173,7 +183,8 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     wrong = (block < 0) | (block >= k) | (component < -1) | (component >= d)
     if wrong.any():
         raise InputError(
-            f"{owner}: row {np.argmax(wrong)} of unknowns is {table[wrong][0].tolist()}; give a node from "
+            f"{owner}: row {np.argmax(wrong)} of unknowns is {table[wrong][0].tolist()}; give a "
+            "node from "
             f"0 to {k - 1} and a component from -1 to {d - 1}"
         )
     places, counts = np.unique((block * d + component)[component >= 0], return_counts=True)
@@ -185,7 +196,8 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     rows, free = integers(owner, "clamped", given["clamped"], (None,)), np.ones(n, dtype=bool)
     if len(rows) and not 0 <= rows.min() <= rows.max() < n:
         raise InputError(
-            f"{owner}: clamped goes from {rows.min()} to {rows.max()}; give numbers of rows below {n}"
+            f"{owner}: clamped goes from {rows.min()} to {rows.max()}; give numbers of rows below "
+            f"{n}"
         )
     free[rows] = False
     return points, block, component, free
@@ -208,16 +220,18 @@ def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array,
 
 
 class MatrixSpace(NodalSpace):
-    """Say what the unknowns of a user's matrices mean: a component of a node each, or no displacement of a point.
+    """Say what the unknowns of a user's matrices mean: a component of a node each, or no
+    displacement of a point.
 
-    Attributes:
-        coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1 for what is no displacement;
+    Attributes: coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1
+        for what is no displacement;
             bodies: (n,) body of each."""
 
     def __init__(
         self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix
     ) -> None:
-        """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks. Collective."""
+        """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks.
+        Collective."""
         self.algebra, self.comm, self.points = algebra, algebra.comm, points
         (k, d), n, first = points.shape, len(block), algebra.first(len(block))
         self.dimension, self.unknowns = d, round(total(self.comm, n))
@@ -234,8 +248,8 @@ class MatrixSpace(NodalSpace):
 
 
 def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
-    """Return the body (0, 1, ..., in the order of least numbers) of each owned unknown: K or a node joins those of one
-    body. ``block``: (n,) the node of each, all on one rank. Collective."""
+    """Return the body (0, 1, ..., in the order of least numbers) of each owned unknown: K or a node
+    joins those of one body. ``block``: (n,) the node of each, all on one rank. Collective."""
     n, first = K.rows, algebra.first(K.rows)
     entries, own = algebra.entries(K, np.arange(n)), first + np.arange(n)
     entries.eliminate_zeros()

@@ -1,4 +1,5 @@
-"""Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises, vectors are of numpy."""
+"""Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises,
+vectors are of numpy."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,7 +30,8 @@ RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the d
 
 
 def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
-    """Room that all matrices share, as a product needs it only for as long as it takes, and a vector in it."""
+    """Room that all matrices share, as a product needs it only for as long as it takes, and a
+    vector in it."""
     room = _ROOM.get((size, way))
     if room is None:
         _ROOM[size, way] = room = np.zeros(size)
@@ -40,8 +42,8 @@ _ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
 
 
 class PetscMatrix:
-    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat`` too unless it is
-    stored otherwise: then it is made anew (``fem.compact``)."""
+    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat``
+    too unless it is stored otherwise: then it is made anew (``fem.compact``)."""
 
     def __init__(self, mat: Any) -> None:
         self.stored = mat
@@ -86,13 +88,14 @@ class PetscMatrix:
 class PetscFactor:
     """Hold a Cholesky factor and its substitutions.
 
-    For matrices without contact unknowns, and where CHOLMOD is not to be had: PETSc's own factorisation with minimum
-    degree ordering where it serves (``own_serves``): its substitutions are 4 to 15 times as fast as those of MUMPS. On
-    several ranks each keeps a whole copy of it, so that results do not depend on the order of messages, as those of
-    MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and what is too large to be copied. Where PETSc
-    has no MUMPS its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log says so.
-    Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
-    ``symmetric`` False: LU of MUMPS."""
+    For matrices without contact unknowns, and where CHOLMOD is not to be had: PETSc's own
+    factorisation with minimum degree ordering where it serves (``own_serves``): its substitutions
+    are 4 to 15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so
+    that results do not depend on the order of messages, as those of MUMPS do. MUMPS takes the rest:
+    large 3D matrices on several ranks, and what is too large to be copied. Where PETSc has no MUMPS
+    its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log
+    says so. Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix
+    cannot be factorised. ``symmetric`` False: LU of MUMPS."""
 
     def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
         mat = matrix.mat
@@ -110,7 +113,8 @@ class PetscFactor:
         if self._by_blocks:
             self._pc.setType(kind)
             self._pc.setFactorSolverType("mumps")
-            # MUMPS may crash on distributed right-hand sides; on busy ranks 20 % of spare room may be too little (-9)
+            # MUMPS may crash on distributed right-hand sides; on busy ranks 20 % of spare room may
+            # be too little (-9)
             defaults = {"mat_mumps_icntl_14": 100, "mat_mumps_icntl_20": 0}
         elif mat.comm.size == 1:
             self._pc.setType(kind)
@@ -140,7 +144,8 @@ class PetscFactor:
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell nothing, as copies."""
+        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell
+        nothing, as copies."""
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
         count = self._pc.getFactorMatrix().getInfo()[
@@ -189,7 +194,8 @@ class PetscFactor:
 
 @contextmanager
 def _default_options(values: Mapping[str, object]) -> Iterator[None]:
-    """PETSc options of the factor that hold while it is made, unless the user has given them: others may differ."""
+    """PETSc options of the factor that hold while it is made, unless the user has given them:
+    others may differ."""
     database = PETSc.Options(PREFIX)
     added = [name for name in values if not database.hasName(name)]
     for name in added:
@@ -202,7 +208,8 @@ def _default_options(values: Mapping[str, object]) -> Iterator[None]:
 
 
 class PetscAlgebra:
-    """Make and combine PETSc matrices on one communicator; ``symmetric``: whether those of its system are."""
+    """Make and combine PETSc matrices on one communicator; ``symmetric``: whether those of its
+    system are."""
 
     symmetric = True
 
@@ -219,7 +226,8 @@ class PetscAlgebra:
                 total = mat.copy() if own else mat
                 total.scale(factor)
             else:
-                # M, C and K come from the same mesh and space: same sparsity unless a basis change dropped entries
+                # M, C and K come from the same mesh and space: same sparsity unless a basis change
+                # dropped entries
                 total.axpy(factor, mat, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
                 if not own:
                     mat.destroy()
@@ -300,7 +308,8 @@ class UnsymmetricAlgebra(PetscAlgebra):
 
 
 def triple_product(K: Any, P: Any) -> Any:
-    """Return PᵀKP of PETSc matrices, a copy: what PETSc makes holds K and P for as long as it lives."""
+    """Return PᵀKP of PETSc matrices, a copy: what PETSc makes holds K and P for as long as it
+    lives."""
     give_back(K.comm)
     product = K.PtAP(P)
     made = product.duplicate(copy=True)

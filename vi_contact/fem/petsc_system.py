@@ -34,17 +34,17 @@ def system_from_matrices(
 ) -> SemiDiscreteSystem:
     """Make the system M u'' + C u' + K u = f of PETSc matrices, on the ranks of these. Collective.
 
-    The arguments are those of ``vc.system_from_arrays``, each rank giving them for the rows that it owns and for the
-    nodes of these. Matrices are copied. Nodes are numbered in the order of ranks and coordinates: where it changes with
-    the number of ranks, as that of DOLFINx does, ``system.space.find_nodes`` finds them, and restarts keep that number.
+    The arguments are those of ``vc.system_from_arrays``, each rank giving them for the rows that it
+    owns and for the nodes of these. Matrices are copied. Nodes are numbered in the order of ranks
+    and coordinates: where it changes with the number of ranks, as that of DOLFINx does,
+    ``system.space.find_nodes`` finds them, and restarts keep that number.
 
-    Args:
-        M, C, K: AIJ matrices of one layout; M also a Vec or (n,) where lumped, C may be None.
-        coordinates: (nodes of this rank, d) [m], or a DOLFINx function space of displacements, of any degree.
-        unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each of its rows.
-        clamped: its rows that stand still, counted from 0 on every rank.
-    Raises:
-        InputError: matrices of another type, layout or communicator; what ``system_from_arrays`` refuses."""
+    Args: M, C, K: AIJ matrices of one layout; M also a Vec or (n,) where lumped, C may be None.
+        coordinates: (nodes of this rank, d) [m], or a DOLFINx function space of displacements, of
+        any degree. unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each
+        of its rows. clamped: its rows that stand still, counted from 0 on every rank.
+    Raises: InputError: matrices of another type, layout or communicator; what
+        ``system_from_arrays`` refuses."""
     given = {
         "coordinates": coordinates,
         "unknowns": unknowns,
@@ -55,7 +55,8 @@ def system_from_matrices(
     }
     if not isinstance(K, PETSc.Mat):
         raise InputError(
-            f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to vc.system_from_arrays"
+            f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to "
+            "vc.system_from_arrays"
         )
     comm = kept(K.comm.tompi4py())
     named = [("M", M), ("K", K)] + ([] if C is None else [("C", C)])
@@ -68,7 +69,8 @@ def system_from_matrices(
 
 
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
-    """A copy of this rank's rows of a matrix with the layout of K; InputError for another type or layout."""
+    """A copy of this rank's rows of a matrix with the layout of K; InputError for another type or
+    layout."""
     (n, _), (_, columns), first = K.getLocalSize(), K.getSize(), K.getOwnershipRangeColumn()[0]
     if name == "M" and not isinstance(A, PETSc.Mat):
         masses = array(OWNER, name, A.array_r if isinstance(A, PETSc.Vec) else A, (n,), unit="kg")

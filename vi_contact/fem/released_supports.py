@@ -1,13 +1,15 @@
-"""Go from a static stage to one on other supports: reactions of removed ones become forces, added ones hold the body.
+"""Go from a static stage to one on other supports: reactions of removed ones become forces, added
+ones hold the body.
 
-Dashpots hold no static load. A gravity stage therefore stands on rollers or clamps; where the dynamic stage has
-dashpots or free sides instead, what these supports carried goes on as the constant load
+Dashpots hold no static load. A gravity stage therefore stands on rollers or clamps; where the
+dynamic stage has dashpots or free sides instead, what these supports carried goes on as the
+constant load
 
     F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t     (zero where nothing was held)
 
-so that u_0, its stresses and its contact are an equilibrium of the new problem too. A support that is added holds the
-body where the stage before has left it: its own displacement counts from there. Staging as in PLAXIS, LS-DYNA
-(INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC)."""
+so that u_0, its stresses and its contact are an equilibrium of the new problem too. A support that
+is added holds the body where the stage before has left it: its own displacement counts from there.
+Staging as in PLAXIS, LS-DYNA (INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC)."""
 
 import logging
 from collections.abc import Sequence
@@ -35,12 +37,14 @@ def release(
     *,
     earlier: Sequence[ContactProblem] = (),
 ) -> tuple[ContactProblem, State]:
-    """Return (problem with the reactions of removed supports as forces, its first state at rest) after a static stage.
+    """Return (problem with the reactions of removed supports as forces, its first state at rest)
+    after a static stage.
 
-    ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same materials, loads
-    and contact points, and a motion that starts from rest. t = 0. ``earlier``: problems of the stages before
-    ``static``, whose supports may be released already. The space of ``problem`` notes where added supports hold it.
-    InputError for another mesh or other contact points, or when forces are missing where nothing was released."""
+    ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same
+    materials, loads and contact points, and a motion that starts from rest. t = 0. ``earlier``:
+    problems of the stages before ``static``, whose supports may be released already. The space of
+    ``problem`` notes where added supports hold it. InputError for another mesh or other contact
+    points, or when forces are missing where nothing was released."""
     stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
     for one in (static, problem, *stages):
         check_problem_given("release", one)
@@ -67,15 +71,16 @@ def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, 
         raise InputError("release: give two problems of fem.assemble on one mesh")
     if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
         raise InputError(
-            "the static stage and the problem have different contact points, perhaps because clamped "
+            "the static stage and the problem have different contact points, perhaps because "
+            "clamped "
             "nodes are left out: name the same points for both (points=)"
         )
     return before, after
 
 
 def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
-    """Say whether two problems of one mesh and contact hold and tie the same; the later one stands where the earlier
-    one does then. InputError for other contact points. Collective."""
+    """Say whether two problems of one mesh and contact hold and tie the same; the later one stands
+    where the earlier one does then. InputError for other contact points. Collective."""
     one, other = _spaces(before, problem)
     if largest(
         one.comm,
@@ -89,8 +94,8 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
 def started(
     problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
 ) -> tuple[ContactProblem, State]:
-    """Return the problem that begins with u0, v0 (its own unknowns) and has a constant force [N] more; that beginning
-    with the contact of another state."""
+    """Return the problem that begins with u0, v0 (its own unknowns) and has a constant force [N]
+    more; that beginning with the contact of another state."""
     surface, system, load = problem.surface, problem.system, problem.system.load
 
     def turned(x: Array) -> Array:
@@ -104,14 +109,16 @@ def started(
 
 
 def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
-    """F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t; InputError where it is not zero and nothing was held."""
+    """F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t; InputError where it is not zero and nothing was
+    held."""
     elastic = problem.system.K @ u0
     force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
     missing = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
     missing = problem.surface.comm.max(missing)
     if missing[0] > BALANCED * max(missing[1:]):
         raise InputError(
-            f"{missing[0]:.3g} N are missing where no support was released: give both stages the same "
+            f"{missing[0]:.3g} N are missing where no support was released: give both stages the "
+            "same "
             "materials, loads and friction, and a motion that starts from rest"
         )
     log.info(
@@ -123,8 +130,9 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
 def removed_support(
     before: ContactProblem, after: ContactProblem, force: Array
 ) -> tuple[str, float]:
-    """Return (name, reaction [N]) of the support that ``after`` does without and that carries most of this force; ""
-    for none. The reaction is its resultant, or its largest nodal force where this is larger. Collective."""
+    """Return (name, reaction [N]) of the support that ``after`` does without and that carries most
+    of this force; "" for none. The reaction is its resultant, or its largest nodal force where this
+    is larger. Collective."""
     (old, new), found = _spaces(before, after), [("", 0.0)]
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
@@ -143,7 +151,8 @@ def removed_support(
 
 
 def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
-    """Let what ``after`` holds in addition stay where the body is; (k, d) mask of what stays off its own place."""
+    """Let what ``after`` holds in addition stay where the body is; (k, d) mask of what stays off
+    its own place."""
     stays = np.where(after.held & ~before.held, nodal, 0.0)
     if before.stands is not None:
         stays = np.where(after.held & before.held, before.stands, stays)
@@ -152,7 +161,8 @@ def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
 
 
 def _beside(space: FemSpace, chosen: Mask) -> Mask:
-    """All components of the owned nodes that share a cell, of any rank, with nodes of chosen components (k, d)."""
+    """All components of the owned nodes that share a cell, of any rank, with nodes of chosen
+    components (k, d)."""
     numbers = np.concatenate(from_each(space.comm, space.nodes[chosen.any(axis=1)]))
     cells = space.node_of_block[compat.cell_blocks(space.V)]
     near = np.concatenate(
@@ -164,7 +174,8 @@ def _beside(space: FemSpace, chosen: Mask) -> Mask:
 def _refuse_moved(
     static: ContactProblem, state: State, nodal: Array, problem: ContactProblem, begun: State
 ) -> None:
-    """The new supports must hold the body, and what its contact points face, where the static stage has left it."""
+    """The new supports must hold the body, and what its contact points face, where the static stage
+    has left it."""
     there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
     before = static.surface.gap(state.t) - static.surface.normal_values(state.u)
     after = problem.surface.gap(0.0) - problem.surface.normal_values(begun.u)
@@ -172,7 +183,8 @@ def _refuse_moved(
     distance, size = problem.surface.comm.max(np.array([away, max_abs(nodal.ravel())]))
     if distance > BALANCED * size:
         raise InputError(
-            f"a support or tie of the problem is {distance:.3g} m away from where the static stage has "
+            f"a support or tie of the problem is {distance:.3g} m away from where the static stage "
+            "has "
             "left the body: hold or tie it there in both stages, or free it in both"
         )
 

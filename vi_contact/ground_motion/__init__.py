@@ -1,4 +1,5 @@
-"""Read, write, process and make ground motions: record files, spectra, intensity measures, synthetic motions.
+"""Read, write, process and make ground motions: record files, spectra, intensity measures,
+synthetic motions.
 
 ``read_record`` reads one, ``Processing`` makes another of it, ``GroundMotion`` shakes with it: docs/guide/records.md.
 >>> from vi_contact.ground_motion import Record, pga, scaled

@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .chain import Processing as Processing
 from .chain import scaled_to_arias as scaled_to_arias
 from .chain import scaled_to_pga as scaled_to_pga

@@ -28,16 +28,19 @@ LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Describe equally spaced accelerations: sample k is the acceleration at t = k · dt, the first one at t = 0.
+    """Describe equally spaced accelerations: sample k is the acceleration at t = k · dt, the first
+    one at t = 0.
 
-    acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0; title; source: path of
-    the file; format: name of its format; units: of the file, before conversion to m/s²; sha256: of the file's bytes;
-    notes: what the file says about station and processing, then every change made since, one line each; station and
-    component (direction): as the file names them, empty where it does not; units_from, dt_from, samples_from: where the
-    units, the time step and the number of samples come from ("header, line 4", "option", "counted"); doubts: what was
-    read in one of several ways that were possible, one sentence each.
-    Between samples the acceleration is a straight line. Two records are equal only if they are the same object.
-    Raises InputError for NaN or infinite samples, fewer than two of them, or a time step that is not positive."""
+    acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0;
+    title; source: path of the file; format: name of its format; units: of the file, before
+    conversion to m/s²; sha256: of the file's bytes; notes: what the file says about station and
+    processing, then every change made since, one line each; station and component (direction): as
+    the file names them, empty where it does not; units_from, dt_from, samples_from: where the
+    units, the time step and the number of samples come from ("header, line 4", "option",
+    "counted"); doubts: what was read in one of several ways that were possible, one sentence each.
+    Between samples the acceleration is a straight line. Two records are equal only if they are the
+    same object. Raises InputError for NaN or infinite samples, fewer than two of them, or a time
+    step that is not positive."""
 
     acceleration: Array
     dt: float
@@ -123,11 +126,13 @@ def known_units(units: str) -> str | None:
 
 @checked
 def canonical_units(source: str, units: str) -> str:
-    """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if there is none."""
+    """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if
+    there is none."""
     text = known_units(units) if isinstance(units, str) else None
     if text is None:
         raise InputError(
-            f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
+            f"{source}: {units!r} is not a unit of acceleration known here; use a file of "
+            "accelerations "
             f"in one of {', '.join(UNITS)}"
         )
     return text

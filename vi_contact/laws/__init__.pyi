@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .excitation import FullSine as FullSine
 from .excitation import HalfSine as HalfSine
 from .excitation import Harmonic as Harmonic

@@ -1,9 +1,10 @@
 """Shake the body: scalar ground accelerations a(t) [m/s²] along a fixed direction.
 
-An excitation is a frozen value with `acceleration(t)` (a float), `direction` (a tuple of d components) and `duration`
-(the time [s] after which it is zero, or negligible, for good); called, it returns the vector a(t) · direction of shape
-(d,). The direction is used as given, never normalised: (1, 0.5) shakes the second axis half as much. The vector is the
-acceleration of the ground; in the frame that moves with the ground it loads the body with -M r a(t). Horizontal and
+An excitation is a frozen value with `acceleration(t)` (a float), `direction` (a tuple of d
+components) and `duration` (the time [s] after which it is zero, or negligible, for good); called,
+it returns the vector a(t) · direction of shape (d,). The direction is used as given, never
+normalised: (1, 0.5) shakes the second axis half as much. The vector is the acceleration of the
+ground; in the frame that moves with the ground it loads the body with -M r a(t). Horizontal and
 vertical motion together are a sequence of excitations."""
 
 import math
@@ -22,7 +23,8 @@ from ..core.protocols import check_excitation, finite_tuple, vector
 class Harmonic:
     """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
 
-    amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or not finite."""
+    amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or
+    not finite."""
 
     amplitude: float
     frequency: float
@@ -42,11 +44,13 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ricker:
-    """Shake with a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker, Geophysics 18, 1953).
+    """Shake with a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker,
+    Geophysics 18, 1953).
 
-    amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the time of the peak, by
-    default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a jump. Velocity and
-    displacement both return to zero. Raises InputError for values out of range or not finite."""
+    amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the
+    time of the peak, by default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller
+    one starts with a jump. Velocity and displacement both return to zero. Raises InputError for
+    values out of range or not finite."""
 
     amplitude: float
     frequency: float
@@ -77,7 +81,8 @@ class Ricker:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Hold what one-sided and two-sided pulses share; amplitude [m/s²] is finite and duration [s] > 0 (InputError)."""
+    """Hold what one-sided and two-sided pulses share; amplitude [m/s²] is finite and duration [s] >
+    0 (InputError)."""
 
     amplitude: float
     duration: float
@@ -87,7 +92,8 @@ class Pulse:
         check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
-        """Return the acceleration [m/s²] inside the pulse, 0 outside; the value at a jump is the one after it."""
+        """Return the acceleration [m/s²] inside the pulse, 0 outside; the value at a jump is the
+        one after it."""
         return self.amplitude * self._shape(t) if 0.0 <= t < self.duration else 0.0
 
     def _shape(self, t: float) -> float:
@@ -98,7 +104,8 @@ class Pulse:
 
 @dataclass(frozen=True)
 class HalfSine(Pulse):
-    """Shake with a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero elsewhere."""
+    """Shake with a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero
+    elsewhere."""
 
     def _shape(self, t: float) -> float:
         return math.sin(math.pi * t / self.duration)
@@ -106,7 +113,8 @@ class HalfSine(Pulse):
 
 @dataclass(frozen=True)
 class FullSine(Pulse):
-    """Shake with a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity ends at zero."""
+    """Shake with a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity
+    ends at zero."""
 
     def _shape(self, t: float) -> float:
         return math.sin(2.0 * math.pi * t / self.duration)
@@ -119,9 +127,11 @@ class Rectangular(Pulse):
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before and after them.
+    """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before
+    and after them.
 
-    times: strictly increasing, at least two; values: as many, kept as tuples. InputError for others, NaN, infinity."""
+    times: strictly increasing, at least two; values: as many, kept as tuples. InputError for
+    others, NaN, infinity."""
 
     times: Sequence[float]
     values: Sequence[float]
@@ -139,7 +149,8 @@ class Tabulated:
         for k, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
                 raise InputError(
-                    f"Tabulated: times[{k + 1}] = {after!r} does not come after times[{k}] = {before!r}; "
+                    f"Tabulated: times[{k + 1}] = {after!r} does not come after times[{k}] = "
+                    f"{before!r}; "
                     "give strictly increasing times"
                 )
 

@@ -1,12 +1,14 @@
 """Bound friction: how large the tangential reaction may be, and the projection onto that disk.
 
-With r_n >= 0 the normal reaction of a contact node and r_t its tangential reaction (d - 1 components), every law says
+With r_n >= 0 the normal reaction of a contact node and r_t its tangential reaction (d - 1
+components), every law says
 
     |r_t| <= limit,      r_t along the slip rate when |r_t| = limit
 
-and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0). Reactions are forces
-[N] for displacement schemes and impulses [N s] for velocity schemes; `scale` (1 or the time step [s]) is the factor
-between the two, so that a stress times a nodal weight becomes either. The slope may depend on the slip rate: `at`."""
+and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0).
+Reactions are forces [N] for displacement schemes and impulses [N s] for velocity schemes; `scale`
+(1 or the time step [s]) is the factor between the two, so that a stress times a nodal weight
+becomes either. The slope may depend on the slip rate: `at`."""
 
 import math
 from collections.abc import Callable
@@ -22,10 +24,11 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class Tresca:
-    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches: limit = threshold · weight · scale.
+    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches: limit = threshold ·
+    weight · scale.
 
-    ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or
-    not a finite number, and, when used, for a wrong count."""
+    ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when
+    one is negative or not a finite number, and, when used, for a wrong count."""
 
     never_negative: ClassVar[bool] = True  # it has checked its values
     threshold: float | Array | tuple[float, ...]
@@ -56,8 +59,9 @@ class Tresca:
 class Coulomb:
     """Bound dry friction by a coefficient mu >= 0: limit = mu · r_n, zero for an open node.
 
-    ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised when one is negative
-    or not a finite number, and, when the law is used, if their count is wrong."""
+    ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised
+    when one is negative or not a finite number, and, when the law is used, if their count is
+    wrong."""
 
     never_negative: ClassVar[bool] = True  # it has checked its values
     mu: float | Array | tuple[float, ...]
@@ -66,7 +70,8 @@ class Coulomb:
         object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu · max(r_n, 0), shape (n,): tension, of a held point or on the way to an answer, rubs on nothing."""
+        """Return mu · max(r_n, 0), shape (n,): tension, of a held point or on the way to an answer,
+        rubs on nothing."""
         return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
     def slope(self, weights: Array) -> Array:
@@ -82,10 +87,12 @@ class Coulomb:
 class SlipRateCoulomb:
     """Bound dry friction by a coefficient that depends on the slip rate: limit = mu(|v|) · r_n.
 
-    ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape (n,), and returns as
-    many coefficients, or one. InputError for no function and, when used, a negative or infinite coefficient.
+    ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape
+    (n,), and returns as many coefficients, or one. InputError for no function and, when used, a
+    negative or infinite coefficient.
 
-    Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the static coefficient."""
+    Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the
+    static coefficient."""
 
     mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"
 
@@ -102,14 +109,16 @@ class SlipRateCoulomb:
         found = np.asarray(values)
         if found.dtype.kind not in "iuf" or found.shape not in ((), speed.shape):
             raise InputError(
-                f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for {len(speed)} "
+                f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for "
+                f"{len(speed)} "
                 "slip rates; return one real coefficient per rate"
             )
         found = np.broadcast_to(found.astype(float), speed.shape)
         wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
         if len(wrong):
             raise InputError(
-                f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it return "
+                f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it "
+                "return "
                 "zero or a positive finite number for every slip rate from 0 on"
             )
         return Coulomb(found)
@@ -125,7 +134,8 @@ class SlipRateCoulomb:
 
 @dataclass(frozen=True)
 class TwoCoefficients:
-    """Hold static and kinetic coefficients: numbers >= 0, or one per contact point. InputError for other values."""
+    """Hold static and kinetic coefficients: numbers >= 0, or one per contact point. InputError for
+    other values."""
 
     mu_s: float | Array | tuple[float, ...]
     mu_k: float | Array | tuple[float, ...]
@@ -157,7 +167,8 @@ class TwoCoefficients:
 
 @dataclass(frozen=True)
 class ExponentialDecay(TwoCoefficients):
-    """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
+    """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed
+    v_c [m/s] > 0.
 
     mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values."""
 
@@ -179,7 +190,8 @@ class ExponentialDecay(TwoCoefficients):
 
 @dataclass(frozen=True)
 class StaticKinetic(TwoCoefficients):
-    """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both hold, rest is chosen.
+    """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both
+    hold, rest is chosen.
 
     mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values."""
 
@@ -197,10 +209,12 @@ class StaticKinetic(TwoCoefficients):
 
 
 def project(r_t: Array, limit: Array) -> Array:
-    """Return the nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|), node by node.
+    """Return the nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|),
+    node by node.
 
-    r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node that cannot slip.
-    Returns a new array of the shape of r_t. Raises InputError when the shapes do not match."""
+    r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node
+    that cannot slip. Returns a new array of the shape of r_t. Raises InputError when the shapes do
+    not match."""
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
         raise InputError(
             f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
@@ -217,7 +231,8 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
     for one in value if field else [value]:
         if not 0.0 <= real(one) < math.inf:
             raise InputError(
-                f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one per "
+                f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one "
+                "per "
                 "point"
             )
     return tuple(float(one) for one in value) if field else value

@@ -1,16 +1,20 @@
 """Change velocities after an impact: inelastic collision, velocity reversal, Newton's restitution.
 
-After each step a law says which normal velocity every contact condition shall have, and an update gives it to v:
+After each step a law says which normal velocity every contact condition shall have, and an update
+gives it to v:
 
-* ``ComponentReset`` sets the components, as the boundary method does. With a consistent mass this is not an impulse:
-  its energy change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books it with its sign.
-* ``ImpulseUpdate`` applies the impulse on the contact unknowns that produces them, the M-orthogonal projection
-  v⁺ = v⁻ + M⁻¹Bᵀ(B M⁻¹Bᵀ)⁻¹(target - B v⁻); identical for lumped masses. It takes ½ (v⁻ - v⁺)ᵀM(v⁻ - v⁺) for target 0.
+* ``ComponentReset`` sets the components, as the boundary method does. With a consistent mass this
+  is not an impulse: its energy change ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ may have either sign and the ledger books
+  it with its sign.
+* ``ImpulseUpdate`` applies the impulse on the contact unknowns that produces them, the M-orthogonal
+  projection v⁺ = v⁻ + M⁻¹Bᵀ(B M⁻¹Bᵀ)⁻¹(target - B v⁻); identical for lumped masses. It takes ½ (v⁻
+  - v⁺)ᵀM(v⁻ - v⁺) for target 0.
 
-A law sees the velocity before the contact (the old state's) and the one the step left. Restitution refers to the
-former: what the step leaves of the approach depends on when in the step the gap closed. The step's contact work and the
-impact loss are therefore to be read together: what the step took beyond the collision, the law gives back. Restitution
-here is a nodal law; on a fine mesh it has no macroscopic effect."""
+A law sees the velocity before the contact (the old state's) and the one the step left. Restitution
+refers to the former: what the step leaves of the approach depends on when in the step the gap
+closed. The step's contact work and the impact loss are therefore to be read together: what the step
+took beyond the collision, the law gives back. Restitution here is a nodal law; on a fine mesh it
+has no macroscopic effect."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -31,7 +35,9 @@ from ..core.system import SemiDiscreteSystem
 
 BELOW = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
 STORED = 20  # entries a row of M⁻¹Bᵀ: half a substitution reads more in two dimensions
-IN_PLANE = 6  # times as many unknowns as beside the steps: factors are sparse there, and impacts come in every step
+# times as many unknowns as beside the steps: factors are sparse there, and impacts come in every
+# step
+IN_PLANE = 6
 UPDATE = "give ComponentReset() or ImpulseUpdate()"
 
 
@@ -41,15 +47,17 @@ class VelocityUpdate(Protocol):
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they are not NaN."""
+        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they
+        are not NaN."""
 
 
 @dataclass(frozen=True)
 class ComponentReset:
     """Set the normal components: the literal rule of the boundary method.
 
-    At a corner with oblique faces of which some only are closed the velocity of the node changes along the normals of
-    these, and with it the normal components on its other faces, as at any other node."""
+    At a corner with oblique faces of which some only are closed the velocity of the node changes
+    along the normals of these, and with it the normal components on its other faces, as at any
+    other node."""
 
     by_rows: ClassVar[bool] = True
 
@@ -63,12 +71,14 @@ class ComponentReset:
 
 @dataclass(frozen=True)
 class ImpulseUpdate:
-    """Apply an impulse on the chosen contact unknowns: the M-orthogonal projection onto the wanted velocities.
+    """Apply an impulse on the chosen contact unknowns: the M-orthogonal projection onto the wanted
+    velocities.
 
-    The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it decays to round-off
-    within thirty elements; else an impact costs half a substitution (``core.condensation``). Large systems, from 50 000
-    unknowns in space and 300 000 in the plane, are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by
-    conjugate gradients to round-off at every impact."""
+    The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it
+    decays to round-off within thirty elements; else an impact costs half a substitution
+    (``core.condensation``). Large systems, from 50 000 unknowns in space and 300 000 in the plane,
+    are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to round-off
+    at every impact."""
 
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
@@ -153,9 +163,11 @@ class Inelastic(ByUpdate):
 
 @dataclass(frozen=True)
 class Newton(ByUpdate):
-    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed are left to the step.
+    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed
+    are left to the step.
 
-    v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed at every dt."""
+    v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed
+    at every dt."""
 
     e: float
     update: VelocityUpdate = field(default_factory=ComponentReset)

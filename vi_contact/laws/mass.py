@@ -1,9 +1,10 @@
-"""Choose the mass matrix of the equations of motion: consistent, or without inertia at the contact nodes.
+"""Choose the mass matrix of the equations of motion: consistent, or without inertia at the contact
+nodes.
 
-With mass at the contact nodes every closure is an impact of that mass: forces ring and, with contact in the
-acceleration balance, energy grows. Without it the contact unknowns follow the body statically (Khenous, Laborde and
-Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete problem has a unique energy-conserving solution, and
-contact forces are those of the waves alone."""
+With mass at the contact nodes every closure is an impact of that mass: forces ring and, with
+contact in the acceleration balance, energy grows. Without it the contact unknowns follow the body
+statically (Khenous, Laborde and Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete
+problem has a unique energy-conserving solution, and contact forces are those of the waves alone."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,23 +37,26 @@ class ConsistentMass:
 
 @dataclass(frozen=True)
 class Redistributed:
-    """Take the mass from the normal unknowns of all contact nodes; with friction also from ``tangential`` ones.
+    """Take the mass from the normal unknowns of all contact nodes; with friction also from
+    ``tangential`` ones.
 
-    M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every contact node the velocity
-    of the rigid motion that fits its neighbours behind the surface best: it hands the node's mass to them, keeps every
-    rigid motion as it is, and makes M* positive semidefinite. The nodal masses D, polynomials of degree 2 in the
-    coordinates times those of M and of the order of (mesh size / body size)², restore what the lumping changed: the
-    mass matrix of rigid motions (total mass, centre of mass, all moments and products of inertia) of every body; in 1D
-    also what the shift by one element changed, centre and second moment. Damping sees the same velocities, C* = PᵀCP:
-    a force on massless unknowns that depends on their rate would ring. Bodies with tied sides cannot turn: of them the
-    total mass is kept.
+    M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every
+    contact node the velocity of the rigid motion that fits its neighbours behind the surface best:
+    it hands the node's mass to them, keeps every rigid motion as it is, and makes M* positive
+    semidefinite. The nodal masses D, polynomials of degree 2 in the coordinates times those of M
+    and of the order of (mesh size / body size)², restore what the lumping changed: the mass matrix
+    of rigid motions (total mass, centre of mass, all moments and products of inertia) of every
+    body; in 1D also what the shift by one element changed, centre and second moment. Damping sees
+    the same velocities, C* = PᵀCP: a force on massless unknowns that depends on their rate would
+    ring. Bodies with tied sides cannot turn: of them the total mass is kept.
 
-    ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
-    the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). Row sums of P2 are zero at the vertices
-    of plane triangles, which does no harm, and may be negative on curved ones: those want lumping 0. P2 tetrahedra are
-    not lumped: their vertices would bear it all, and frequencies fall by per cents. InputError for lumping outside
-    [0, 1] or above 0 with negative row sums, a contact node with no material behind it, or a mesh too coarse to hold
-    the inertia."""
+    ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high
+    frequencies ahead of the wave, lumped mass leaves them behind (table in docs/guide/schemes.md).
+    Row sums of P2 are zero at the vertices of plane triangles, which does no harm, and may be
+    negative on curved ones: those want lumping 0. P2 tetrahedra are not lumped: their vertices
+    would bear it all, and frequencies fall by per cents. InputError for lumping outside [0, 1] or
+    above 0 with negative row sums, a contact node with no material behind it, or a mesh too coarse
+    to hold the inertia."""
 
     lumping: float = 0.4
 
@@ -75,7 +79,8 @@ class Redistributed:
             lumping = 0.0
         elif largest(algebra.comm, still.any()):
             raise InputError(
-                "redistributed mass is for displacements only, and M has the inertia of rotations or of "
+                "redistributed mass is for displacements only, and M has the inertia of rotations "
+                "or of "
                 "other unknowns: give the problem mass=ConsistentMass()"
             )
         wrong = int(
@@ -83,7 +88,8 @@ class Redistributed:
         )  # as of elements of higher order
         if wrong and lumping:
             raise InputError(
-                f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have them: "
+                f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have "
+                "them: "
                 "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()"
             )
         nodal = own if wrong else np.maximum(nodal, 0.0)
@@ -135,8 +141,8 @@ def _contact_unknowns(
 def _inertia_correction(
     system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array
 ) -> Matrix:
-    """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d) matrix of polynomials of
-    degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
+    """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d)
+    matrix of polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
     comm, d = system.algebra.comm, system.influence.shape[1]
     points = system.space.coordinates
     high = comm.max(np.max(points[body], axis=0, initial=-np.inf))
@@ -155,7 +161,8 @@ def _inertia_correction(
     )
     pairs = list(_pairs_of_components(system, inner))
     shapes = [powers[i] @ _orthonormal(comm, powers[i], nodal[i]) for i, _ in pairs]
-    # an off-diagonal mass stands in two places: with this factor "smallest" does not depend on the axes
+    # an off-diagonal mass stands in two places: with this factor "smallest" does not depend on the
+    # axes
     shapes = [
         shape * (1.0 if i is j else np.sqrt(2.0))
         for shape, (i, j) in zip(shapes, pairs, strict=True)
@@ -176,7 +183,8 @@ def _inertia_correction(
     if moved_most > LARGEST_CORRECTION:
         raise InputError(
             "the mesh is too coarse for redistributed mass, which would change nodal "
-            f"masses by {100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()"
+            f"masses by {100 * moved_most:.0f} %: refine it, or give the problem "
+            "mass=ConsistentMass()"
         )
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
@@ -185,8 +193,9 @@ def _inertia_correction(
 
 
 def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
-    """Columns c such that the polynomials powers @ c are orthonormal with the nodal masses as weights: with them the
-    smallest coefficients are the smallest changes of nodal masses. Dependent polynomials are left out."""
+    """Columns c such that the polynomials powers @ c are orthonormal with the nodal masses as
+    weights: with them the smallest coefficients are the smallest changes of nodal masses. Dependent
+    polynomials are left out."""
     values, vectors = np.linalg.eigh(comm.sum(powers.T @ (nodal[:, None] * powers)))
     kept = values > 1e-10 * values[-1]
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
@@ -195,7 +204,8 @@ def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
 def _pairs_of_components(
     system: SemiDiscreteSystem, inner: Mask
 ) -> Iterator[tuple[Indices, Indices]]:
-    """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c <= e."""
+    """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c
+    <= e."""
     d = system.influence.shape[1]
     mine = np.flatnonzero(inner)
     numbers, component = np.divmod(np.asarray(system.space.ids)[mine], d)

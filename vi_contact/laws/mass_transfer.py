@@ -1,7 +1,8 @@
-"""Give contact nodes the velocity of the nodes behind them: how redistributed mass leaves the contact surface.
+"""Give contact nodes the velocity of the nodes behind them: how redistributed mass leaves the
+contact surface.
 
-A massless unknown i at node c, with direction q_i, gets the velocity of the rigid motion a that fits its neighbours J
-best, weighted with their entries w_J of the mass matrix:
+A massless unknown i at node c, with direction q_i, gets the velocity of the rigid motion a that
+fits its neighbours J best, weighted with their entries w_J of the mass matrix:
 
     v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J,   R = (q, q·(e_k x (X - X_c)) for rotations k)
 
@@ -25,10 +26,12 @@ NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 def from_neighbours(
     system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array
 ) -> list[Matrix]:
-    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those of contact nodes.
+    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those
+    of contact nodes.
 
-    Contact nodes with neighbours behind the surface come last in the product; those in corners, with contact nodes
-    around, follow them, and tied ones, which are in two places. InputError for contact nodes without material behind.
+    Contact nodes with neighbours behind the surface come last in the product; those in corners,
+    with contact nodes around, follow them, and tied ones, which are in two places. InputError for
+    contact nodes without material behind.
     """
     algebra, comm = system.algebra, system.algebra.comm
     node = np.asarray(system.space.ids) // system.influence.shape[1]
@@ -57,8 +60,8 @@ def from_neighbours(
 def _rows(
     system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
 ) -> tuple[Indices, sp.csr_matrix]:
-    """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors; ``exact``: enough
-    of them to keep every rigid motion. Collective."""
+    """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors;
+    ``exact``: enough of them to keep every rigid motion. Collective."""
     asked = np.flatnonzero(left)
     entries = system.algebra.entries(system.M, asked)
     neighbours = _neighbours(system, donors, entries.indices)
@@ -97,7 +100,8 @@ def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
 
 @dataclass(frozen=True)
 class _Neighbours:
-    """Unknowns of all donor nodes next to the contact nodes of this rank, and some others, sorted by column.
+    """Unknowns of all donor nodes next to the contact nodes of this rank, and some others, sorted
+    by column.
 
     columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d)."""
 
@@ -136,8 +140,9 @@ class _Neighbours:
     def fit(
         self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
     ) -> tuple[Array, Array]:
-        """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid motion each loses); with
-        ``turning`` False of translations only, which a single neighbour can tell."""
+        """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid
+        motion each loses); with ``turning`` False of translations only, which a single neighbour
+        can tell."""
         offset = self.points[used] - points[:, None, :]
         size = np.max(np.abs(offset), axis=(1, 2))[:, None, None]
         R = rigid_motions(self.directions[used], offset / size)
@@ -157,7 +162,8 @@ class _Neighbours:
 
 
 def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
-    """What this rank needs of the donor nodes in these columns; what other ranks own is told to all. Collective."""
+    """What this rank needs of the donor nodes in these columns; what other ranks own is told to
+    all. Collective."""
     d, first = system.influence.shape[1], system.algebra.first(system.rows)
     node, every = np.asarray(system.space.ids) // d, system.space.coordinates
 
@@ -190,7 +196,8 @@ def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
-    """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions (…, d) at offsets."""
+    """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions
+    (…, d) at offsets."""
     d = directions.shape[-1]
     turns = [
         directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]

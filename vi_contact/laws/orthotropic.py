@@ -1,4 +1,5 @@
-"""Describe orthotropic elasticity: nine engineering constants along three material axes at right angles."""
+"""Describe orthotropic elasticity: nine engineering constants along three material axes at right
+angles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,14 +27,14 @@ class Orthotropic:
 
     with i != j: nu_ij is the contraction along j under a stress along i alone.
 
-    Args:
-        E1, E2, E3: Young's moduli [Pa] > 0; G12, G13, G23: shear moduli [Pa] > 0; rho: mass density [kg/m³] > 0.
-        nu12, nu13, nu23: Poisson's ratios.
-        axes: the angle [rad] from x to axis 1, anticlockwise about z, which is axis 3; or a rotation matrix (3, 3)
+    Args: E1, E2, E3: Young's moduli [Pa] > 0; G12, G13, G23: shear moduli [Pa] > 0; rho: mass
+        density [kg/m³] > 0. nu12, nu13, nu23: Poisson's ratios. axes: the angle [rad] from x to
+        axis 1, anticlockwise about z, which is axis 3; or a rotation matrix (3, 3)
             whose columns are the axes 1, 2, 3. A body in the plane needs z among the axes.
-        xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads it.
-    Raises:
-        InputError: a modulus or density that is not positive, ratios with which some strain would have negative energy,
+        xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads
+            it.
+    Raises: InputError: a modulus or density that is not positive, ratios with which some strain
+        would have negative energy,
             axes that are no rotation."""
 
     E1: float
@@ -58,14 +59,16 @@ class Orthotropic:
         root = np.sqrt([self.E1, self.E2, self.E3])
         if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
             raise InputError(
-                f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = {self.nu23:g} "
+                f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = "
+                f"{self.nu23:g} "
                 "some strain has no positive energy at these moduli; give ratios nu_ij well below "
                 "sqrt(E_i / E_j)"
             )
         Q = self._rotation
         if not np.allclose(Q.T @ Q, np.eye(3), atol=1e-9) or np.linalg.det(Q) < 0.0:
             raise InputError(
-                "Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose columns are "
+                "Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose "
+                "columns are "
                 "right-handed unit vectors at right angles"
             )
 
@@ -99,9 +102,11 @@ class Orthotropic:
         return np.einsum("ip,jq,kr,ls,pqrs->ijkl", Q, Q, Q, Q, C, optimize=True)
 
     def matrix(self, section: Section, dimension: int) -> Array:
-        """Return the stresses (rows in the order of ``VOIGT``, in the plane then sigma_zz) of unit strains [Pa].
+        """Return the stresses (rows in the order of ``VOIGT``, in the plane then sigma_zz) of unit
+        strains [Pa].
 
-        (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and on a line."""
+        (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and
+        on a line."""
         if dimension not in VOIGT:
             raise InputError(
                 "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"
@@ -113,7 +118,8 @@ class Orthotropic:
             ]  # shear across the plane by strains in it
             if out.max() > ROUND_OFF * C.max():
                 raise InputError(
-                    "Orthotropic: z is not one of the material axes, so the body would leave its plane; "
+                    "Orthotropic: z is not one of the material axes, so the body would leave its "
+                    "plane; "
                     "give the angle of axis 1 in the plane"
                 )
             if isinstance(section, PlaneStress):

@@ -26,11 +26,13 @@ def with_weight(
 ) -> SemiDiscreteSystem:
     """Return the same system under its own weight, f + M r g: whatever its materials and densities.
 
-    acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
-    (-1,). bodies: the numbers of those that have weight (``fem.bodies_of``), all by default. It is the load of
-    ``BodyForce`` with the density of every material. InputError for a direction of another length, and a system without
-    ``base_inertia``: it lost the mass at held nodes; for weight that no unknown feels; and for weight that the system
-    has already, as a constant load of nearly its size: of ``BodyForce``, or of this function. Collective."""
+    acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by
+    default, in one dimension (-1,). bodies: the numbers of those that have weight
+    (``fem.bodies_of``), all by default. It is the load of ``BodyForce`` with the density of every
+    material. InputError for a direction of another length, and a system without ``base_inertia``:
+    it lost the mass at held nodes; for weight that no unknown feels; and for weight that the system
+    has already, as a constant load of nearly its size: of ``BodyForce``, or of this function.
+    Collective."""
     instance(
         "with_weight",
         "system",
@@ -44,7 +46,8 @@ def with_weight(
     way = array("with_weight", "direction", down if direction is None else direction, (None,))
     if way.shape != (d,) or not np.isclose(np.linalg.norm(way), 1.0):
         raise InputError(
-            f"the direction of gravity is {tuple(way)}: give {d} components of a vector of length one"
+            f"the direction of gravity is {tuple(way)}: give {d} components of a vector of length "
+            "one"
         )
     if system.base_mass is None:
         raise InputError("the weight needs the mass at held nodes: assemble with base_inertia=True")
@@ -63,15 +66,18 @@ def with_weight(
 
 
 def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
-    """Raise InputError, on all ranks, for weight that nothing feels, or that the constant loads hold already."""
+    """Raise InputError, on all ranks, for weight that nothing feels, or that the constant loads
+    hold already."""
     comm = system.algebra.comm
     size = largest(comm, max_abs(weight))
     if not size:
         raise InputError(
-            "with_weight: no unknown feels the weight, as its acceleration is zero or its bodies are held "
+            "with_weight: no unknown feels the weight, as its acceleration is zero or its bodies "
+            "are held "
             "everywhere; leave it out"
         )
-    # Body by body: of how many unknowns the constant load is the weight. Tractions touch few, a weight nearly all.
+    # Body by body: of how many unknowns the constant load is the weight. Tractions touch few, a
+    # weight nearly all.
     numbers = np.asarray(system.space.bodies)
     heavy = np.abs(weight) > NOTHING * size
     alike = heavy & (np.abs(system.load.constant - weight) <= ALIKE * np.abs(weight))
@@ -81,6 +87,7 @@ def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
     )
     if np.any((doubled > 0.0) & (doubled >= SHARE * having)):
         raise InputError(
-            "with_weight: the system has this weight already among its constant loads, as a BodyForce or "
+            "with_weight: the system has this weight already among its constant loads, as a "
+            "BodyForce or "
             "from an earlier with_weight, and would weigh twice as much; leave one of the two out"
         )

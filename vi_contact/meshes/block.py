@@ -1,7 +1,9 @@
-"""Mesh a bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
+"""Mesh a bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body
+of most tests.
 
-Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z,
-front towards the viewer). A bar has the first two, a rectangle four, a box six."""
+Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y),
+"back", "front" (z, front towards the viewer). A bar has the first two, a rectangle four, a box
+six."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,8 +24,9 @@ SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 class BlockMesh:
     """Describe a mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
-    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the
-    origin (the z axis in space). `deform` takes and returns points (n, d) [m]. InputError if the sizes make no box."""
+    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle`
+    [rad] about the origin (the z axis in space). `deform` takes and returns points (n, d) [m].
+    InputError if the sizes make no box."""
 
     lengths: tuple[float, ...] = (1.0, 1.0)
     divisions: tuple[int, ...] = (1, 1)
@@ -37,7 +40,8 @@ class BlockMesh:
         check_box(self.lengths, self.divisions)
         if self.corner is not None and len(self.corner) != len(self.lengths):
             raise InputError(
-                f"block corner is {self.corner}: give {len(self.lengths)} coordinates, one per length"
+                f"block corner is {self.corner}: give {len(self.lengths)} coordinates, one per "
+                "length"
             )
         if self.angle and len(self.lengths) == 1:
             raise InputError(
@@ -54,7 +58,8 @@ class BlockMesh:
             moved = np.asarray(self.deform(straight))
             if moved.shape != straight.shape:
                 raise InputError(
-                    f"deform returned shape {moved.shape} for points {straight.shape}: return that shape"
+                    f"deform returned shape {moved.shape} for points {straight.shape}: return that "
+                    "shape"
                 )
             nodes = moved.reshape(nodes.shape)
         if self.angle:
@@ -74,10 +79,12 @@ class BlockMesh:
 
 
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
-    """Raise InputError unless there are 1 to 3 positive lengths [m], each with a positive number of divisions."""
+    """Raise InputError unless there are 1 to 3 positive lengths [m], each with a positive number of
+    divisions."""
     if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
         raise InputError(
-            f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of both"
+            f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of "
+            "both"
         )
     if not all(math.isfinite(length) and length > 0.0 for length in lengths):
         raise InputError(f"lengths is {tuple(lengths)}: give positive numbers of metres")

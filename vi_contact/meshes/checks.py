@@ -1,7 +1,9 @@
-"""Check what a solver asks of a mesh: cells with volume, neither twisted nor folded; boundary groups of their sides.
+"""Check what a solver asks of a mesh: cells with volume, neither twisted nor folded; boundary
+groups of their sides.
 
-Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points, vertices in Gmsh's order.
-Cells may run either way round (finite elements use |det J|), neighbours may not lie on the same side of a facet."""
+Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points,
+vertices in Gmsh's order. Cells may run either way round (finite elements use |det J|), neighbours
+may not lie on the same side of a facet."""
 
 import numpy as np
 
@@ -13,7 +15,8 @@ _ROUND_OFF = 1024 * np.finfo(float).eps
 
 
 def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
-    """Raise InputError for cells of no volume and for twisted ones (det J of both signs at the corners)."""
+    """Raise InputError for cells of no volume and for twisted ones (det J of both signs at the
+    corners)."""
     corners = np.array(CORNERS[cell])
     x = points[cells[:, corners]]  # (n_cells, n_corners, 1 + d, d)
     edges = x[:, :, 1:] - x[:, :, :1]
@@ -30,7 +33,8 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
 
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
-    """Raise InputError where three cells share a facet or two neighbours lie on the same side of theirs."""
+    """Raise InputError where three cells share a facet or two neighbours lie on the same side of
+    theirs."""
     sides, owner = cell_sides(cells, cell)
     (number,) = number_alike(sides)
     x = points[sides[:, : points.shape[1]]]
@@ -49,13 +53,15 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
         if missing := int(np.sum(~found_in(numbers, sides))):
             facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
             raise InputError(
-                f"boundary group '{name}' of {source} has {facets} no side of a cell: remove duplicate "
+                f"boundary group '{name}' of {source} has {facets} no side of a cell: remove "
+                "duplicate "
                 "nodes, and curves or surfaces that do not bound the named cells"
             )
 
 
 def _normals(x: Array) -> Array:
-    """Return the normals of facets through their first d vertices, (n, d, d) -> (n, d), of any length and direction."""
+    """Return the normals of facets through their first d vertices, (n, d, d) -> (n, d), of any
+    length and direction."""
     d = x.shape[-1]
     if d == 1:
         return np.ones((len(x), 1))

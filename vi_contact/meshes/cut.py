@@ -1,7 +1,9 @@
-"""Make joints and cracks: nodes along an inner boundary are doubled, or those of two bodies welded into one.
+"""Make joints and cracks: nodes along an inner boundary are doubled, or those of two bodies welded
+into one.
 
-Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented along the joint and
-conforming there, gets them by `CutOpen`; bodies meshed one by one have them already."""
+Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented
+along the joint and conforming there, gets them by `CutOpen`; bodies meshed one by one have them
+already."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,8 +20,9 @@ from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_ali
 
 @dataclass(frozen=True)
 class CutOpen:
-    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group, or between two groups
-    of cells, which need no boundary group then: their joint is called "<first>_<second>", side 1 is the first's."""
+    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group,
+    or between two groups of cells, which need no boundary group then: their joint is called
+    "<first>_<second>", side 1 is the first's."""
 
     source: Source
     group: str | None = None
@@ -57,19 +60,21 @@ def cut_open(
     towards: Sequence[float] | None = None,
     between: Sequence[str] | None = None,
 ) -> MeshArrays:
-    """Double the nodes along an inner boundary; its two sides become the groups "<group>_1", "<group>_2".
+    """Double the nodes along an inner boundary; its two sides become the groups "<group>_1",
+    "<group>_2".
 
-    Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
-    give one of them. With `between`, two groups of cells, the boundary is all that lies between them, `group` is
-    "<first>_<second>" and side 1 that of the first.
+    Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads
+    across the boundary: give one of them. With `between`, two groups of cells, the boundary is all
+    that lies between them, `group` is "<first>_<second>" and side 1 that of the first.
 
-    Cells around a node of the boundary keep a common node as long as they hang together through other facets: a crack
-    that ends inside a body stays closed at its tip, and boundaries cut one after the other may meet and cross. Where
-    they cross, every arm needs a group of its own, cut `towards` in turn, so that round the crossing every node is on
-    side 1 of both its pairs, or on side 2 of both.
+    Cells around a node of the boundary keep a common node as long as they hang together through
+    other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one
+    after the other may meet and cross. Where they cross, every arm needs a group of its own, cut
+    `towards` in turn, so that round the crossing every node is on side 1 of both its pairs, or on
+    side 2 of both.
 
-    InputError for a group that does not exist or lies on the outside, sides that cannot be told, cell groups without a
-    common facet, and names of sides that the mesh has already."""
+    InputError for a group that does not exist or lies on the outside, sides that cannot be told,
+    cell groups without a common facet, and names of sides that the mesh has already."""
     if (group is None) == (between is None):
         raise InputError(
             "CutOpen: give group=, the name of an inner boundary, or between=, two groups of cells"
@@ -81,12 +86,14 @@ def cut_open(
     for name in (f"{group}_1", f"{group}_2"):
         if name in arrays.facet_groups or name in arrays.cell_groups:
             raise InputError(
-                f"cut of '{group}': the mesh has a group '{name}' already, the name of a side of the cut: "
+                f"cut of '{group}': the mesh has a group '{name}' already, the name of a side of "
+                "the cut: "
                 "give one of them another name"
             )
     if (inside is None) == (towards is None):
         raise InputError(
-            f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a vector"
+            f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a "
+            "vector"
         )
     sides, owner = cell_sides(arrays.cells, arrays.cell)
     side, *numbers = number_alike(sides, *arrays.facet_groups.values())
@@ -98,13 +105,15 @@ def cut_open(
     cut = np.isin(side[one], wanted)
     if cut.sum() < len(np.unique(wanted)):
         raise InputError(
-            f"boundary group '{group}' has facets without cells on both sides: cut inner boundaries only"
+            f"boundary group '{group}' has facets without cells on both sides: cut inner "
+            "boundaries only"
         )
     first = _on_first_side(arrays, group, owner[one[cut]], owner[other[cut]], inside, towards)
     cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
 
     def moved(rows: Rows, number: Rows, at: Rows) -> Rows:
-        """Return the facets `rows` of these numbers as the cells beside them know them now; `at`: rows of sides."""
+        """Return the facets `rows` of these numbers as the cells beside them know them now; `at`:
+        rows of sides."""
         known, place = np.unique(number, return_index=True)
         before = rows[place[np.searchsorted(known, side[at])]]
         match = arrays.cells[owner[at]][:, None, :] == before[:, :, None]
@@ -123,7 +132,8 @@ def cut_open(
 def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     """Replace every node of the group `second` by the node of `first` at its place.
 
-    Both groups remain, as the same inner boundary. InputError for nodes of `second` without a partner (1e-9 of size).
+    Both groups remain, as the same inner boundary. InputError for nodes of `second` without a
+    partner (1e-9 of size).
     """
     one, two = (np.unique(_group(arrays, name)) for name in (first, second))
     size = float(np.ptp(arrays.points, axis=0).max())
@@ -135,13 +145,16 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     )
     for node in two[there > 1][:1]:
         raise InputError(
-            f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet there, "
-            f"and '{second}' can be welded to one only: weld these bodies first, or give '{second}' first"
+            f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet "
+            "there, "
+            f"and '{second}' can be welded to one only: weld these bodies first, or give "
+            f"'{second}' first"
         )
     if distance.max(initial=0.0) > 1e-9 * size:
         where = at(arrays.points[two[np.argmax(distance)]])
         raise InputError(
-            f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node of "
+            f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node "
+            "of "
             f"'{first}': weld only sides that are divided alike"
         )
     target = np.arange(len(arrays.points))
@@ -161,7 +174,8 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
     if name not in arrays.facet_groups:
         has = ", ".join(arrays.facet_groups) or "none"
         raise InputError(
-            f"mesh has no boundary group '{name}'; it has {has}: name it in Gmsh as a physical group"
+            f"mesh has no boundary group '{name}'; it has {has}: name it in Gmsh as a physical "
+            "group"
         )
     return arrays.facet_groups[name]
 
@@ -169,7 +183,8 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
 def _joint(
     arrays: MeshArrays, between: Sequence[str], inside: str | None, towards: Sequence[float] | None
 ) -> tuple[MeshArrays, str, str]:
-    """Return (the mesh with a boundary group of all facets between two cell groups, its name, the group of side 1)."""
+    """Return (the mesh with a boundary group of all facets between two cell groups, its name, the
+    group of side 1)."""
     names = tuple(between) if not isinstance(between, str) else ()
     if len(names) != 2 or names[0] == names[1]:
         raise InputError(
@@ -177,7 +192,8 @@ def _joint(
         )
     if inside is not None or towards is not None:
         raise InputError(
-            f"CutOpen: between={names} has its first side in '{names[0]}': leave out inside and towards"
+            f"CutOpen: between={names} has its first side in '{names[0]}': leave out inside and "
+            "towards"
         )
     for name in names:
         if name not in arrays.cell_groups:
@@ -187,7 +203,8 @@ def _joint(
     first, second = (arrays.cell_groups[name] for name in names)
     if np.any(first & second):
         raise InputError(
-            f"cell groups '{names[0]}' and '{names[1]}' have common cells, so that nothing lies between "
+            f"cell groups '{names[0]}' and '{names[1]}' have common cells, so that nothing lies "
+            "between "
             "them: give groups without common cells"
         )
     joint = "_".join(names)
@@ -203,7 +220,8 @@ def _joint(
     across = (first[owner[one]] & second[owner[other]]) | (second[owner[one]] & first[owner[other]])
     if not across.any():
         raise InputError(
-            f"cell groups '{names[0]}' and '{names[1]}' have no common facet, so that there is nothing to "
+            f"cell groups '{names[0]}' and '{names[1]}' have no common facet, so that there is "
+            "nothing to "
             "cut: bodies with nodes of their own touch by their boundaries, contact_pair(…)"
         )
     return (
@@ -230,7 +248,8 @@ def _on_first_side(
         mask = arrays.cell_groups[inside]
         if np.any(mask[one] == mask[other]):
             raise InputError(
-                f"cell group '{inside}' is not on one side of '{group}' only: give towards=vector instead"
+                f"cell group '{inside}' is not on one side of '{group}' only: give towards=vector "
+                "instead"
             )
         return np.asarray(mask[one])
     way = np.asarray(towards, dtype=float)
@@ -248,7 +267,8 @@ def _on_first_side(
 def _doubled(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
 ) -> tuple[Rows, Array]:
-    """Give each node a copy for every part of its cells that facets (rows `one`, `other`) connect: (cells, points)."""
+    """Give each node a copy for every part of its cells that facets (rows `one`, `other`) connect:
+    (cells, points)."""
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))
     node = arrays.cells[around, column]

@@ -1,7 +1,7 @@
 """Mesh a Gmsh script (.geo) that holds nothing but geometry, sizes, groups and arithmetic.
 
-``geo_script`` writes the script anew in words that can do no harm. A process of its own meshes it, for a limited time
-and in half of the machine's memory."""
+``geo_script`` writes the script anew in words that can do no harm. A process of its own meshes it,
+for a limited time and in half of the machine's memory."""
 
 import ctypes
 import logging
@@ -27,25 +27,25 @@ from vi_contact.meshes.mesh_file import safe_copy
 MOST = 8  # how often a mesh may be refined
 log = logging.getLogger(__name__)
 _NOT_TRANSFINITE = re.compile(
-    r"(?:Error|Warning)\s*: ((?:Surface|Volume) \d+) cannot be meshed using the transfinite algo\w* \((.*)\)"
+    r"(?:Error|Warning)\s*: ((?:Surface|Volume) \d+) cannot be meshed using the transfinite "
+    r"algo\w* \((.*)\)"
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeoFile:
-    """Describe the mesh of a Gmsh script: its physical groups, cells of the highest dimension that they have.
+    """Describe the mesh of a Gmsh script: its physical groups, cells of the highest dimension that
+    they have.
 
-    Statements that change no mesh, such as ``Printf``, ``Save``, ``Mesh 2`` and options of Gmsh's window, are left out,
-    and a warning in the log lists them.
+    Statements that change no mesh, such as ``Printf``, ``Save``, ``Mesh 2`` and options of Gmsh's
+    window, are left out, and a warning in the log lists them.
 
-    Args:
-        path: the script.
-        refine: how often Gmsh divides all cells into 2^d; new nodes lie on the curves of the geometry.
-        time_limit: seconds that the meshing may take.
-        numbers: values of names that the script uses and does not set, or sets by DefineConstant alone; as Gmsh's
+    Args: path: the script. refine: how often Gmsh divides all cells into 2^d; new nodes lie on the
+        curves of the geometry. time_limit: seconds that the meshing may take. numbers: values of
+        names that the script uses and does not set, or sets by DefineConstant alone; as Gmsh's
             option -setnumber.
-    Raises:
-        InputError: words that are not allowed, all with their lines; numbers without effect; when Gmsh fails, or time
+    Raises: InputError: words that are not allowed, all with their lines; numbers without effect;
+        when Gmsh fails, or time
             or memory is over.
     """
 
@@ -77,7 +77,8 @@ class GeoFile:
                 log.warning("%s: left out, as it changes no mesh: %s", self.path, places)
             Path(folder, "script.geo").write_text(script.text, encoding="utf-8")
             code = (
-                "import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import mesh_here; "
+                "import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import "
+                "mesh_here; "
                 f"mesh_here({self.refine}, {self.time_limit})"
             )
             command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
@@ -93,7 +94,8 @@ class GeoFile:
                 )
             except subprocess.TimeoutExpired:
                 raise InputError(
-                    f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger cells, "
+                    f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger "
+                    "cells, "
                     "or give a longer time_limit"
                 ) from None
             if done.returncode:
@@ -116,7 +118,8 @@ class GeoFile:
 
 
 def mesh_here(refine: int, time_limit: float) -> None:
-    """Mesh script.geo of this folder as made.msh: for a process of its own, which ends with its parent or its time."""
+    """Mesh script.geo of this folder as made.msh: for a process of its own, which ends with its
+    parent or its time."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     signal.setitimer(signal.ITIMER_REAL, time_limit + 1.0)
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
@@ -132,7 +135,8 @@ def mesh_here(refine: int, time_limit: float) -> None:
             groups = gmsh.model.getPhysicalGroups()
             if not groups:
                 sys.exit(
-                    "it has no cells in a group: name the body by a Physical Surface or Physical Volume"
+                    "it has no cells in a group: name the body by a Physical Surface or Physical "
+                    "Volume"
                 )
             gmsh.model.mesh.generate(max(d for d, _ in groups))
             for _ in range(refine):
@@ -145,7 +149,8 @@ def mesh_here(refine: int, time_limit: float) -> None:
 
 
 def _tell_errors(lines: Sequence[str]) -> None:
-    """Print a note where Gmsh left a transfinite mesh out, and end the process at any other error of its log."""
+    """Print a note where Gmsh left a transfinite mesh out, and end the process at any other error
+    of its log."""
     for before, line in pairwise(["", *lines]):
         if match := _NOT_TRANSFINITE.match(
             line

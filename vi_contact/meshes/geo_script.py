@@ -1,9 +1,10 @@
 """Write a Gmsh script anew in words that can do no harm: geometry, sizes, groups and arithmetic.
 
-Gmsh runs commands of the shell and opens files from scripts, so none is given to it as it stands. The script is cut
-into tokens. Statements that change no mesh, as most scripts have some (``Printf``, ``Save``, ``Mesh 2``, options of
-the window), are left out. All other tokens must be words that geo_words.toml lists, or names that the script sets.
-Those names get a prefix, so that none of them can be a command, and texts stand only where groups are named.
+Gmsh runs commands of the shell and opens files from scripts, so none is given to it as it stands.
+The script is cut into tokens. Statements that change no mesh, as most scripts have some
+(``Printf``, ``Save``, ``Mesh 2``, options of the window), are left out. All other tokens must be
+words that geo_words.toml lists, or names that the script sets. Those names get a prefix, so that
+none of them can be a command, and texts stand only where groups are named.
 """
 
 from __future__ import annotations
@@ -51,19 +52,22 @@ _TOKEN = re.compile(
 # Names that a script sets: h = …, list[] = …, list() = …, For i In …
 _SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)
 _ARITHMETIC = re.compile(r'"[\w\s.,+*/^()-]*"', re.ASCII)
-# Gmsh leaves out of a group what is not there, without a word. What is written in the place of a group asks for it.
+# Gmsh leaves out of a group what is not there, without a word. What is written in the place of a
+# group asks for it.
 _GROUP = re.compile(
     r'( Physical\s+(Line|Curve|Surface|Volume)\s+\(\s*(?:"([^"%]*)[^"]*")?[^"()]*\)\s+\+?=)'
     r"(?!\s*\{\s*:)((?:[^;{}]|\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*+\})*+\})*+\})*+);"
 )
 _CHECKED = (
-    r' told [ ] =\4; If (#told[] == 0) Error("it is empty, the group \3"); EndIf Printf("in the group \3");'
+    r' told [ ] =\4; If (#told[] == 0) Error("it is empty, the group \3"); EndIf Printf("in the '
+    r'group \3");'
     r" told_[] = Boundary{ \2{ told[] }; };\1 told [ ] ;"
 )
 
 
 class Token(NamedTuple):
-    """Hold a piece of a script: blank, open (comment), text, escaped (text), name, sign, or "" for what is none."""
+    """Hold a piece of a script: blank, open (comment), text, escaped (text), name, sign, or "" for
+    what is none."""
 
     kind: str
     word: str
@@ -81,12 +85,11 @@ class Script:
 def allowed(path: Path, numbers: Mapping[str, float] | None = None) -> Script:
     """Return the script in listed words alone, each in its line.
 
-    Args:
-        path: the script.
-        numbers: values of names that the script uses and does not set, or sets by DefineConstant alone, as Gmsh's
+    Args: path: the script. numbers: values of names that the script uses and does not set, or sets
+        by DefineConstant alone, as Gmsh's
             option -setnumber gives them.
-    Raises:
-        InputError: a file that cannot be read, words that are not allowed, all of them with their lines, and a number
+    Raises: InputError: a file that cannot be read, words that are not allowed, all of them with
+        their lines, and a number
             that the script does not use or sets itself.
     """
     text = _read(path)
@@ -132,7 +135,8 @@ def _tokens(text: str) -> list[Token]:
 
 
 def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, str]]]:
-    """Return the tokens without the statements that change no mesh, and (line, beginning) of each of these."""
+    """Return the tokens without the statements that change no mesh, and (line, beginning) of each
+    of these."""
     kept: list[Token] = []
     left_out: list[tuple[int, str]] = []
     before = ""  # the last word that is no blank
@@ -167,7 +171,8 @@ def _beginning(statement: Sequence[Token]) -> str:
 
 
 def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
-    """Return the place after the statement that begins at ``start`` if it changes no mesh, else ``start``."""
+    """Return the place after the statement that begins at ``start`` if it changes no mesh, else
+    ``start``."""
     heads = [token.word for token in tokens[start : start + 12] if token.kind != "blank"][:3]
     heads += [""] * (3 - len(heads))
     first, second, third = heads
@@ -186,9 +191,11 @@ def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
 
 
 def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
-    """Return the place after the statement that begins at ``start``; ``start`` where it does not end.
+    """Return the place after the statement that begins at ``start``; ``start`` where it does not
+    end.
 
-    braces: whether a closing brace ends it too, unless another brace opens behind it: Color {1, 2, 3} { Line{1}; }
+    braces: whether a closing brace ends it too, unless another brace opens behind it: Color {1, 2,
+    3} { Line{1}; }
     """
     level = 0
     for place in range(start, len(tokens)):
@@ -215,7 +222,8 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
 
 
 def _without_parameters(tokens: Sequence[Token]) -> list[Token]:
-    """Return the tokens with DefineConstant[ h = {1, Name "size", Min 0} ] as DefineConstant[ h = 1 ].
+    """Return the tokens with DefineConstant[ h = {1, Name "size", Min 0} ] as DefineConstant[ h = 1
+    ].
 
     What follows the value tells a window how to show it, and a text could name a file.
     """
@@ -274,7 +282,8 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
 
 
 def _write(path: Path, tokens: Sequence[Token], own: set[str]) -> Iterator[str]:
-    """Yield the words that Gmsh gets; InputError for all that are not allowed. ``own``: names of the script."""
+    """Yield the words that Gmsh gets; InputError for all that are not allowed. ``own``: names of
+    the script."""
     refused: list[tuple[Token, bool]] = []  # with whether it is a value that nobody has set
     words = ["", "", ""]
     level = 0  # brackets that are open since the last For
@@ -318,7 +327,8 @@ def _fits(kind: str, word: str, words: Sequence[str], own: set[str]) -> bool:
 
 
 def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool:
-    """Whether a name stands where a number is wanted: it is no command, no function, no option, no kind of field."""
+    """Whether a name stands where a number is wanted: it is no command, no function, no option, no
+    kind of field."""
     before = words[-1]
     is_field = list(words[-2:]) == ["]", "="] and "Field" in words[-6:]
     token = tokens[place]
@@ -342,7 +352,8 @@ def _sentence(refused: Sequence[tuple[Token, bool]]) -> str:
         more = f", and {len(others) - TOLD} more" if len(others) > TOLD else ""
         them = "them" if len(others) > 1 else "it"
         parts.append(
-            f"{places}{more}, and only words of geometry, sizes, groups and arithmetic are meshed here: "
+            f"{places}{more}, and only words of geometry, sizes, groups and arithmetic are meshed "
+            "here: "
             f"leave {them} out, or mesh the script yourself and give the .msh"
         )
     if values:

@@ -1,6 +1,7 @@
 """Mesh bars, rectangles and boxes node by node: Gmsh's transfinite curves are only exact to 1e-11.
 
-A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written as a file."""
+A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written
+as a file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +18,8 @@ _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
 
 
 def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
-    """Return the nodes of an evenly divided box with one corner at the origin, (n_1+1, ..., n_d+1, d) [m]."""
+    """Return the nodes of an evenly divided box with one corner at the origin, (n_1+1, ..., n_d+1,
+    d) [m]."""
     axes = [length * np.arange(n + 1) / n for length, n in zip(lengths, divisions, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
@@ -26,8 +28,9 @@ def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
 class Grid:
     """Describe a structured mesh of one body.
 
-    `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which
-    lattice index a is lowest and highest; `body` names all cells. `simplices` splits boxes along a diagonal (Kuhn)."""
+    `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the
+    two sides on which lattice index a is lowest and highest; `body` names all cells. `simplices`
+    splits boxes along a diagonal (Kuhn)."""
 
     nodes: Array
     simplices: bool
@@ -54,7 +57,8 @@ class Grid:
 
 
 def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
-    """Add structured meshes to the current model as discrete entities with named physical groups."""
+    """Add structured meshes to the current model as discrete entities with named physical
+    groups."""
     model, first = gmsh.model, 1  # tag of the first node
     for grid in grids:
         points, cells, faces = grid.numbered()
@@ -78,9 +82,11 @@ def add_outline(
     sizes: Sequence[float],
     cells: Sequence[int] = (),
 ) -> int:
-    """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be meshed irregularly.
+    """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be
+    meshed irregularly.
 
-    ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first curves."""
+    ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first
+    curves."""
     points = [
         model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)
     ]
@@ -106,7 +112,8 @@ def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -
 
 
 def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
-    """Return the vertices of every cell of a lattice of node tags, in Gmsh's order, (n_cells, n_vertices)."""
+    """Return the vertices of every cell of a lattice of node tags, in Gmsh's order, (n_cells,
+    n_vertices)."""
     d = tags.ndim
     shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
     count = [n - 1 for n in tags.shape]
@@ -130,7 +137,8 @@ def _box_corners(d: int) -> list[tuple[int, ...]]:
 
 
 def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
-    """Return the d! simplices walked from corner (0,...,0) to (1,...,1) along the axes, positively oriented."""
+    """Return the d! simplices walked from corner (0,...,0) to (1,...,1) along the axes, positively
+    oriented."""
     simplices = []
     for order in permutations(range(d)):
         steps = np.eye(d, dtype=int)[list(order)]

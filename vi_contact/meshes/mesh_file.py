@@ -1,8 +1,10 @@
-"""Check a mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder of our own.
+"""Check a mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder
+of our own.
 
-Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of the shell. It
-decides by the name of a file, else by the first word in it, and it runs FILE.opt beside a mesh too. So a mesh file is
-read only if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in a new folder."""
+Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of
+the shell. It decides by the name of a file, else by the first word in it, and it runs FILE.opt
+beside a mesh too. So a mesh file is read only if its first bytes are those of Gmsh's own format,
+and from a copy called mesh.msh, alone in a new folder."""
 
 import mmap
 import re
@@ -21,7 +23,8 @@ SHORT = 80  # bytes in which what comes first is found
 def safe_copy(file: Path, folder: Path) -> Path:
     """Copy a mesh file into this folder, safe for Gmsh to read.
 
-    InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces more than it holds."""
+    InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces
+    more than it holds."""
     copy = folder / "mesh.msh"
     try:
         there = file.is_file()
@@ -46,14 +49,17 @@ def safe_copy(file: Path, folder: Path) -> Path:
 def _check_magic(data: mmap.mmap, file: Path) -> None:
     if data[: len(MAGIC)] != MAGIC:
         raise InputError(
-            f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format and "
-            "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of geometry "
+            f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format "
+            "and "
+            "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of "
+            "geometry "
             "alone as meshes.GeoFile"
         )
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:
-    """Refuse sections not closed, or that announce more than the file holds: Gmsh makes room before it reads."""
+    """Refuse sections not closed, or that announce more than the file holds: Gmsh makes room before
+    it reads."""
     version, binary = (data[:SHORT].split() + [b"", b""])[1:3]
     opened, name = b"", b""
     for section in _SECTION.finditer(data):
@@ -68,7 +74,8 @@ def _check_sections(data: mmap.mmap, file: Path) -> None:
             if max(counts[:1] if version.startswith(b"2") else counts) > len(data):
                 what = name.decode().lower()
                 raise InputError(
-                    f"mesh file {file} announces more {what} than it can hold: write it again from Gmsh"
+                    f"mesh file {file} announces more {what} than it can hold: write it again from "
+                    "Gmsh"
                 )
         opened = b"" if closes else name
     else:
@@ -80,12 +87,14 @@ def _check_sections(data: mmap.mmap, file: Path) -> None:
 
 
 def _written(ahead: bytes) -> tuple[int, ...]:
-    """Return the first two numbers after a section's name: blocks and items in format 4, items and more in 2."""
+    """Return the first two numbers after a section's name: blocks and items in format 4, items and
+    more in 2."""
     return tuple(int(word) if word.isdigit() else 0 for word in ahead.split()[:2]) or (0,)
 
 
 def _packed(ahead: bytes) -> tuple[int, ...]:
-    """Return these numbers of a binary file: 8 bytes each, in the order of bytes that makes them smaller."""
+    """Return these numbers of a binary file: 8 bytes each, in the order of bytes that makes them
+    smaller."""
     head = ahead[1:17]
     both = [struct.unpack(order, head) for order in ("<2Q", ">2Q")] if len(head) == 16 else []
     return min([*both, _written(ahead)] if ahead[1:2].isdigit() else both, key=max, default=(0,))

@@ -1,7 +1,8 @@
-"""Mesh bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed each for itself.
+"""Mesh bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed
+each for itself.
 
-Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x lowest, highest),
-"lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z)."""
+Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x
+lowest, highest), "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +16,8 @@ from vi_contact.meshes.grid import Grid, add_grids
 
 @dataclass(frozen=True)
 class Blocks:
-    """Hold blocks by name, each a body of its own. InputError for blocks of different dimension or cells."""
+    """Hold blocks by name, each a body of its own. InputError for blocks of different dimension or
+    cells."""
 
     blocks: Mapping[str, BlockMesh]
 
@@ -49,9 +51,10 @@ class Blocks:
 class TwoBlocks:
     """Describe a block "upper" on top of a block "lower", in one dimension to the right of it.
 
-    The lower one has a corner at the origin; the upper one begins at `offset` [m] along the interface (x, and z of a
-    box), `gap` [m] above it. Interface "lower_top" and "upper_bottom", of bars "lower_right" and "upper_left": nodes at
-    the same places when lengths and divisions match, never the same nodes. `angle` [rad] turns both about the origin.
+    The lower one has a corner at the origin; the upper one begins at `offset` [m] along the
+    interface (x, and z of a box), `gap` [m] above it. Interface "lower_top" and "upper_bottom", of
+    bars "lower_right" and "upper_left": nodes at the same places when lengths and divisions match,
+    never the same nodes. `angle` [rad] turns both about the origin.
     """
 
     lower: BlockMesh = field(default_factory=BlockMesh)

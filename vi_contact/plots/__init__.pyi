@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .bodies import draw_run as draw_run
 from .bodies import film as film
 from .bodies import plot_deformed as plot_deformed

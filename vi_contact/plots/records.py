@@ -1,4 +1,5 @@
-"""Draw ground motions, response spectra and a target, transfer functions, loops of force and deformation."""
+"""Draw ground motions, response spectra and a target, transfer functions, loops of force and
+deformation."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,7 +29,8 @@ SAMPLES_A_PERIOD = (
 def plot_motion(
     record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2"
 ) -> Path:
-    """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked and D5-95 shaded.
+    """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked
+    and D5-95 shaded.
 
     title: default the record's. Nothing is corrected: a drift of the record shows."""
     units = canonical_units("plot_motion: units", units)
@@ -62,13 +64,15 @@ def plot_spectra(
     title: str = "Response spectra",
     units: str = "g",
 ) -> Path:
-    """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
+    """Draw pseudo-acceleration in `units` and displacement over the period, one line for each
+    label, the target dashed.
 
     steps: time step [s] of the record behind each label; below ten of them its line is pale."""
     units = canonical_units("plot_spectra: units", units)
     if not spectra:
         raise InputError(
-            "plot_spectra: spectra is empty; give one response spectrum or more, each with its label"
+            "plot_spectra: spectra is empty; give one response spectrum or more, each with its "
+            "label"
         )
     figure, ((top,), (bottom,)) = canvas(2, 1, (8.0, 7.5), sharex=True)
     bottom.set_xscale("log")
@@ -126,7 +130,8 @@ def plot_loop(
     y: tuple[str, str],
     title: str | None = None,
 ) -> Path:
-    """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
+    """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the
+    work at the end."""
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
     across, x_unit = scaled(loop.deformation, x[1])
     up, y_unit = scaled(loop.force, y[1])
@@ -201,7 +206,8 @@ def _husid(axis: Any, record: Record) -> None:
 
 
 def _size(values: Array) -> tuple[float, str]:
-    """Unit of length that fits; centimetres in place of hundreds of millimetres, as is usual for ground motions."""
+    """Unit of length that fits; centimetres in place of hundreds of millimetres, as is usual for
+    ground motions."""
     peak = float(np.max(np.abs(values)))
     return (0.01, "cm") if 0.001 <= peak < 10.0 else length_unit(peak)
 

@@ -1,4 +1,5 @@
-"""Say in words, tables and curves what a run tells a design engineer: the content of the page, whatever draws it."""
+"""Say in words, tables and curves what a run tells a design engineer: the content of the page,
+whatever draws it."""
 
 import tomllib
 from collections import defaultdict
@@ -36,7 +37,8 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """Hold a part of the page, in this order: sentences, tables, curves, drawings on one axis each, pictures."""
+    """Hold a part of the page, in this order: sentences, tables, curves, drawings on one axis each,
+    pictures."""
 
     title: str
     sentences: Sequence[str] = ()
@@ -49,8 +51,8 @@ class Section:
 def sections_of(
     run: RunFolder, model: Mapping[str, Any], columns: Sequence[Sequence[str]] | None = None
 ) -> list[Section]:
-    """Return the sections that a run has data for; ``model``: model.json, empty where there is none; ``columns``:
-    groups of columns for the histories, in place of those that move."""
+    """Return the sections that a run has data for; ``model``: model.json, empty where there is
+    none; ``columns``: groups of columns for the histories, in place of those that move."""
     if len(run.history["t"]) < 2:
         raise InputError(
             f"the run in '{run.folder}' has no steps yet: report on it when it has some"
@@ -81,7 +83,8 @@ def number(value: float) -> str:
 
 
 def words(value: Any, depth: int = 9) -> str:
-    """Return a value of a file as it is read by people; what is nested deeper than anybody would is left out."""
+    """Return a value of a file as it is read by people; what is nested deeper than anybody would is
+    left out."""
     if isinstance(value, Mapping) and depth:
         return ", ".join(f"{key} = {words(one, depth - 1)}" for key, one in value.items())
     if isinstance(value, list | tuple | Mapping):
@@ -92,7 +95,8 @@ def words(value: Any, depth: int = 9) -> str:
 
 
 def table_of(title: str, rows: Any) -> list[Table]:
-    """Return the table of objects that a file lists, a column for each of their keys; none for anything else."""
+    """Return the table of objects that a file lists, a column for each of their keys; none for
+    anything else."""
     given = (
         [one for one in rows if isinstance(one, Mapping)] if isinstance(rows, list | tuple) else []
     )
@@ -145,7 +149,8 @@ def _results(run: RunFolder) -> Section:
 
 
 def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Iterable[list[str]]:
-    """Rows of the columns that begin so: of heights at the largest thrust, for without thrust they say nothing."""
+    """Rows of the columns that begin so: of heights at the largest thrust, for without thrust they
+    say nothing."""
     t = run.history["t"]
     for name in (name for name in run.columns if name.startswith(prefixes)):
         values = run.history.get(name, np.zeros((0, 0)))
@@ -172,7 +177,8 @@ def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Itera
 
 
 def _safety(run: RunFolder) -> Iterable[list[str]]:
-    """Rows of the parts of the contact: 1 / (1 - margin) is the friction that they could carry over what they do."""
+    """Rows of the parts of the contact: 1 / (1 - margin) is the friction that they could carry over
+    what they do."""
     for name in (name for name in run.history if name.startswith("margin_")):
         used = 1.0 - run.history[name]
         if not np.isnan(used).all() and np.nanmax(used) > 0.0:
@@ -252,7 +258,8 @@ def _peaks(run: RunFolder) -> Section:
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
-    """Return (name, value) of what the report says first: of the method, and of the outcome; a dash for unknown."""
+    """Return (name, value) of what the report says first: of the method, and of the outcome; a dash
+    for unknown."""
     t, facts = run.history["t"], {key: one for key, one in run.facts.items() if one is not None}
     facts |= {
         "count": len(t) - 1,

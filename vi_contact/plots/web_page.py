@@ -1,6 +1,8 @@
-"""Write sections about a run as one HTML file that loads nothing and runs no script but its own two.
+"""Write sections about a run as one HTML file that loads nothing and runs no script but its own
+two.
 
-Texts of files are escaped by the template's engine, those in curves once more, for Plotly reads some HTML in them."""
+Texts of files are escaped by the template's engine, those in curves once more, for Plotly reads
+some HTML in them."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
@@ -40,7 +42,8 @@ def can_write() -> bool:
 def write_web_page(
     path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
 ) -> Path:
-    """Write a page: the title, (name, value) of facts, the sections with curves to zoom and tables to sort, a foot.
+    """Write a page: the title, (name, value) of facts, the sections with curves to zoom and tables
+    to sort, a foot.
 
     Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly."""
     if not can_write():
@@ -97,7 +100,8 @@ def write_web_page(
 
 
 def extremes(values: Array, most: int) -> Indices:
-    """Return at most ``most`` rows (k,) in order, with the smallest and the largest of equal parts; all of few."""
+    """Return at most ``most`` rows (k,) in order, with the smallest and the largest of equal parts;
+    all of few."""
     if len(values) <= most:
         return np.arange(len(values))
     starts = np.linspace(0, len(values), most // 2, endpoint=False).astype(int)

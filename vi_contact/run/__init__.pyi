@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .cross_check import CrossChecked as CrossChecked
 from .cross_check import cross_check as cross_check
 from .files.reading import RunFolder as RunFolder

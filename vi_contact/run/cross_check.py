@@ -1,6 +1,7 @@
 """Compare independent routes to the same step, step by step from the same state.
 
-Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not."""
+Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state
+must not."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -21,8 +22,8 @@ from .time_steps import TimeSteps
 
 @dataclass
 class Disagreement:
-    """Hold how far the answers of a solver are off those of the primary one so far: of u, r_n and, in steps with
-    friction, r_t the largest difference ``off`` and the largest value ``size``."""
+    """Hold how far the answers of a solver are off those of the primary one so far: of u, r_n and,
+    in steps with friction, r_t the largest difference ``off`` and the largest value ``size``."""
 
     method: str = ""
     off: dict[str, float] = field(default_factory=lambda: {"u": 0.0, "r_n": 0.0})
@@ -32,7 +33,8 @@ class Disagreement:
 
     @property
     def relative(self) -> dict[str, float]:
-        """Return max |x - x'| / max |x| over all components and steps, by name; max |x - x'| where x is zero."""
+        """Return max |x - x'| / max |x| over all components and steps, by name; max |x - x'| where
+        x is zero."""
         return {name: off / (self.size[name] or 1.0) for name, off in self.off.items()}
 
     @property
@@ -43,7 +45,8 @@ class Disagreement:
 
 @dataclass
 class CrossChecked:
-    """Solve by one solver, whose answer counts, ask others at every step too, and remember how far they are off.
+    """Solve by one solver, whose answer counts, ask others at every step too, and remember how far
+    they are off.
 
     ``found``: without attempts that ``HalvedAtImpact`` threw away."""
 
@@ -57,14 +60,16 @@ class CrossChecked:
             check_solver("CrossChecked", one, "a solver")
         if not len(self.others):
             raise InputError(
-                "CrossChecked: others names no solver, so that nothing is compared; give one or more, or "
+                "CrossChecked: others names no solver, so that nothing is compared; give one or "
+                "more, or "
                 "the first solver alone"
             )
         self.found = [Disagreement() for _ in self.others]
         self._earlier, self._last = self.found, (-1, 0.0)
 
     def begin(self, step: StepProblem) -> None:
-        """Forget the attempt before when this one is of the same step but shorter: that was thrown away."""
+        """Forget the attempt before when this one is of the same step but shorter: that was thrown
+        away."""
         k, t = self._last
         if step.k == k and step.t < t:
             self.found = self._earlier
@@ -83,8 +88,8 @@ class CrossChecked:
         return PreparedCrossCheck(self, solvers, surface)
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
-        """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
-        summary.json shows. A name that comes again gets a number."""
+        """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per
+        step: what summary.json shows. A name that comes again gets a number."""
         names = [one.method for one in self.found]
         return {
             name if names.count(name) == 1 else f"{name} #{rank}": one.relative
@@ -142,9 +147,11 @@ def cross_check(
     steps: int,
     state: State | None = None,
 ) -> CrossChecked:
-    """March with the first solver and compare the others with it at every step. ``report()`` of the result tells.
+    """March with the first solver and compare the others with it at every step. ``report()`` of the
+    result tells.
 
-    ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones."""
+    ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted
+    ones."""
     given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
     if len(given) < 2:
         raise InputError(f"cross_check: {len(given)} solvers are given; give two or more")

@@ -1,7 +1,9 @@
-"""Name bodies that nothing holds and that no contact condition touches, before a run computes a step.
+"""Name bodies that nothing holds and that no contact condition touches, before a run computes a
+step.
 
-They are seldom meant. Where nodes of such a body lie at the places of another body's nodes, the meshes of the two have
-not been merged: they look like one body in a picture, and fly apart without a word.
+They are seldom meant. Where nodes of such a body lie at the places of another body's nodes, the
+meshes of the two have not been merged: they look like one body in a picture, and fly apart without
+a word.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ SAME = 1e-9  # of the size of the bodies: nodes that are nearer lie at one place
 
 @dataclass(frozen=True)
 class LooseBody:
-    """Hold the middle [m] of a loose body, its number of nodes, and how many of them lie at nodes of other bodies."""
+    """Hold the middle [m] of a loose body, its number of nodes, and how many of them lie at nodes
+    of other bodies."""
 
     middle: Array
     nodes: int
@@ -32,7 +35,8 @@ class LooseBody:
 
 
 def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
-    """Return the bodies with a rigid motion that neither a stiffness nor a contact condition meets. Collective."""
+    """Return the bodies with a rigid motion that neither a stiffness nor a contact condition meets.
+    Collective."""
     # Nearly every body is touched: the rest, which gathers nodes, is for those that are not.
     system = problem.system
     rows = rows_of_bodies(system)
@@ -65,7 +69,8 @@ def _distinct(parts: list[Array]) -> Array:
 
 
 def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
-    """Return for every body whether its translation alone moves some contact condition, as side 1 or 2. Collective."""
+    """Return for every body whether its translation alone moves some contact condition, as side 1
+    or 2. Collective."""
     surface = problem.surface
     moved = np.zeros(len(bodies))
     for number, rows in enumerate(bodies):
@@ -83,13 +88,16 @@ def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
 
 
 def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
-    """Yield a sentence on every loose body, and whether it is refused: where its nodes lie at another's. Collective."""
+    """Yield a sentence on every loose body, and whether it is refused: where its nodes lie at
+    another's. Collective."""
     for body in find_loose_bodies(problem):
         what = f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no contact touches it"
         if body.coinciding:
             yield (
-                f"{what}: {body.coinciding} of its nodes lie at the places of nodes of another body, as of meshes that "
-                "are not merged: merge them (Coherence in Gmsh), or make a contact or a tie between the two",
+                f"{what}: {body.coinciding} of its nodes lie at the places of nodes of another "
+                "body, as of meshes that "
+                "are not merged: merge them (Coherence in Gmsh), or make a contact or a tie "
+                "between the two",
                 True,
             )
         else:
@@ -97,7 +105,8 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
 
 
 def refuse_loose_bodies(problem: ContactProblem) -> None:
-    """Raise InputError for a loose body whose nodes lie at another body's; warn, on rank 0, of others. Collective."""
+    """Raise InputError for a loose body whose nodes lie at another body's; warn, on rank 0, of
+    others. Collective."""
     for sentence, refused in judge_loose_bodies(problem):
         if refused:
             raise InputError(sentence)

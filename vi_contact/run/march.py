@@ -31,14 +31,15 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.
 
-    If ``scheme`` is None, or the problem names no mass matrix, ``run.method.with_defaults`` chooses them, and
-    ``report.problem`` has them. If ``solver`` is None, it is Automatic().
+    If ``scheme`` is None, or the problem names no mass matrix, ``run.method.with_defaults`` chooses
+    them, and ``report.problem`` has them. If ``solver`` is None, it is Automatic().
 
-    ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
-    a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
-    A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn. If all of them fail,
-    StepFailure is raised with step, time, residuals and advice. ``state`` is that of a static stage or a checkpoint.
-    InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
+    ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base
+    steps: the halves of a halved step are yielded one by one, and ``state.k`` counts them, but they
+    are one of the ``steps``. A step whose certificate exceeds ``tolerance`` goes to the solvers of
+    ``escalation`` in turn. If all of them fail, StepFailure is raised with step, time, residuals
+    and advice. ``state`` is that of a static stage or a checkpoint. InputError is raised at the
+    call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
     method = checked_method(
         "march",
         problem,
@@ -56,7 +57,8 @@ def march(
 
 
 class March:
-    """Step along a plan, and keep the books of it. ``prepared``: matrices and solvers by the length of their steps.
+    """Step along a plan, and keep the books of it. ``prepared``: matrices and solvers by the length
+    of their steps.
 
     Attributes, at the time a step is handed out:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
@@ -103,7 +105,8 @@ class March:
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
         """A step of dt; None when it closes a point and is to be halved: nothing has happened then.
 
-        Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked once, at its end."""
+        Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked
+        once, at its end."""
         with together(self.method.problem.surface.comm):
             return self._attempted(dt, final=final)
 
@@ -136,7 +139,8 @@ class March:
 def after_impact(
     problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float
 ) -> State:
-    """Return the state with the impact law applied; points on massless supports (springs) do not collide."""
+    """Return the state with the impact law applied; points on massless supports (springs) do not
+    collide."""
     law, surface = problem.impact, problem.surface
     if law is None:
         return new

@@ -1,4 +1,5 @@
-"""March many: several runs of one body at once, which differ in what shakes it, how it rubs and where it starts."""
+"""March many: several runs of one body at once, which differ in what shakes it, how it rubs and
+where it starts."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -28,15 +29,18 @@ def march_many(
 ) -> Iterator[tuple[int, Report | ViContactError]]:
     """Yield (number of the run, report) after every certified step, a step of each run in turn.
 
-    A run that fails yields its error, last; the others go on. ``steps`` or ``t_end``: one for all, or one for each run,
-    as ``states``, None for that of the system; everything else as of ``march``, of which each run takes the steps.
+    A run that fails yields its error, last; the others go on. ``steps`` or ``t_end``: one for all,
+    or one for each run, as ``states``, None for that of the system; everything else as of
+    ``march``, of which each run takes the steps.
 
-    Runs step together, which reads every matrix once for eight of them, when their problems have the same system and
-    surface objects, and equal mass and impact laws: ``dataclasses.replace(problem, excitation=…)``; when all of them
-    have friction or none; and are at the same time. One whose record ends, or whose step needs the escalation, leaves
-    the others and goes on alone. Alone from the beginning go runs on several MPI ranks, with HalvedAtImpact, with
-    motions that are marched beside (``soil``), with schemes that do not say ``by_rows`` (ContactStabilisedNewmark,
-    MoreauJean), with other solvers than Condensed() of ActiveSet(), or of any method for friction, and without CHOLMOD.
+    Runs step together, which reads every matrix once for eight of them, when their problems have
+    the same system and surface objects, and equal mass and impact laws:
+    ``dataclasses.replace(problem, excitation=…)``; when all of them have friction or none; and are
+    at the same time. One whose record ends, or whose step needs the escalation, leaves the others
+    and goes on alone. Alone from the beginning go runs on several MPI ranks, with HalvedAtImpact,
+    with motions that are marched beside (``soil``), with schemes that do not say ``by_rows``
+    (ContactStabilisedNewmark, MoreauJean), with other solvers than Condensed() of ActiveSet(), or
+    of any method for friction, and without CHOLMOD.
     """
     given = several("march_many", "problems", problems, "give a list of ContactProblems")
     every = [

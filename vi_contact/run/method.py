@@ -1,4 +1,5 @@
-"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it starts from."""
+"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it
+starts from."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +27,8 @@ SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state 
 
 @dataclass(frozen=True)
 class Method:
-    """Hold how a problem is marched: scheme, solver and its escalation, time steps [s] as asked for, tolerance."""
+    """Hold how a problem is marched: scheme, solver and its escalation, time steps [s] as asked
+    for, tolerance."""
 
     problem: ContactProblem
     scheme: Scheme
@@ -35,7 +37,8 @@ class Method:
     tolerance: float
 
     def bind(self) -> None:
-        """Hand scheme and time steps to the motions that are marched beside the run, unless they have them."""
+        """Hand scheme and time steps to the motions that are marched beside the run, unless they
+        have them."""
         for companion in (*self.problem.system.companions, *self.problem.surface.companions):
             companion.bind(self.scheme, self.dt)
 
@@ -52,9 +55,11 @@ def checked_method(
     state: State | None,
     tolerance: float,
 ) -> Method:
-    """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and the escalation.
+    """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and
+    the escalation.
 
-    InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective."""
+    InputError for arguments of the wrong kind, and a state of another problem or inside the
+    obstacle. Collective."""
     check_problem_given(owner, problem)
     comm = problem.surface.comm
     agree(
@@ -97,9 +102,9 @@ def with_defaults(
 ) -> tuple[ContactProblem, Scheme]:
     """Return the problem with a mass matrix and the scheme to run it with.
 
-    Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
-    asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's.
-    ``others``: the first that has its matrices lends them."""
+    Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass
+    at the contact nodes asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains
+    energy. Without a mass: the scheme's. ``others``: the first that has its matrices lends them."""
     check_problem_given("march", problem)
     for one in several("march", "others", others, "give a list of problems, or leave it out"):
         check_problem_given("march", one)
@@ -129,23 +134,27 @@ def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
 
 
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
-    """Raise InputError unless these are a solver or None, a list of solvers, and a tolerance between 0 and 1."""
+    """Raise InputError unless these are a solver or None, a list of solvers, and a tolerance
+    between 0 and 1."""
     if solver is not None:
         check_solver(owner, solver)
     for one in several(owner, "escalation", escalation, "give a list of solvers"):
         check_solver(owner, one, "a solver of escalation")
     if not 0.0 < real(tolerance) <= 1.0:
         raise InputError(
-            f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as 1e-9"
+            f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as "
+            "1e-9"
         )
 
 
 def check_state(
     owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a state of another problem, or one that penetrates the obstacle. Collective.
+    """Raise InputError, on all ranks, for a state of another problem, or one that penetrates the
+    obstacle. Collective.
 
-    A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its own runs (k > 0).
+    A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its
+    own runs (k > 0).
     """
     check_sizes(owner, problem, state)
     surface, rigid = problem.surface, problem.surface.compliance == 0.0
@@ -157,6 +166,7 @@ def check_state(
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
         raise InputError(
-            f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a state "
+            f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a "
+            "state "
             "with every gap >= 0"
         )

@@ -1,17 +1,21 @@
-"""Solve the static stage of a body that contact alone holds (floating: a block standing on the ground): K is singular.
+"""Solve the static stage of a body that contact alone holds (floating: a block standing on the
+ground): K is singular.
 
-Its equilibrium is the limit of the proximal-point iteration (Martinet 1970; Rockafellar, SIAM J. Control Optim. 14,
-1976, thm 1), solved for the increment d = u_{k+1} - u_k and with the reactions of u_k (``correction``):
+Its equilibrium is the limit of the proximal-point iteration (Martinet 1970; Rockafellar, SIAM J.
+Control Optim. 14, 1976, thm 1), solved for the increment d = u_{k+1} - u_k and with the reactions
+of u_k (``correction``):
 
     (K + P) d = (f - K u_k) - B_nᵀ r_n - B_tᵀ r_t,    contact conditions on u_k + d
 
-each step of which is an ordinary problem of the contract, with one factorisation for all. P is the mass of every body
-on springs to where it is, as weak as the body's own stiffness allows (``rigid_bodies.body_springs``). It converges from
-any start if there is an equilibrium. If there is none, d tends to a rigid motion that no contact stops and that the
-loads drive; that is how it is recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
+each step of which is an ordinary problem of the contract, with one factorisation for all. P is the
+mass of every body on springs to where it is, as weak as the body's own stiffness allows
+(``rigid_bodies.body_springs``). It converges from any start if there is an equilibrium. If there is
+none, d tends to a rigid motion that no contact stops and that the loads drive; that is how it is
+recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
 
-Rigid motions that no load drives stay where they start: along them P-weighted means of u are those of u0 (the centre of
-mass of a block free to slide on level ground does not move). On a conservative problem all else is unique."""
+Rigid motions that no load drives stay where they start: along them P-weighted means of u are those
+of u0 (the centre of mass of a block free to slide on level ground does not move). On a conservative
+problem all else is unique."""
 
 from dataclasses import dataclass, replace
 
@@ -28,12 +32,14 @@ from .rigid_bodies import RigidBodies, body_springs
 
 ITERATIONS = 200
 STIFFER = 1e3  # springs for solvers that the weak ones defeat
-INNER = 20_000  # iterations of the solver in all: methods that crawl on a body that is almost free would never end
+# iterations of the solver in all: methods that crawl on a body that is almost free would never end
+INNER = 20_000
 RIGID = 1e-4  # dᵀKd over dᵀPd below which a motion deforms nothing
 DRIVEN = 0.5  # f·d over dᵀPd above which the loads drive it
 NEAR = 1e-3  # of the tolerance: what stiff bodies reach on soft ones
 UNBRAKED = 0.99999  # of the step before: a motion that only a new contact can stop
-STOPPED = 1e-9  # of the largest motion: what a contact point may move towards its obstacle in a free motion
+# of the largest motion: what a contact point may move towards its obstacle in a free motion
+STOPPED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -63,8 +69,8 @@ class _Progress:
         return self.least <= self.tolerance
 
     def take(self, result: StepResult, worst: float, pace: float) -> None:
-        """An answer is better with a smaller residual or, near round-off, with the smallest step: the residual of a
-        stiff body is there long before soft motions are."""
+        """An answer is better with a smaller residual or, near round-off, with the smallest step:
+        the residual of a stiff body is there long before soft motions are."""
         better = worst < self.least or (worst <= NEAR * self.tolerance and pace < self.slowest)
         self.vain, self.best = (0, result) if better else (self.vain + 1, self.best)
         self.least, self.slowest = min(worst, self.least), min(pace, self.slowest)
@@ -100,13 +106,15 @@ class Proximal:
         self._prepared = self._solver.prepare(self._A, self._surface, 1.0)
 
     def certificate(self, result: StepResult) -> Certificate:
-        """Return the certificate of the stage itself, with the equilibrium of every body as a rigid one."""
+        """Return the certificate of the stage itself, with the equilibrium of every body as a rigid
+        one."""
         reaction = self.step.surface.reaction_load(result.r_n, len(result.x), result.r_t)
         resultant = self._bodies.imbalance(self.step.b, reaction)
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Iterate until two answers running are no better; once, if the solver fails, with stronger springs instead."""
+        """Iterate until two answers running are no better; once, if the solver fails, with stronger
+        springs instead."""
         self.step = step
         progress = _Progress(self._tolerance)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
@@ -123,7 +131,8 @@ class Proximal:
         if progress.best is not None and progress.certified:
             return progress.best
         raise StepFailure(
-            f"the static stage of a body held by contact alone was not solved ({why}): start closer to "
+            f"the static stage of a body held by contact alone was not solved ({why}): start "
+            "closer to "
             "the obstacle, use stiffer supports, the solver Condensed(), or hold a part of the body"
         )
 
@@ -147,21 +156,24 @@ class Proximal:
                 raise StepFailure(f"{result.method} took more than {INNER} iterations")
             if not progress.certified:
                 self._refuse_flight(new)
-            # settled reactions need a share of themselves to change; a larger one when the last did not help
+            # settled reactions need a share of themselves to change; a larger one when the last did
+            # not help
             helped = again or share == 1.0 or worst < 0.5 * before
             last, share = share, share_of(worst) if helped else min(1.0, MARGIN * share)
             before, answer, again = worst, result, share < last == 1.0
             if again:
                 continue  # the same step, which corrects its round-off
             carried = self._missing(inner, found)
-            # once the tolerance is met steps are round-off: to go far along one would shift the body
+            # once the tolerance is met steps are round-off: to go far along one would shift the
+            # body
             ahead = 0.0 if old is None or progress.certified else self._ahead(old, new, result)
             old = new if ahead == 0.0 else None
             answer = replace(result, x=result.x + ahead * new.d)
             centre = answer.x
 
     def _missing(self, inner: StepProblem, found: StepResult) -> Array:
-        """What a solver left of a step's resultants: the next carries it, or bodies would drift along what P holds."""
+        """What a solver left of a step's resultants: the next carries it, or bodies would drift
+        along what P holds."""
         if found.aim == 0.0:
             return np.zeros_like(found.x)
         reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
@@ -170,7 +182,8 @@ class Proximal:
     def _left_over(
         self, answer: StepResult, share: float, centre: Array, carried: Array
     ) -> StepProblem:
-        """The next step, b with the forces' own resultants: K u has none, and its round-off would move the body."""
+        """The next step, b with the forces' own resultants: K u has none, and its round-off would
+        move the body."""
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
@@ -203,8 +216,10 @@ class Proximal:
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
         raise InputError(
-            f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor "
-            "a prescribed displacement stops it: hold it there, change the loads, or start the dynamics "
+            f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither "
+            "contact nor "
+            "a prescribed displacement stops it: hold it there, change the loads, or start the "
+            "dynamics "
             "from rest"
         )
 
@@ -220,9 +235,10 @@ class Proximal:
         return f"carry it off along ({way})"
 
     def _ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
-        """How many times d to go further at once: the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the
-        one before (Aitken), or only to the next contact. 0 unless d_new and d_old are parallel, to the accuracy which
-        that distance needs. Any start of the next step will do, so nothing but the speed depends on it."""
+        """How many times d to go further at once: the sum of the steps to come when each is
+        ‖d_new‖/‖d_old‖ of the one before (Aitken), or only to the next contact. 0 unless d_new and
+        d_old are parallel, to the accuracy which that distance needs. Any start of the next step
+        will do, so nothing but the speed depends on it."""
         if 0.0 in (old.pace, new.pace) or self.step.surface.some(old.active != new.active):
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace

@@ -1,7 +1,8 @@
 """Listen to the loop: each recorder names its columns once and fills a row after every step.
 
-Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or arrays (HDF5 only), those of rank 0.
-Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body."""
+Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or arrays (HDF5 only),
+those of rank 0. Displacements and velocities are those of the equations: relative to the ground
+when an excitation shakes the body."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +35,8 @@ def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
 
 
 def refuse_overflow(row: Row) -> None:
-    """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy ledger."""
+    """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy
+    ledger."""
     for name, value in row.items():
         if not isinstance(value, float) or isfinite(value):
             continue
@@ -46,7 +48,8 @@ def refuse_overflow(row: Row) -> None:
 
 
 class Steps:
-    """Record the columns of every run: time, step, iterations, certificate, escalation and ground acceleration."""
+    """Record the columns of every run: time, step, iterations, certificate, escalation and ground
+    acceleration."""
 
     _axes = AXES  # those of the problem, once it is started
 
@@ -78,14 +81,16 @@ class Steps:
 class Energy:
     """Record the energy ledger of the run in joules. Works and losses are sums since the start.
 
-        W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic - defect
-        E = ½ vᵀMv + ½ uᵀKu of the free unknowns, with initial strains ½ vᵀMv + ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0
+        W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic -
+        defect E = ½ vᵀMv + ½ uᵀKu of the free unknowns, with initial strains ½ vᵀMv + ½ uᵀKu -
+        f_0·u + ½ ∫ eps_0 : C eps_0
 
-    with f_0·u = ∫ C eps_0 : eps(u), so that E is ½ ∫ (eps - eps_0) : C (eps - eps_0) if supports are at zero. Rates of
-    initial strains do work too. E has no energy that moved supports store by themselves: their pull -K U is a load.
-    D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is the work of loads, inertia loads -M r a_g and prescribed
-    motions. The defect is the summed work of the residual of the equation of motion; ``summary.json`` has its size over
-    the largest energy or work. Each step costs three products, and damping and impacts cost one more each."""
+    with f_0·u = ∫ C eps_0 : eps(u), so that E is ½ ∫ (eps - eps_0) : C (eps - eps_0) if supports
+    are at zero. Rates of initial strains do work too. E has no energy that moved supports store by
+    themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is
+    the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the summed work
+    of the residual of the equation of motion; ``summary.json`` has its size over the largest energy
+    or work. Each step costs three products, and damping and impacts cost one more each."""
 
     _COLUMNS: ClassVar[Columns] = {
         name: ("J", meaning) for name, meaning in WORDS["columns"].items()
@@ -99,7 +104,8 @@ class Energy:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the initial energies; works and losses are zero, or those of the run that is continued."""
+        """Return the initial energies; works and losses are zero, or those of the run that is
+        continued."""
         self._problem = problem
         self._now, self._stored = (
             energies(problem.equations, state.u, state.v),
@@ -158,7 +164,8 @@ class Energy:
 
 
 def told_pressures(surface: ContactSurface) -> Mask | None:
-    """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all of them.
+    """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all
+    of them.
 
     Where all on all ranks are ``uncovered`` all count. Collective."""
     uncovered = (
@@ -170,18 +177,22 @@ def told_pressures(surface: ContactSurface) -> Mask | None:
 
 @dataclass
 class Contact:
-    """Record gaps, pressures, forces and slip of the contact. Reactions are mean or end values, as the scheme says.
+    """Record gaps, pressures, forces and slip of the contact. Reactions are mean or end values, as
+    the scheme says.
 
-    gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight; the largest is that of
-    points that are covered (``ContactSurface.uncovered``). The force on the body is
-    -Σ r_n n, and its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). On rank 0 the arrays (total,)
-    have all conditions in the order of their numbers, as the points in ``history.h5``; on other ranks they are empty.
+    gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight; the
+    largest is that of points that are covered (``ContactSurface.uncovered``). The force on the body
+    is -Σ r_n n, and its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). On rank
+    0 the arrays (total,) have all conditions in the order of their numbers, as the points in
+    ``history.h5``; on other ranks they are empty.
 
-    With friction it also records the friction force on the body, the largest slip, and arrays (total, d - 1) in the
-    tangents of the nodal frames: traction_t = r_t / weight, the traction of the body on its support, and slip = B_t u,
-    the tangential displacement on the support (of open points too).
+    With friction it also records the friction force on the body, the largest slip, and arrays
+    (total, d - 1) in the tangents of the nodal frames: traction_t = r_t / weight, the traction of
+    the body on its support, and slip = B_t u, the tangential displacement on the support (of open
+    points too).
 
-    Ranks exchange a dozen numbers in each step. ``arrays=False`` leaves the arrays out, and then nothing is gathered.
+    Ranks exchange a dozen numbers in each step. ``arrays=False`` leaves the arrays out, and then
+    nothing is gathered.
     """
 
     arrays: bool = True
@@ -192,7 +203,8 @@ class Contact:
         attributes(self, flags=("arrays",))
 
     def columns(self) -> Columns:
-        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
+        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call
+        ``start`` first."""
         every = _named(
             _COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes
         )
@@ -295,12 +307,14 @@ class Contact:
 class Probe:
     """Record histories at points of the body, each at its nearest node: label -> point (d,) [m].
 
-    The columns are u_x_<label>, u_y_<label> [m]; with ``velocity`` also v_x_<label> [m/s], after the impact law; with
-    ``acceleration`` also a_x_<label> [m/s²], the *absolute* acceleration. This is the one of the step's equation of
-    motion, without velocity jumps of the impact law, plus the mean ground acceleration of the step; row 0 has the
-    ground's own. u and v are relative to the ground when an excitation shakes the body.
+    The columns are u_x_<label>, u_y_<label> [m]; with ``velocity`` also v_x_<label> [m/s], after
+    the impact law; with ``acceleration`` also a_x_<label> [m/s²], the *absolute* acceleration. This
+    is the one of the step's equation of motion, without velocity jumps of the impact law, plus the
+    mean ground acceleration of the step; row 0 has the ground's own. u and v are relative to the
+    ground when an excitation shakes the body.
 
-    InputError if a label has other characters than letters, digits and underscores, or a point is outside the body."""
+    InputError if a label has other characters than letters, digits and underscores, or a point is
+    outside the body."""
 
     points: Mapping[Any, Sequence[float]]
     velocity: bool = False
@@ -318,7 +332,8 @@ class Probe:
             array("Probe", f"the point '{label}'", point, (None,), unit="metres")
         if len({len(point) for point in self.points.values()}) > 1:
             raise InputError(
-                "the probe points have different numbers of coordinates: give one for each dimension"
+                "the probe points have different numbers of coordinates: give one for each "
+                "dimension"
             )
 
     def columns(self) -> Columns:

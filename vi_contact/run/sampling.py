@@ -1,8 +1,10 @@
-"""Say when time steps are too long for what acts: a motion or a load that changes between the steps is not seen.
+"""Say when time steps are too long for what acts: a motion or a load that changes between the steps
+is not seen.
 
-A sine of frequency f is zero at every step if dt is a multiple of half its period 1/(2 f), whatever its amplitude; with
-fewer than ``FEWEST`` steps in a period the steps miss its peaks. The same holds for pulses, by the sine that they are
-cut from, and for records and tables, by the distance of their samples."""
+A sine of frequency f is zero at every step if dt is a multiple of half its period 1/(2 f), whatever
+its amplitude; with fewer than ``FEWEST`` steps in a period the steps miss its peaks. The same holds
+for pulses, by the sine that they are cut from, and for records and tables, by the distance of their
+samples."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +16,8 @@ from ..ground_motion.excitation import GroundMotion
 from ..ground_motion.record import Record
 from ..laws.excitation import FullSine, HalfSine, Rectangular, Tabulated
 
-FEWEST = 4.0  # CHOSEN: steps in a period; a sine at its zeros and peaks still has its largest value at a step
+# CHOSEN: steps in a period; a sine at its zeros and peaks still has its largest value at a step
+FEWEST = 4.0
 ROUNDED = 1e-6  # of a time step: round-off of its quotient with a period
 PARTS = (
     "excitation",
@@ -32,14 +35,16 @@ DEEP = 5  # how far a motion is looked for in what holds it
 
 
 def sampling_warning(problem: ContactProblem, dt: float) -> str | None:
-    """Return a sentence when the time step [s] is too long for an excitation, a load or a motion of the problem whose
-    frequency, period or samples are known; None when it is not, or nothing is known."""
+    """Return a sentence when the time step [s] is too long for an excitation, a load or a motion of
+    the problem whose frequency, period or samples are known; None when it is not, or nothing is
+    known."""
     said = (one for source in _sources(problem) for one in _said(source, dt))
     return next(said, None)
 
 
 def _sources(problem: ContactProblem) -> Iterator[Any]:
-    """Everything that acts as a function of the time: first excitations, then loads, prescribed and moving parts."""
+    """Everything that acts as a function of the time: first excitations, then loads, prescribed and
+    moving parts."""
     yield from problem.excitations
     system, surface = problem.system, problem.surface
     for _, history in system.load.separable:
@@ -64,7 +69,8 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
         spacing = float(np.median(np.diff(source.times)))
         if dt > spacing * (1.0 + ROUNDED):
             yield (
-                f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of {name}, whose "
+                f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of "
+                f"{name}, whose "
                 f"peaks fall between the steps: take a dt of at most {spacing:g} s"
             )
     elif isinstance(source, HalfSine | FullSine | Rectangular):
@@ -85,7 +91,8 @@ def _frequency(source: Any) -> float | None:
 
 
 def _held(source: Any) -> Iterator[Any]:
-    """What a function or an object may have its motion from: its owner, a part of it, or what it closes over."""
+    """What a function or an object may have its motion from: its owner, a part of it, or what it
+    closes over."""
     for name in PARTS:
         found = getattr(source, name, None)
         yield from found if isinstance(found, list | tuple) else (found,)
@@ -105,8 +112,10 @@ def _of_samples(spacing: float, dt: float) -> Iterator[str]:
     """A record with longer steps than its own."""
     if dt > spacing * (1.0 + ROUNDED):
         yield (
-            f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose peaks fall between "
-            "the steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt "
+            f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose "
+            "peaks fall between "
+            "the steps: take a shorter dt, or give resampled(record, dt), which filters out "
+            "frequencies that dt "
             "cannot represent"
         )
 
@@ -118,7 +127,8 @@ def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
     halves = 2.0 * dt / period
     blind = round(halves) >= 1 and abs(halves - round(halves)) <= ROUNDED * halves
     why = (
-        f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every step sees the same "
+        f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every "
+        "step sees the same "
         "value, or zero"
         if blind
         else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}"

@@ -1,4 +1,5 @@
-"""Run the loop over certified steps, with everything that has to happen when it ends, well or badly."""
+"""Run the loop over certified steps, with everything that has to happen when it ends, well or
+badly."""
 
 import logging
 import time
@@ -53,12 +54,13 @@ class Comparison(Protocol):
 
 @dataclass
 class Session:
-    """Hold a run under way: what of the arguments of ``simulate`` holds for all of it, and where it is.
+    """Hold a run under way: what of the arguments of ``simulate`` holds for all of it, and where it
+    is.
 
-    Attributes:
-        recorders: the user's, after those of every run. wall_time: when the process has to have ended.
-        table: the rows so far. step_plan: the base steps. place: the end of the last base step.
-        loop: its steps, where others have them too. resumed_from: the step of the checkpoint that it continues, None
+    Attributes: recorders: the user's, after those of every run. wall_time: when the process has to
+        have ended. table: the rows so far. step_plan: the base steps. place: the end of the last
+        base step. loop: its steps, where others have them too. resumed_from: the step of the
+        checkpoint that it continues, None
             for a new run. stopped: in words, when the callback has asked for the end."""
 
     method: Method
@@ -197,7 +199,8 @@ class Session:
                 begin = time.perf_counter()
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
-        """Interrupted on all ranks, with a checkpoint, by a signal to one, or by the end of the time. Collective."""
+        """Interrupted on all ranks, with a checkpoint, by a signal to one, or by the end of the
+        time. Collective."""
         number, late = signals.asked(self._comm, self.wall_time.over())
         if not (number or late):
             return
@@ -211,7 +214,8 @@ class Session:
     def _call(
         self, callback: Callable[[State, Report], Any], report: Report, writer: Writer
     ) -> None:
-        """Show a step to the callback, which may ask for the end of the run or raise, on one rank. Collective."""
+        """Show a step to the callback, which may ask for the end of the run or raise, on one rank.
+        Collective."""
         state = report.new
         for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
             if array is not None:
@@ -274,9 +278,10 @@ class Session:
     def _rescue(
         self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool
     ) -> None:
-        """Save what there is. A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the
-        same error: others might not come."""
-        # Of any kind: the error that ended the run is the one to tell, and it may keep each of these from working.
+        """Save what there is. A checkpoint of the last base step only on one rank, or where
+        ``all_ranks`` raise the same error: others might not come."""
+        # Of any kind: the error that ended the run is the one to tell, and it may keep each of
+        # these from working.
         with suppress(Exception):
             writer.flush(alone=True)
         with suppress(Exception):
@@ -328,7 +333,8 @@ class Session:
         }
 
     def _seconds_per_linear_step(self) -> float:
-        """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
+        """Median time of right-hand side, one back-substitution and update with the same A, from
+        the last state [s]."""
         if (
             self.last is None or not self.last.step.A.factorised
         ):  # none is made for this: it may not fit
@@ -353,7 +359,8 @@ class Session:
 
 
 def _locked(value: T) -> T:
-    """The value with read-only views of its arrays: some of them, such as the gap at rest, belong to the problem."""
+    """The value with read-only views of its arrays: some of them, such as the gap at rest, belong
+    to the problem."""
     own: Any = value
     views = {
         one.name: array.view()

@@ -1,4 +1,5 @@
-"""Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot spoil."""
+"""Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot
+spoil."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -54,35 +55,46 @@ def simulate(
     wall_time: str | None = None,
     callback: Callable[[State, Report], Any] | None = None,
 ) -> Solution:
-    """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank gets the solution.
+    """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank
+    gets the solution.
 
-    Args:
-        scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the Zienkiewicz-Wood-Taylor
-            step. A problem that names no mass matrix gets the one of the scheme (``run.method.with_defaults``).
+    Args: scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
+        Zienkiewicz-Wood-Taylor
+            step. A problem that names no mass matrix gets the one of the scheme
+            (``run.method.with_defaults``).
         solver: None means Automatic().
-        dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
-        record: recorders; None means (Energy(), Contact()). Time, iterations and certificate are always recorded.
-        out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log, checkpoint.npz, fields.xdmf.
-            Without it nothing is written. Output of an earlier run in the folder is replaced, unless ``restart``.
-        state: the initial state, from a gravity stage for example; None means u0 and v0 of the system.
+        dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and
+            checkpoint_every count base steps.
+        record: recorders; None means (Energy(), Contact()). Time, iterations and certificate are
+            always recorded.
+        out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log,
+            checkpoint.npz, fields.xdmf. Without it nothing is written. Output of an earlier run in
+            the folder is replaced, unless ``restart``.
+        state: the initial state, from a gravity stage for example; None means u0 and v0 of the
+            system.
         escalation, tolerance: see ``march``.
         checkpoint_every: number of base steps between checkpoints.
-        restart: True continues the run in ``out`` from its checkpoint; a path continues the run in that folder.
-            ``steps`` and ``t_end`` are those of the whole run. The result is that of an uninterrupted run: on one rank
-            to the last bit, on several to round-off. InputError if problem, dt or scheme differ from the checkpoint.
-        changed: True continues even if they differ; after a change of dt, ``steps`` count from the checkpoint.
-        progress: show a progress line on a terminal. fields: fem.XDMF(every=10) writes frames for ParaView.
+        restart: True continues the run in ``out`` from its checkpoint; a path continues the run in
+            that folder. ``steps`` and ``t_end`` are those of the whole run. The result is that of
+            an uninterrupted run: on one rank to the last bit, on several to round-off. InputError
+            if problem, dt or scheme differ from the checkpoint.
+        changed: True continues even if they differ; after a change of dt, ``steps`` count from the
+            checkpoint.
+        progress: show a progress line on a terminal. fields: fem.XDMF(every=10) writes frames for
+            ParaView.
         cross_check: a solver whose report() goes into the summary.
-        wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends before it is over.
-        callback: it is called as callback(state, report) on all ranks after every accepted step, also after a part of
-            a halved step, when its row is recorded; the arrays of the state are read-only. If it returns True on some
-            rank, the run ends with this base step, with a checkpoint and status "stopped". If it raises an error, the
-            run ends with an InputError that says where, on all ranks and with a checkpoint.
-    Raises:
-        InputError: before anything is computed or overwritten; also when another run writes into the folder.
-        Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with a checkpoint.
-        OutOfTime: before the wall time is over, with a checkpoint.
-        StepFailure: no solver could certify a step. ViContactError: the disk refused to read or write. All that was
+        wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends
+            before it is over.
+        callback: it is called as callback(state, report) on all ranks after every accepted step,
+            also after a part of a halved step, when its row is recorded; the arrays of the state
+            are read-only. If it returns True on some rank, the run ends with this base step, with a
+            checkpoint and status "stopped". If it raises an error, the run ends with an InputError
+            that says where, on all ranks and with a checkpoint.
+    Raises: InputError: before anything is computed or overwritten; also when another run writes
+        into the folder. Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM
+        or SIGHUP, with a checkpoint. OutOfTime: before the wall time is over, with a checkpoint.
+        StepFailure: no solver could certify a step. ViContactError: the disk refused to read or
+        write. All that was
             computed is then in the folder, and summary.json says why the run ended."""
     with opened(**locals()) as (session, writer):
         return session.go(writer)
@@ -112,8 +124,9 @@ def opened(
     others: Sequence[ContactProblem] = (),
     runs: int = 1,
 ) -> Iterator[tuple[Session, Writer]]:
-    """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``: problems that lend their
-    matrices and factors to it, if they are its own. ``runs``: how many take turns. Collective."""
+    """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``:
+    problems that lend their matrices and factors to it, if they are its own. ``runs``: how many
+    take turns. Collective."""
     check_problem_given("simulate", problem)
     comm = problem.system.algebra.comm
     agree(
@@ -151,7 +164,8 @@ def opened(
         raise InputError("wall_time needs a folder from which the run continues: give out")
     if changed and restart is False:
         raise InputError(
-            "changed=True is for a run that is continued, and this one begins anew: give restart too, or "
+            "changed=True is for a run that is continued, and this one begins anew: give restart "
+            "too, or "
             "leave it out"
         )
     end = WallTime(wall_time, runs)
@@ -216,7 +230,8 @@ def _check_outputs(
     fields: Any,
     cross_check: Any,
 ) -> None:
-    """InputError for what is no recorder, folder, number of steps, writer of fields or cross-check."""
+    """InputError for what is no recorder, folder, number of steps, writer of fields or
+    cross-check."""
     owner = "simulate"
     for one in (
         ()
@@ -265,7 +280,8 @@ def _started(
     state: State,
     resumed: Mapping[str, Any] | None = None,
 ) -> tuple[Columns, Row]:
-    """Start the recorders: their columns, and the row of the state. InputError when two record the same column."""
+    """Start the recorders: their columns, and the row of the state. InputError when two record the
+    same column."""
     row: dict[str, Any] = {}
     nothing: Row = {}
     columns: dict[str, tuple[str, str]] = {}
@@ -288,8 +304,8 @@ def _started(
 
 
 def _kinds(record: Any) -> Any:
-    """What is compared over ranks of recorders: kinds, and settings of those of the package, as each rank may hold its
-    part of what is recorded."""
+    """What is compared over ranks of recorders: kinds, and settings of those of the package, as
+    each rank may hold its part of what is recorded."""
     if not isinstance(record, list | tuple):
         return record
     return [
@@ -299,7 +315,8 @@ def _kinds(record: Any) -> Any:
 
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
-    """Put the rows of an earlier run into the table, arrays on rank 0 only; the last of them. Collective."""
+    """Put the rows of an earlier run into the table, arrays on rank 0 only; the last of them.
+    Collective."""
     blocks = stored.blocks()
     last: Row = {}
     while True:

@@ -1,4 +1,5 @@
-"""Simulate many: several runs of one body at once, each recorded in its own folder as ``simulate`` does."""
+"""Simulate many: several runs of one body at once, each recorded in its own folder as ``simulate``
+does."""
 
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -23,16 +24,19 @@ Ended = tuple[int, Solution | ViContactError]
 def simulate_many(
     runs: Sequence[Mapping[str, Any]], *, tell: Callable[[float], None] = lambda share: None
 ) -> Iterator[Ended]:
-    """Yield (number of the run, its solution) as the runs end; each is given by the arguments of ``simulate``.
+    """Yield (number of the run, its solution) as the runs end; each is given by the arguments of
+    ``simulate``.
 
-    A run that fails yields its error instead, and the others go on; what cannot begin is told before the first step.
-    Runs of one body step together, which costs less than one after the other: ``march_many`` says which can. The
-    others are made one by one at the end. Every run has recorders and a folder of its own; its numbers are those of
-    ``simulate`` to round-off, whatever the company. In the place of progress lines ``tell`` gets the share of all steps
-    that is done, after every step. Collective.
+    A run that fails yields its error instead, and the others go on; what cannot begin is told
+    before the first step. Runs of one body step together, which costs less than one after the
+    other: ``march_many`` says which can. The others are made one by one at the end. Every run has
+    recorders and a folder of its own; its numbers are those of ``simulate`` to round-off, whatever
+    the company. In the place of progress lines ``tell`` gets the share of all steps that is done,
+    after every step. Collective.
 
-    Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as ``simulate`` does,
-    when all runs that have begun have written their checkpoints: ``restart=True`` continues them."""
+    Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as
+    ``simulate`` does, when all runs that have begun have written their checkpoints:
+    ``restart=True`` continues them."""
     every = [
         _arguments(run)
         for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")
@@ -46,7 +50,8 @@ def simulate_many(
     for what, own in (("recorder", books), ("folder", folders)):
         if len(set(own)) < len(own):
             raise InputError(
-                f"simulate_many: two runs have one {what}, which keeps results of one: give each its own"
+                f"simulate_many: two runs have one {what}, which keeps results of one: give each "
+                "its own"
             )
     return _in_turn(every, tell)
 

@@ -29,12 +29,11 @@ CREATED = (
 class Solution:
     """Hold the result of ``simulate``.
 
-    Attributes:
-        history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial state.
-        columns: column -> (unit, meaning).
-        state: the final state in the basis of the nodal frames (``problem.cartesian`` turns it back).
-        facts: the contents of summary.json; the times of a step are medians in seconds, nan without steps.
-        problem: the solved problem, with the mass matrix that the scheme chose. folder: the run folder, or None."""
+    Attributes: history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial
+        state. columns: column -> (unit, meaning). state: the final state in the basis of the nodal
+        frames (``problem.cartesian`` turns it back). facts: the contents of summary.json; the times
+        of a step are medians in seconds, nan without steps. problem: the solved problem, with the
+        mass matrix that the scheme chose. folder: the run folder, or None."""
 
     history: Mapping[str, Array]
     columns: Columns
@@ -51,10 +50,11 @@ class Solution:
         frame: int | None = None,
         continuous: bool = False,
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function, ``fem.as_function`` of the end state.
+        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function,
+        ``fem.as_function`` of the end state.
 
-        With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``. Collective.
-        InputError for a system without a mesh, and without such a frame."""
+        With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``.
+        Collective. InputError for a system without a mesh, and without such a frame."""
         if not hasattr(self.problem.system.space, "V"):
             raise InputError(
                 "function: the system has no mesh and so no Functions; use history and state"
@@ -83,7 +83,8 @@ class Solution:
     __repr__ = summary
 
     def plot(self) -> Any:
-        """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger, certificates."""
+        """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger,
+        certificates."""
         return import_module("vi_contact.plots").plot_overview(
             self
         )  # by name: on a floor above, and no run needs it
@@ -103,12 +104,15 @@ class Solution:
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
-    """Return a sentence when the run had more energy than was put in, by more than CREATED of the largest energy."""
+    """Return a sentence when the run had more energy than was put in, by more than CREATED of the
+    largest energy."""
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
     return (
-        f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: "
-        "take a smaller dt (a wave should not cross more than two elements in a step) or, without impact law, "
+        f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest "
+        "energy of the run: "
+        "take a smaller dt (a wave should not cross more than two elements in a step) or, without "
+        "impact law, "
         "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it"
     )
 

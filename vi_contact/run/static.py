@@ -1,13 +1,16 @@
-"""Find equilibria with contact: the static (gravity) stage where a run starts, and load histories without inertia.
+"""Find equilibria with contact: the static (gravity) stage where a run starts, and load histories
+without inertia.
 
-In a history one stage follows another, as friction makes the equilibrium depend on the way to it. Each stage solves
-the static problem with slips counted from the stage before (slip rate times time step, implicit Euler):
+In a history one stage follows another, as friction makes the equilibrium depend on the way to it.
+Each stage solves the static problem with slips counted from the stage before (slip rate times time
+step, implicit Euler):
 
     K u_k = f(t_k) - B_nᵀ r_n - B_tᵀ r_t,    r_t against B_t (u_k - u_{k-1}),    |r_t| <= limit(r_n)
 
-so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed`` displacements, and
-obstacles that move. Without friction every stage is the equilibrium of its own loads. Slip between stages has no rate,
-so a law that asks for one is refused: its value at rest would be wrong for points in motion wherever it jumps there."""
+so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed``
+displacements, and obstacles that move. Without friction every stage is the equilibrium of its own
+loads. Slip between stages has no rate, so a law that asks for one is refused: its value at rest
+would be wrong for points in motion wherever it jumps there."""
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
@@ -42,15 +45,16 @@ def static_equilibrium(
     t: float = 0.0,
     tolerance: float = TOLERANCE,
 ) -> State:
-    """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without excitation.
+    """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without
+    excitation.
 
-    The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic stage starts. A body
-    that no prescribed displacement holds is brought to rest on its contacts. Free rigid motions that no load drives
-    keep the mean position of u0 (see ``proximal``). If ``solver`` is None, it is Automatic().
+    The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic
+    stage starts. A body that no prescribed displacement holds is brought to rest on its contacts.
+    Free rigid motions that no load drives keep the mean position of u0 (see ``proximal``). If
+    ``solver`` is None, it is Automatic().
 
-    Raises:
-        InputError: the loads drive a rigid motion that nothing stops, so that there is no equilibrium.
-        StepFailure: no answer has a certificate below the tolerance."""
+    Raises: InputError: the loads drive a rigid motion that nothing stops, so that there is no
+        equilibrium. StepFailure: no answer has a certificate below the tolerance."""
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
     agree(problem.surface.comm, owner, {"solver": solver, "t": t, "tolerance": tolerance})
@@ -65,7 +69,8 @@ def static_equilibrium(
 
 
 def _warn_if_open(problem: ContactProblem, state: State) -> None:
-    """Warn, on rank 0, where much of a contact that touches at the start, and is pressed, is open at rest. Collective.
+    """Warn, on rank 0, where much of a contact that touches at the start, and is pressed, is open
+    at rest. Collective.
 
     The place is that of the open point with the lowest number."""
     surface = problem.surface
@@ -82,8 +87,10 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     place = surface.comm.sum(surface.points[own].sum(axis=0))
     if surface.comm.rank == 0:
         log.warning(
-            "at rest at t = %g s %.3g %% of the contact area that touches at the start is open, from %s on: "
-            "loads that lift a body do that; so does a side 1 with smaller facets than a softer side 2, which "
+            "at rest at t = %g s %.3g %% of the contact area that touches at the start is open, "
+            "from %s on: "
+            "loads that lift a body do that; so does a side 1 with smaller facets than a softer "
+            "side 2, which "
             "should be meshed as finely or be side 1",
             state.t,
             100.0 * lost / area,
@@ -111,7 +118,8 @@ class Equilibria:
             self._solve = lambda step: certified.solve(step)[0]
 
     def after(self, old: State, t: float) -> State:
-        """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was; its number too."""
+        """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was;
+        its number too."""
         problem = self._problem
         with together(
             problem.surface.comm
@@ -145,19 +153,20 @@ def quasi_static(
     state: State | None = None,
     tolerance: float = TOLERANCE,
 ) -> Iterator[State]:
-    """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
+    """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k
+    counts stages.
 
-    A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at least a step for
-    every turn, and more where zones of slip grow (small steps follow the path, the error is that of implicit Euler).
-    K is factorised once. Prescribed motions should have no velocity and acceleration: their C U' + M U'' are loads.
+    A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at
+    least a step for every turn, and more where zones of slip grow (small steps follow the path, the
+    error is that of implicit Euler). K is factorised once. Prescribed motions should have no
+    velocity and acceleration: their C U' + M U'' are loads.
 
-    Args:
-        solver: Automatic() when None.
-        times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
-        state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t = 0 without
+    Args: solver: Automatic() when None. times: increasing, none before ``state.t``; the loads are
+        taken there, excitations are not. state: where the history starts, from
+        ``static_equilibrium`` or an earlier history; u0 at t = 0 without
             reactions when None. A body pressed without friction first: the state of that problem.
-    Raises:
-        InputError: times that do not increase; friction that depends on the slip rate; loads that drive a rigid motion
+    Raises: InputError: times that do not increase; friction that depends on the slip rate; loads
+        that drive a rigid motion
             which nothing stops.
         StepFailure: no answer below the certificate tolerance."""
     check_problem_given("quasi_static", problem)
@@ -171,7 +180,8 @@ def quasi_static(
     check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
         raise InputError(
-            f"load steps have no slip rate for {problem.friction}: use Coulomb with the coefficient of "
+            f"load steps have no slip rate for {problem.friction}: use Coulomb with the "
+            "coefficient of "
             "slow sliding, or compute the history in time by march"
         )
     if state is None:
@@ -195,6 +205,7 @@ def _checked(times: Iterable[float], start: float) -> list[float]:
     ways = np.diff([start, *order])
     if not (np.all(np.isfinite(ways)) and np.all(ways >= 0.0) and np.all(ways[1:] > 0.0)):
         raise InputError(
-            f"load steps from t = {start:g} s at {order}: give times that increase, none before the start"
+            f"load steps from t = {start:g} s at {order}: give times that increase, none before "
+            "the start"
         )
     return order

@@ -1,4 +1,5 @@
-"""End a run before its time is over: read a wall time as Slurm does, and say when what is left of it gets short."""
+"""End a run before its time is over: read a wall time as Slurm does, and say when what is left of
+it gets short."""
 
 import math
 import os
@@ -12,7 +13,8 @@ from pathlib import Path
 from ..core.checks import shown
 from ..core.errors import InputError
 
-SAFETY = 2.0  # times the longest step and the checkpoint and histories at the end, as long as the longest so far
+# times the longest step and the checkpoint and histories at the end, as long as the longest so far
+SAFETY = 2.0
 _FORMS = "minutes, minutes:seconds, hours:minutes:seconds, days-hours, days-hours:minutes or days-hours:minutes:seconds"
 _UNITS = {
     "": ((60,), (60, 1), (3600, 60, 1)),
@@ -36,7 +38,8 @@ def seconds_of(wall_time: object) -> float:
 
 
 def age() -> float:
-    """Return the seconds since this process began; where the system does not tell, since this module was imported."""
+    """Return the seconds since this process began; where the system does not tell, since this
+    module was imported."""
     return time.monotonic() - _born()
 
 
@@ -51,7 +54,8 @@ def _born() -> float:
 
 
 class WallTime:
-    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time; None: there is no end."""
+    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time; None:
+    there is no end."""
 
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
         self.text, self._runs = wall_time, runs

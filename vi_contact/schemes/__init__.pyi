@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .contact_stabilised import ContactStabilisedNewmark as ContactStabilisedNewmark
 from .generalised_alpha import GeneralisedAlpha as GeneralisedAlpha
 from .hht import HHT as HHT

@@ -1,4 +1,5 @@
-"""Hold what schemes share: two families of them, the step in displacements, and what does not suit their contact."""
+"""Hold what schemes share: two families of them, the step in displacements, and what does not suit
+their contact."""
 
 import logging
 
@@ -13,19 +14,23 @@ log = logging.getLogger(__name__)
 
 
 class SingleStep:
-    """Share what one-step schemes have in common: they start by themselves, and velocity jumps do not disturb them."""
+    """Share what one-step schemes have in common: they start by themselves, and velocity jumps do
+    not disturb them."""
 
     @property
     def mass(self) -> MassLaw:
-        """Return the consistent mass: contact is an impulse within the step, so contact nodes need their mass."""
+        """Return the consistent mass: contact is an impulse within the step, so contact nodes need
+        their mass."""
         return ConsistentMass()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for unknowns without mass, as contact nodes: their forces would swing for ever."""
+        """Raise InputError for unknowns without mass, as contact nodes: their forces would swing
+        for ever."""
         _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
             raise InputError(
-                f"{type(self).__name__} needs mass at the contact nodes, else their forces oscillate: "
+                f"{type(self).__name__} needs mass at the contact nodes, else their forces "
+                "oscillate: "
                 "give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()"
             )
 
@@ -43,11 +48,13 @@ class BalanceStep:
 
     @property
     def mass(self) -> MassLaw:
-        """Return the redistributed mass: with contact in the balance of forces, mass at its nodes creates energy."""
+        """Return the redistributed mass: with contact in the balance of forces, mass at its nodes
+        creates energy."""
         return Redistributed()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes; warn when they have mass."""
+        """Raise InputError for an impact law on massless contact nodes; warn when they have
+        mass."""
         check_balance(repr(self), problem)
 
 
@@ -62,7 +69,8 @@ def position_step(
     guess: Array | None = None,
     active: Mask | None = None,
 ) -> StepProblem:
-    """Return the step A x = b - …, x = u1: gap and slip of the end of the step; by default free flight as the guess."""
+    """Return the step A x = b - …, x = u1: gap and slip of the end of the step; by default free
+    flight as the guess."""
     end = state.t + dt
     return StepProblem(
         A=A,
@@ -81,7 +89,8 @@ def position_step(
 
 
 def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
-    """Return the state after the step, with the mean reactions r/scale; what another scheme remembered is forgotten."""
+    """Return the state after the step, with the mean reactions r/scale; what another scheme
+    remembered is forgotten."""
     r_t = None if result.r_t is None else result.r_t / step.scale
     return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
@@ -89,7 +98,8 @@ def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
 def means(
     problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array
 ) -> Balance:
-    """Return the equation of a step with mean u and f, mean rates of u and v, and the reactions of the new state."""
+    """Return the equation of a step with mean u and f, mean rates of u and v, and the reactions of
+    the new state."""
     v, a = problem.equations.rates(old.u, new.u, old.v, new.v, dt)
     return Balance(u=u, v=v, a=a, f=f, r_n=new.r_n, r_t=new.r_t)
 
@@ -97,14 +107,16 @@ def means(
 def check_balance(name: str, problem: ContactProblem) -> None:
     """Check what schemes with contact in the acceleration balance march.
 
-    Raises InputError for an impact law on massless contact nodes: there is no momentum that it could change. Warns,
-    once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1 g0) is created whenever a contact opens.
+    Raises InputError for an impact law on massless contact nodes: there is no momentum that it
+    could change. Warns, once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1
+    g0) is created whenever a contact opens.
     """
     _refuse_massless_elsewhere(problem)
     massless, surface = problem.equations.massless is not None, problem.surface
     if massless and problem.impact is not None:
         raise InputError(
-            f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in this "
+            f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in "
+            "this "
             "problem: leave the law out, or give the problem mass=ConsistentMass()"
         )
     if massless or not surface.some(~surface.bilateral & surface.rigid):
@@ -124,6 +136,7 @@ def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     layer, surface = problem.equations.massless, problem.surface
     if layer is not None and surface.some(~layer[surface.owned]):
         raise InputError(
-            "rows of M are zero while contact nodes have mass: condense these unknowns out of K (it is "
+            "rows of M are zero while contact nodes have mass: condense these unknowns out of K "
+            "(it is "
             "exact, as for rotations of a lumped beam), give them mass, or use mass=Redistributed()"
         )

@@ -1,20 +1,23 @@
-"""Step with the general linear multistep operators of the boundary method, eqs. 11a,b, with Newmark as one member.
+"""Step with the general linear multistep operators of the boundary method, eqs. 11a,b, with Newmark
+as one member.
 
     sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
     sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
 
-Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n - B_tᵀ r_t at t_p:
+Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n -
+B_tᵀ r_t at t_p:
 
     A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1,   |r_t| <= limit(r_n) along B_t du
 
-(The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +.)
-Start, and restart after every velocity jump or change of dt: the past is filled in with constant acceleration, which
-makes Newmark's two-step form reproduce its one-step form exactly and keeps second order for the other members. After a
-jump it is the one that fits the state without the reaction of the collision (``consistent_data``): kept, that would
-act for another step, and throw off what the impact law has just stopped. A change of dt keeps both.
-Unknowns without mass (mass.Redistributed) have no acceleration and the mean velocity of the step.
-Energy: the ledger closes with the means of both ends. Unlike the midpoint form, contact in the acceleration
-balance at t_p can *gain* energy on consistent mass, booked as algorithmic or contact loss of negative sign.
+(The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +.) Start,
+and restart after every velocity jump or change of dt: the past is filled in with constant
+acceleration, which makes Newmark's two-step form reproduce its one-step form exactly and keeps
+second order for the other members. After a jump it is the one that fits the state without the
+reaction of the collision (``consistent_data``): kept, that would act for another step, and throw
+off what the impact law has just stopped. A change of dt keeps both. Unknowns without mass
+(mass.Redistributed) have no acceleration and the mean velocity of the step. Energy: the ledger
+closes with the means of both ends. Unlike the midpoint form, contact in the acceleration balance at
+t_p can *gain* energy on consistent mass, booked as algorithmic or contact loss of negative sign.
 Impulses: those over a contact with free flight before and after are the change of momentum."""
 
 from dataclasses import dataclass, replace
@@ -37,9 +40,11 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 @dataclass(frozen=True)
 class LinearMultistep(BalanceStep):
-    """Step with the coefficients of a linear multistep method, newest level first, all of one length q + 1 >= 2.
+    """Step with the coefficients of a linear multistep method, newest level first, all of one
+    length q + 1 >= 2.
 
-    InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²)."""
+    InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u =
+    1, t and t²)."""
 
     by_rows: ClassVar[bool] = True
 
@@ -59,7 +64,8 @@ class LinearMultistep(BalanceStep):
             )
         if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
             raise InputError(
-                "LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit schemes "
+                "LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit "
+                "schemes "
                 "can hold contact"
             )
         level = -np.arange(q + 1.0)
@@ -74,19 +80,22 @@ class LinearMultistep(BalanceStep):
         scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
         if not np.max(np.abs(defects)) <= 1e-12 * scale * (q + 1) ** 2:
             raise InputError(
-                "LinearMultistep coefficients are inconsistent: give some for which eq. 11a is exact for "
+                "LinearMultistep coefficients are inconsistent: give some for which eq. 11a is "
+                "exact for "
                 "u = 1, t and eq. 11b for u = 1, t, t²"
             )
         if self.spectral_radius() > 1.0 + 1e-6:
             raise InputError(
-                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally "
-                "stable: contact has no highest frequency to choose dt by; take other coefficients, for "
+                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not "
+                "unconditionally "
+                "stable: contact has no highest frequency to choose dt by; take other "
+                "coefficients, for "
                 "Newmark beta >= gamma/2 >= 1/4"
             )
 
     def spectral_radius(self) -> float:
-        """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and
-        DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
+        """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over
+        FREQUENCIES w dt and DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         polynomials = [b] + [
             gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING
@@ -112,7 +121,8 @@ class LinearMultistep(BalanceStep):
         return self.a[0] / (dt * self.b[0]), self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with a past, unless it has one for this dt; massless nodes come into equilibrium, once."""
+        """Return the state with a past, unless it has one for this dt; massless nodes come into
+        equilibrium, once."""
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
             return self._restarted(problem, equilibrated(problem, state), dt)
@@ -178,7 +188,8 @@ class LinearMultistep(BalanceStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one down."""
+        """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one
+        down."""
         levels = self._levels(state)
         (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
         v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
@@ -195,5 +206,6 @@ class LinearMultistep(BalanceStep):
         )
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the mean of the equations of motion at both ends of the step, the old end after its impact."""
+        """Return the mean of the equations of motion at both ends of the step, the old end after
+        its impact."""
         return weighted(problem, old, new, 0.5, 0.5, "_0")

@@ -7,10 +7,11 @@
 In x = u1:  A = 4/dt² M + 2/dt C + K,  scale = 2. It is ZienkiewiczWoodTaylor(½), SS22(½, ½) and the rule of Kane,
 Repetto, Ortiz and Marsden with implicit contact, identical to round-off (table 1.7).
 
-Order 2, unconditionally stable, no damping of any frequency. Energy: it changes by work of loads, damping and
-friction, and a closure loses r̄_n times the gap that was closed: contact never creates energy. Contact forces ring,
-since contact nodes need their mass here. Impulses: dt r̄_n is the change of momentum in every step.
-Source: Kane, Repetto, Ortiz and Marsden, Comput. Methods Appl. Mech. Eng. 180 (1999) 1-26."""
+Order 2, unconditionally stable, no damping of any frequency. Energy: it changes by work of loads,
+damping and friction, and a closure loses r̄_n times the gap that was closed: contact never creates
+energy. Contact forces ring, since contact nodes need their mass here. Impulses: dt r̄_n is the
+change of momentum in every step. Source: Kane, Repetto, Ortiz and Marsden, Comput. Methods Appl.
+Mech. Eng. 180 (1999) 1-26."""
 
 from dataclasses import dataclass, field
 

@@ -11,17 +11,20 @@ is a law for nodes: on a fine mesh it has no macroscopic effect. Order 2 without
 
 Energy:  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)
 
-With Newton's law P_n B_n v_θ = (1 - theta - theta e) P_n B_n v0: no energy comes from points that approach if
-theta <= 1/(1 + e). From points that had begun to separate and are caught within the step it does. They therefore get
-the bound -(1 - theta)/theta B_n v0, that is B_n v_θ <= 0: such a point ends the step no deeper than it began, and is an
-approaching one in the next. Normal contact then never creates energy; at theta = 1/(1 + e) there is no difference.
-Friction has the law at the end of the step but the work of its mean: P_t·B_t v_θ may be negative where sliding turns.
+With Newton's law P_n B_n v_θ = (1 - theta - theta e) P_n B_n v0: no energy comes from points that
+approach if theta <= 1/(1 + e). From points that had begun to separate and are caught within the
+step it does. They therefore get the bound -(1 - theta)/theta B_n v0, that is B_n v_θ <= 0: such a
+point ends the step no deeper than it began, and is an approaching one in the next. Normal contact
+then never creates energy; at theta = 1/(1 + e) there is no difference. Friction has the law at the
+end of the step but the work of its mean: P_t·B_t v_θ may be negative where sliding turns.
 
-Penetration: the condition is on velocities, so a gap closes late, by less than dt times the speed of approach, and what
-it has passed by then stays while contact lasts (e = 0): a negative ``contact_min_gap`` that shrinks with dt.
+Penetration: the condition is on velocities, so a gap closes late, by less than dt times the speed
+of approach, and what it has passed by then stays while contact lasts (e = 0): a negative
+``contact_min_gap`` that shrinks with dt.
 
-Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods Appl. Mech. Engng
-177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound of separating points is ours."""
+Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods
+Appl. Mech. Engng 177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound
+of separating points is ours."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -41,10 +44,9 @@ from .consistent_data import ROUND_OFF
 class MoreauJean(SingleStep):
     """Step by the module's equations.
 
-    Attributes:
-        theta: weight of the end of the step, from ½ to 1/(1 + e).
-        e: restitution coefficient of the contact nodes, from 0 to 1.
-        allow_energy_gain: accept any theta from ½ to 1, and use Newton's law for points that separate too.
+    Attributes: theta: weight of the end of the step, from ½ to 1/(1 + e). e: restitution
+        coefficient of the contact nodes, from 0 to 1. allow_energy_gain: accept any theta from ½ to
+        1, and use Newton's law for points that separate too.
 
     InputError for numbers outside these ranges."""
 
@@ -68,12 +70,14 @@ class MoreauJean(SingleStep):
         largest = 1.0 / (1.0 + self.e)
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
             raise InputError(
-                f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give theta "
+                f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give "
+                "theta "
                 f"from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True"
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
+        """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point
+        with a gap."""
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
@@ -83,12 +87,14 @@ class MoreauJean(SingleStep):
             )
         if problem.impact is not None:
             raise InputError(
-                f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of "
+                f"MoreauJean has its own restitution coefficient and {problem.impact} would act on "
+                "top of "
                 "it: leave the impact law out, and give MoreauJean(e=…)"
             )
         if surface.some(surface.bilateral & (surface.gap0 > 0.0)):
             raise InputError(
-                "MoreauJean holds the velocity of bilateral points and would never close their initial "
+                "MoreauJean holds the velocity of bilateral points and would never close their "
+                "initial "
                 "gap: let them start on the obstacle, or use another scheme"
             )
 
@@ -103,7 +109,8 @@ class MoreauJean(SingleStep):
         return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
 
     def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Largest normal velocity after the step of a closed point; all refer to the velocity of the obstacle."""
+        """Largest normal velocity after the step of a closed point; all refer to the velocity of
+        the obstacle."""
         surface, advance = problem.surface, problem.surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt
         v_n = surface.normal_values(state.v) - obstacle
@@ -115,7 +122,8 @@ class MoreauJean(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0)."""
+        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta)
+        C v0)."""
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.product("K", state.u)
         force -= self.theta * left * dt * system.product("K", state.v)

@@ -1,4 +1,5 @@
-"""Step by SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two weights theta1, theta2.
+"""Step by SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two weights theta1,
+theta2.
 
     u(tau) = u0 + v0 tau + ½ alpha tau²,  weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
     (M + theta1 dt C + ½ theta2 dt² K) alpha = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n - B_tᵀ r̄_t
@@ -24,7 +25,8 @@ from .base import SingleStep, means, position_step, stepped
 
 @dataclass(frozen=True)
 class SS22(SingleStep):
-    """Step by the module's equations. InputError unless theta2 >= theta1 >= ½ (else only conditionally stable)."""
+    """Step by the module's equations. InputError unless theta2 >= theta1 >= ½ (else only
+    conditionally stable)."""
 
     by_rows: ClassVar[bool] = True
 
@@ -34,7 +36,8 @@ class SS22(SingleStep):
     def __post_init__(self) -> None:
         if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
             raise InputError(
-                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give theta2 >= "
+                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give "
+                "theta2 >= "
                 "theta1 >= 0.5, the unconditionally stable range"
             )
 

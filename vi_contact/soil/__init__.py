@@ -1,4 +1,5 @@
-"""Bring the motion of the ground to a body: moved bases, upgoing waves, soil columns, free-field sides.
+"""Bring the motion of the ground to a body: moved bases, upgoing waves, soil columns, free-field
+sides.
 
 Begin with docs/guide/soil.md, which tells ``base_motion`` (rock that moves) from ``upgoing`` (a wave in
 ``fem.CompliantBase``, half the motion of an outcrop); ``FreeField`` goes to the sides.

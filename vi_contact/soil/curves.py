@@ -1,4 +1,5 @@
-"""Say how soil softens and damps as it is sheared: curves of G/Gmax and of the damping ratio over the shear strain."""
+"""Say how soil softens and damps as it is sheared: curves of G/Gmax and of the damping ratio over
+the shear strain."""
 
 import tomllib
 from collections.abc import Sequence
@@ -12,18 +13,21 @@ from ..core.algebra import Array
 from ..core.checks import array, check_word, number, shown
 from ..core.errors import InputError
 
-LINEAR = 0.95  # G/Gmax where a table must begin: below its first strain the soil has the values of its first row
+# G/Gmax where a table must begin: below its first strain the soil has the values of its first row
+LINEAR = 0.95
 ATMOSPHERE = 101325.0  # Pa
 _TABLES = tomllib.loads(files(__package__).joinpath("curves.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
 class SoilCurves:
-    """Hold G/Gmax and the damping ratio at shear strains; straight lines over the logarithm of the strain between them.
+    """Hold G/Gmax and the damping ratio at shear strains; straight lines over the logarithm of the
+    strain between them.
 
-    strain: rising, as numbers, not per cent (1e-3 is 0.1 %); reduction: G/Gmax, from at least 0.95 falling, above zero;
-    damping: ratios below 1/2. Smaller strains than the first have its values; larger ones than the last are outside:
-    ``equivalent_linear`` and ``strain_compatible`` refuse to end there. InputError for other tables."""
+    strain: rising, as numbers, not per cent (1e-3 is 0.1 %); reduction: G/Gmax, from at least 0.95
+    falling, above zero; damping: ratios below 1/2. Smaller strains than the first have its values;
+    larger ones than the last are outside: ``equivalent_linear`` and ``strain_compatible`` refuse to
+    end there. InputError for other tables."""
 
     strain: Sequence[float]
     reduction: Sequence[float]
@@ -38,7 +42,8 @@ class SoilCurves:
         )
         if len(strain) < 2 or strain[0] <= 0.0 or np.any(np.diff(strain) <= 0.0):
             raise InputError(
-                f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more rising "
+                f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more "
+                "rising "
                 "numbers above zero"
             )
         if (
@@ -47,12 +52,14 @@ class SoilCurves:
             or not LINEAR <= reduction[0] <= 1.0
         ):
             raise InputError(
-                f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax that "
+                f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax "
+                "that "
                 f"falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller strains"
             )
         if damping.min() < 0.0 or damping.max() >= 0.5:
             raise InputError(
-                f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from 0 to "
+                f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from "
+                "0 to "
                 "less than 1/2, not per cent"
             )
         for name, values in (("strain", strain), ("reduction", reduction), ("damping", damping)):
@@ -60,14 +67,16 @@ class SoilCurves:
 
     @classmethod
     def linear(cls, damping: float) -> "SoilCurves":
-        """Return those of what keeps its stiffness and this damping ratio at any strain: a structure, stiff rock."""
+        """Return those of what keeps its stiffness and this damping ratio at any strain: a
+        structure, stiff rock."""
         xi = number("SoilCurves.linear", "the damping ratio", damping, not_negative=True)
         return cls((1e-9, 1e9), (1.0, 1.0), (xi, xi), f"linear, {xi:g}")
 
     @classmethod
     def seed_idriss(cls, bound: str = "mean") -> "SoilCurves":
-        """Return those of sands, Seed and Idriss (1970), as pystrata 0.5.4 has read them from the figures: "mean", or
-        "upper" modulus with lower damping, which SHAKE91 goes by. Strains up to 1 %."""
+        """Return those of sands, Seed and Idriss (1970), as pystrata 0.5.4 has read them from the
+        figures: "mean", or "upper" modulus with lower damping, which SHAKE91 goes by. Strains up to
+        1 %."""
         known = _TABLES["seed_idriss"]
         check_word("bound of seed_idriss", bound, tuple(known))
         return cls(
@@ -79,15 +88,17 @@ class SoilCurves:
 
     @classmethod
     def vucetic_dobry(cls, plasticity: float) -> "SoilCurves":
-        """Return those of a plasticity index from 0 to 200 [%], Vucetic and Dobry (1991), read likewise: published for
-        0, 15, 30, 50, 100 and 200, straight lines over the index between. Strains up to 1 %."""
+        """Return those of a plasticity index from 0 to 200 [%], Vucetic and Dobry (1991), read
+        likewise: published for 0, 15, 30, 50, 100 and 200, straight lines over the index between.
+        Strains up to 1 %."""
         index = number(
             "SoilCurves.vucetic_dobry", "the plasticity index [%]", plasticity, not_negative=True
         )
         known = _TABLES["vucetic_dobry"]
         if index > known["plasticity"][-1]:
             raise InputError(
-                f"SoilCurves.vucetic_dobry: the plasticity index is {index:g} %, and the curves end at "
+                f"SoilCurves.vucetic_dobry: the plasticity index is {index:g} %, and the curves "
+                "end at "
                 f"{known['plasticity'][-1]} %: give SoilCurves of your own"
             )
         reduction, damping = (
@@ -106,13 +117,15 @@ class SoilCurves:
         frequency: float = 1.0,
         cycles: float = 10.0,
     ) -> "SoilCurves":
-        """Return those of Darendeli (2001), for p = mean_stress / 1 atm, PI in %, strains in % up to 1:
+        """Return those of Darendeli (2001), for p = mean_stress / 1 atm, PI in %, strains in % up
+        to 1:
 
             G/Gmax = 1 / (1 + (s/s_r)^0.919),    s_r = (0.0352 + 0.001 PI ocr^0.3246) p^0.3483
             xi = (0.6329 - 0.00566 ln N) (G/Gmax)^0.1 D_Masing + xi_min
             xi_min = (0.8005 + 0.0129 PI ocr^-0.1069) p^-0.2889 (1 + 0.2919 ln f)
 
-        with his D_Masing. mean_stress: effective [Pa] > 0; ocr: at least 1; frequency f [Hz], N cycles > 0."""
+        with his D_Masing. mean_stress: effective [Pa] > 0; ocr: at least 1; frequency f [Hz], N
+        cycles > 0."""
         owner = "SoilCurves.darendeli"
         p = number(owner, "mean_stress [Pa]", mean_stress, positive=True) / ATMOSPHERE
         index = number(owner, "plasticity [%]", plasticity, not_negative=True)
@@ -141,17 +154,20 @@ class SoilCurves:
         return cls(rows[0], rows[1], rows[2], f"Darendeli PI {index:g}, {mean_stress:g} Pa")
 
     def beyond(self, strain: float, place: str) -> str:
-        """Return the sentence about an effective strain beyond the largest of the curves; empty where it is not."""
+        """Return the sentence about an effective strain beyond the largest of the curves; empty
+        where it is not."""
         return (
             ""
             if strain <= self.strain[-1]
             else (
-                f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and '{self.name}' ends at "
+                f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and "
+                f"'{self.name}' ends at "
                 f"{100.0 * self.strain[-1]:.3g} %; give a weaker motion, or curves that go further"
             )
         )
 
     def at(self, strain: Array) -> tuple[Array, Array]:
-        """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its values."""
+        """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its
+        values."""
         place, known = np.log(np.maximum(strain, self.strain[0])), np.log(self.strain)
         return np.interp(place, known, self.reduction), np.interp(place, known, self.damping)

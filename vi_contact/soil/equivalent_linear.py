@@ -1,12 +1,15 @@
-"""Shake level ground whose layers soften and damp as they are sheared: equivalent-linear columns, as SHAKE does.
+"""Shake level ground whose layers soften and damp as they are sheared: equivalent-linear columns,
+as SHAKE does.
 
-Vertical shear waves in layers on rock, in the frequency domain; depth z from the top of a layer, downwards:
+Vertical shear waves in layers on rock, in the frequency domain; depth z from the top of a layer,
+downwards:
 
     u = A exp(i (w t + k z)) + B exp(i (w t - k z)),    k = w sqrt(rho/G*),    G* = G (1 + 2 i xi)
 
-Every layer has one G and one xi, those of its curves at ``ratio`` times the largest strain in its middle, and the waves
-are computed again until neither changes by more than ``tolerance``.
-Sources: Schnabel, Lysmer and Seed, EERC 72-12 (1972); Idriss and Sun, SHAKE91 (1992); Kramer (1996), ch. 7."""
+Every layer has one G and one xi, those of its curves at ``ratio`` times the largest strain in its
+middle, and the waves are computed again until neither changes by more than ``tolerance``. Sources:
+Schnabel, Lysmer and Seed, EERC 72-12 (1972); Idriss and Sun, SHAKE91 (1992); Kramer (1996), ch.
+7."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,8 +36,9 @@ Layer = tuple[
 
 @dataclass(frozen=True)
 class SiteResponse:
-    """Hold what ``equivalent_linear`` found. From the top: ``shear`` [Pa] and ``damping`` of every layer, and its
-    largest ``strain``, (n,); ``surface``: the motion at the surface; ``iterations``: how many it took."""
+    """Hold what ``equivalent_linear`` found. From the top: ``shear`` [Pa] and ``damping`` of every
+    layer, and its largest ``strain``, (n,); ``surface``: the motion at the surface; ``iterations``:
+    how many it took."""
 
     layers: tuple[Layer, ...]
     shear: Array
@@ -44,8 +48,9 @@ class SiteResponse:
     iterations: int
 
     def column(self, *, frequency: float, height: float) -> SoilColumn:
-        """Return the column for runs in time, base at y = 0, damped by beta = xi / (pi f) at this frequency [Hz]; its
-        elements have at most this height [m], and Poisson's ratio is that of the layers."""
+        """Return the column for runs in time, base at y = 0, damped by beta = xi / (pi f) at this
+        frequency [Hz]; its elements have at most this height [m], and Poisson's ratio is that of
+        the layers."""
         f, most = (
             number("SiteResponse.column", name, one, positive=True)
             for name, one in (("frequency", frequency), ("height", height))
@@ -76,12 +81,13 @@ def equivalent_linear(
 ) -> SiteResponse:
     """Return the response of layers to a record along the surface.
 
-    layers: (thickness [m], material at small strains, curves) of each, from the top.
-    rock: the half-space below, whose *outcrop* the record is of; None: the record is of the base itself (*within*).
-    ratio: of the effective to the largest strain, 0.65 or (M - 1)/10 for magnitude M. tolerance: relative, of G and xi.
-    frequency: None for xi at all frequencies; f [Hz] for G* = G (1 + 2 i xi w/(2 pi f)), the damping of
-    ``column`` and DampingRatio. The record is followed by as long a quiet time. InputError where the effective strain
-    ends beyond its curves; ViContactError without convergence in so many iterations."""
+    layers: (thickness [m], material at small strains, curves) of each, from the top. rock: the
+    half-space below, whose *outcrop* the record is of; None: the record is of the base itself
+    (*within*). ratio: of the effective to the largest strain, 0.65 or (M - 1)/10 for magnitude M.
+    tolerance: relative, of G and xi. frequency: None for xi at all frequencies; f [Hz] for G* = G
+    (1 + 2 i xi w/(2 pi f)), the damping of ``column`` and DampingRatio. The record is followed by
+    as long a quiet time. InputError where the effective strain ends beyond its curves;
+    ViContactError without convergence in so many iterations."""
     owner = "equivalent_linear"
     remedy = "give (thickness, LinearElastic, SoilCurves) of each layer, from the top"
     layers = tuple(
@@ -95,7 +101,8 @@ def equivalent_linear(
         instance(owner, "the curves", curves, SoilCurves, remedy)
         if material.xi:
             raise InputError(
-                f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and the "
+                f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and "
+                "the "
                 "curves of the layer give its damping; leave xi out"
             )
     instance(owner, "record", record, Record, "give a Record, such as read_record returns")
@@ -103,12 +110,14 @@ def equivalent_linear(
     number(owner, "rock_damping", rock_damping, not_negative=True)
     if rock is None and rock_damping not in (0.0, ROCK_DAMPING):
         raise InputError(
-            f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or leave "
+            f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or "
+            "leave "
             "it out"
         )
     if rock is not None and rock.xi:
         raise InputError(
-            f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; give "
+            f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; "
+            "give "
             "rock_damping, and leave xi out"
         )
     optional(number, owner, "frequency", frequency, positive=True)
@@ -158,8 +167,9 @@ def iterated(
     most: int,
     comm: Comm,
 ) -> tuple[T, Array, tuple[float, ...]]:
-    """Return (what the last run returned, the values it had, changes) as soon as none of run(values) -> (…, new values)
-    changes by more than the tolerance, relative to the new one. ViContactError after so many runs. Collective."""
+    """Return (what the last run returned, the values it had, changes) as soon as none of
+    run(values) -> (…, new values) changes by more than the tolerance, relative to the new one.
+    ViContactError after so many runs. Collective."""
     number(owner, "tolerance", tolerance, positive=True)
     changes: list[float] = []
     for _ in range(whole(owner, "most", most, least=1)):
@@ -183,10 +193,11 @@ def _waves(
     slope: Array,
     rock: NDArray[np.complex128] | None,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Surface acceleration and strains in the middle of the layers, (n, frequencies), over the acceleration given.
+    """Surface acceleration and strains in the middle of the layers, (n, frequencies), over the
+    acceleration given.
 
-    From the top down: B/A, and A over that of the layer below, of which none grows with depth or frequency. Below a
-    base that moves as given any rock does."""
+    From the top down: B/A, and A over that of the layer below, of which none grows with depth or
+    frequency. Below a base that moves as given any rock does."""
     thick, rho = np.array([[thickness, material.rho] for thickness, material, _ in layers]).T[
         :, :, None
     ]

@@ -1,13 +1,16 @@
-"""Continue level ground behind a body's sides: dashpots on the difference to the free field, and its stress.
+"""Continue level ground behind a body's sides: dashpots on the difference to the free field, and
+its stress.
 
-On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the ground far away,
+On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the
+ground far away,
 
     traction = sigma_ff·n - D (v - v_ff),    D v = rho c_P v_n n + rho c_S v_t
 
-(FLAC and PLAXIS free-field boundaries; OpenSees ASDAbsorbingBoundary2D). Without a structure v = v_ff and the side is
-not there: exact here to round-off, as the column has the heights and materials of the side's own elements and is
-marched with the run's scheme. Waves that a structure sends out leave through the dashpots. No static load is
-held: for a gravity stage put the sides on rollers, then ``release`` them."""
+(FLAC and PLAXIS free-field boundaries; OpenSees ASDAbsorbingBoundary2D). Without a structure v =
+v_ff and the side is not there: exact here to round-off, as the column has the heights and materials
+of the side's own elements and is marched with the run's scheme. Waves that a structure sends out
+leave through the dashpots. No static load is held: for a gravity stage put the sides on rollers,
+then ``release`` them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -36,8 +39,9 @@ Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
 class FreeField(Dashpots):
     """Describe one vertical side of a body in the plane, its lowest node at the base.
 
-    ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion`` (prescribed base) or its
-    ``CompliantBase``. The column behind the side is marched with the scheme and the time steps of the run, from t = 0.
+    ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion``
+    (prescribed base) or its ``CompliantBase``. The column behind the side is marched with the
+    scheme and the time steps of the run, from t = 0.
     """
 
     base: Base = field(repr=False)
@@ -50,13 +54,15 @@ class FreeField(Dashpots):
 
     @property
     def ground(self) -> CompliantBase | GroundFrame:
-        """Return what the column stands on: the base, or the frame of the ground that the excitations shake."""
+        """Return what the column stands on: the base, or the frame of the ground that the
+        excitations shake."""
         if isinstance(self.base, BaseMotion | CompliantBase):
             return self.base
         return GroundFrame(tuple(self.base) if isinstance(self.base, Sequence) else (self.base,))
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
-        """Return the stress of the free field on the side, D v_ff, and the column that both are taken from."""
+        """Return the stress of the free field on the side, D v_ff, and the column that both are
+        taken from."""
         side = FreeFieldSide(matrix, self, forms)
         return BoundaryLoads(
             (side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ()))
@@ -72,7 +78,8 @@ class FreeField(Dashpots):
 class FreeFieldSide:
     """March the column beside one side, and give the forces it puts on the body.
 
-    InputError for a body in space, a side not vertical, a lowest node free on a rigid base or held on a compliant one.
+    InputError for a body in space, a side not vertical, a lowest node free on a rigid base or held
+    on a compliant one.
     """
 
     def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:
@@ -96,12 +103,14 @@ class FreeFieldSide:
         name, compliant = given.facets.name, self._ground.lets_waves_in
         if not compliant and held < 2:
             raise InputError(
-                f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "
+                f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the "
+                "base, "
                 "or give the side its CompliantBase"
             )
         if compliant and held:
             raise InputError(
-                f"the lowest node of free-field side '{name}' is held, but its base is compliant: leave "
+                f"the lowest node of free-field side '{name}' is held, but its base is compliant: "
+                "leave "
                 "the base free"
             )
 
@@ -148,7 +157,8 @@ class FreeFieldSide:
 
 
 def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
-    """The column beside the side, the same on every rank, and the sign of the side's outward normal."""
+    """The column beside the side, the same on every rank, and the sign of the side's outward
+    normal."""
     mesh, name = space.mesh, given.facets.name
     owned = given.facets.indices[given.facets.indices < mesh.topology.index_map(1).size_local]
     mesh.topology.create_connectivity(1, 2)
@@ -169,7 +179,8 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
     rows = rows[np.argsort(rows[:, 0])]
     if np.isnan(rows).any():
         raise InputError(
-            f"free-field side '{name}' stands beside orthotropic cells, and its soil column is isotropic: "
+            f"free-field side '{name}' stands beside orthotropic cells, and its soil column is "
+            "isotropic: "
             "put a LinearElastic there, or Dashpots(…, material=)"
         )
     x, close = rows[:, 7:9], 1e-9 * space.size

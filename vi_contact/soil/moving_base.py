@@ -1,15 +1,18 @@
-"""Integrate the motion (u, v, a) of a base that an acceleration shakes, by the time scheme of the run.
+"""Integrate the motion (u, v, a) of a base that an acceleration shakes, by the time scheme of the
+run.
 
-A run in the frame of the ground, -M r a_g (``ContactProblem(excitation=...)``), and one whose base is moved
-(``fem.Prescribed``) are the same problem in two frames, u = u_relative + r u_g. They are the same discrete problem if
-u_g and v_g are what the scheme makes of u_g'' = a_g: for the trapezoidal rule
+A run in the frame of the ground, -M r a_g (``ContactProblem(excitation=...)``), and one whose base
+is moved (``fem.Prescribed``) are the same problem in two frames, u = u_relative + r u_g. They are
+the same discrete problem if u_g and v_g are what the scheme makes of u_g'' = a_g: for the
+trapezoidal rule
 
     v_1 = v_0 + dt (a_0 + a_1)/2,    u_1 = u_0 + dt (v_0 + v_1)/2.
 
-The scheme is asked: a free unit mass is marched with it under the force a_g. Mass-proportional damping acts on the
-absolute velocity of a moved base and on the relative one in the frame of the ground: with alpha M the frames differ.
-So do MoreauJean and ContactStabilisedNewmark, whose contact looks at velocities or at a prediction.
-Source: seismic practice, prescribed base; a base moved by (u, v, a) integrated otherwise drifts against its inertia."""
+The scheme is asked: a free unit mass is marched with it under the force a_g. Mass-proportional
+damping acts on the absolute velocity of a moved base and on the relative one in the frame of the
+ground: with alpha M the frames differ. So do MoreauJean and ContactStabilisedNewmark, whose contact
+looks at velocities or at a prediction. Source: seismic practice, prescribed base; a base moved by
+(u, v, a) integrated otherwise drifts against its inertia."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -29,7 +32,8 @@ from .companion import CompanionRun, linear_problem
 
 @dataclass(frozen=True)
 class GroundFrame:
-    """Describe the base in the frame of the ground: at rest, shaken by the excitations as inertia loads."""
+    """Describe the base in the frame of the ground: at rest, shaken by the excitations as inertia
+    loads."""
 
     excitations: tuple[Excitation, ...]
     lets_waves_in: ClassVar[bool] = False
@@ -45,10 +49,11 @@ class GroundFrame:
 
 @dataclass(frozen=True)
 class BaseMotion(GroundFrame):
-    """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
+    """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from
+    rest at t = 0.
 
-    ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d), as
-    ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors."""
+    ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d),
+    as ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors."""
 
     path: CompanionRun = field(repr=False)
 
@@ -93,11 +98,13 @@ class BaseMotion(GroundFrame):
 
 
 def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
-    """Return the ground motion that the run's scheme makes of an acceleration, with the run's time steps.
+    """Return the ground motion that the run's scheme makes of an acceleration, with the run's time
+    steps.
 
-    Systems and surfaces that it moves hand it to the run, which binds it (``CompanionRun.bind``). What the acceleration
-    leaves behind (a final velocity, a drift) is in it: correct the baseline of a record first (``baseline_corrected``).
-    InputError for no excitation, or excitations of different dimensions."""
+    Systems and surfaces that it moves hand it to the run, which binds it (``CompanionRun.bind``).
+    What the acceleration leaves behind (a final velocity, a drift) is in it: correct the baseline
+    of a record first (``baseline_corrected``). InputError for no excitation, or excitations of
+    different dimensions."""
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
     for one in excitations:
         provides(
@@ -110,7 +117,8 @@ def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
     sizes = {len(one.direction) for one in excitations}
     if len(sizes) != 1:
         raise InputError(
-            "base_motion needs one or more excitations with directions of the same number of components"
+            "base_motion needs one or more excitations with directions of the same number of "
+            "components"
         )
     d = sizes.pop()
     forces = tuple(

@@ -1,4 +1,5 @@
-"""Make the soil of a model strain-compatible: run it again with the stiffness and damping that its strains ask for."""
+"""Make the soil of a model strain-compatible: run it again with the stiffness and damping that its
+strains ask for."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,8 +27,9 @@ OWNER = "strain_compatible"
 
 @dataclass(frozen=True)
 class StrainCompatible(Generic[T]):
-    """Hold what ``strain_compatible`` found: what the last ``run`` returned; the ``material`` it had, E and xi among it
-    as Functions of DG0; its effective ``strain``, likewise; ``changes``: the largest one after every run."""
+    """Hold what ``strain_compatible`` found: what the last ``run`` returned; the ``material`` it
+    had, E and xi among it as Functions of DG0; its effective ``strain``, likewise; ``changes``: the
+    largest one after every run."""
 
     solution: T
     material: Heterogeneous
@@ -47,15 +49,18 @@ def strain_compatible(
 ) -> StrainCompatible[T]:
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
-    Args:
-        material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the middle.
-        curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their material.
-        run: run(material, strain): assemble the body of this material with ``damping=DampingRatio(…)``, march with
-            ``strain`` among the recorders, and return anything. All else is yours: contact, gravity first, free fields.
-        ratio: of the effective to the largest strain. tolerance: of the largest relative change of G or xi in a cell.
+    Args: material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the
+        middle. curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their
+        material. run: run(material, strain): assemble the body of this material with
+        ``damping=DampingRatio(…)``, march with
+            ``strain`` among the recorders, and return anything. All else is yours: contact, gravity
+            first, free fields.
+        ratio: of the effective to the largest strain. tolerance: of the largest relative change of
+            G or xi in a cell.
     Poisson's ratio is kept.
     Raises:
-        InputError: cells named twice, Orthotropic ones, an effective strain that ends beyond its curves, with place.
+        InputError: cells named twice, Orthotropic ones, an effective strain that ends beyond its
+            curves, with place.
         ViContactError: no end after so many runs."""
     function(OWNER, "run", run, "give a function of a material and a recorder")
     number(OWNER, "ratio", ratio, positive=True)
@@ -120,7 +125,8 @@ def strain_compatible(
 def _refuse_lost_ratios(
     material: Materials, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm
 ) -> None:
-    """Raise InputError for a material with a damping ratio whose cells all have curves, which give it another one."""
+    """Raise InputError for a material with a damping ratio whose cells all have curves, which give
+    it another one."""
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
@@ -128,6 +134,7 @@ def _refuse_lost_ratios(
         outside = len(np.setdiff1d(cells.indices, named))
         if not largest(comm, outside) and isinstance(one, LinearElastic) and one.xi:
             raise InputError(
-                f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, and the "
+                f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, "
+                "and the "
                 "curves of its cells give another one; leave xi out there"
             )

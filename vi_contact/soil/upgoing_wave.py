@@ -1,8 +1,9 @@
 """Make upgoing waves out of recorded motions: what a compliant base expects.
 
-A record from an outcrop, where up- and downgoing waves are equal, is twice the upgoing wave; a record from within a
-profile holds what came back down and is of no use here without deconvolution. Wording as in PLAXIS: a fixed base
-expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawson 2006)."""
+A record from an outcrop, where up- and downgoing waves are equal, is twice the upgoing wave; a
+record from within a profile holds what came back down and is of no use here without deconvolution.
+Wording as in PLAXIS: a fixed base expects the *within* motion, a compliant base the *upgoing* one
+(Mejia and Dawson 2006)."""
 
 from collections.abc import Callable, Sequence
 
@@ -17,9 +18,11 @@ from ..ground_motion.record import Record
 
 
 class UpgoingVelocity:
-    """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t = 0.
+    """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t =
+    0.
 
-    Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt)."""
+    Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} -
+    a_k) s²/(2 dt)."""
 
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
         number("UpgoingVelocity", "dt", dt, positive=True, unit="s")
@@ -52,13 +55,14 @@ def upgoing(
     dt: float | None = None,
     outcrop: bool = True,
 ) -> Callable[[float], Array]:
-    """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False (already upgoing).
+    """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False
+    (already upgoing).
 
-    motion: a record, along ``direction``, or an excitation, which has its own, or several, which act together (the
-    components of an earthquake). dt: step of the integration [s], of the record when None. A record keeps its drift:
-    correct its baseline first (``baseline_corrected``).
-    InputError for an excitation other than a record without dt, a dt that is not positive, none at all, records in a
-    list, or directions of different numbers of components."""
+    motion: a record, along ``direction``, or an excitation, which has its own, or several, which
+    act together (the components of an earthquake). dt: step of the integration [s], of the record
+    when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
+    InputError for an excitation other than a record without dt, a dt that is not positive, none at
+    all, records in a list, or directions of different numbers of components."""
     flag("upgoing", "outcrop", outcrop)
     if isinstance(motion, Sequence) and not isinstance(motion, str):
         if any(isinstance(one, Record) for one in motion):
@@ -69,7 +73,8 @@ def upgoing(
         waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
         if len({len(wave(0.0)) for wave in waves}) != 1:
             raise InputError(
-                "upgoing needs one or more excitations with directions of the same number of components"
+                "upgoing needs one or more excitations with directions of the same number of "
+                "components"
             )
         return lambda t: np.asarray(np.sum([wave(t) for wave in waves], axis=0))
     if not isinstance(motion, Record):

@@ -1,4 +1,5 @@
-"""Solve the contact problem of one step: condensed to the contact points, or in the volume with PETSc.
+"""Solve the contact problem of one step: condensed to the contact points, or in the volume with
+PETSc.
 
 Take ``Condensed()``; ``Volume()`` and ``Iterative()`` are for large bodies. The other names are their methods, without
 friction (``normal/``) and with it (``friction/``): docs/guide/solvers.md.

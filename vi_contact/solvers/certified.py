@@ -1,7 +1,9 @@
-"""Certify or refuse steps: a solver, the methods to escalate to, and the certificate of every answer.
+"""Certify or refuse steps: a solver, the methods to escalate to, and the certificate of every
+answer.
 
-An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets bodies of very unlike
-stiffness, is corrected by what it leaves over (``correction``) before it is judged."""
+An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets
+bodies of very unlike stiffness, is corrected by what it leaves over (``correction``) before it is
+judged."""
 
 from collections.abc import Sequence
 
@@ -22,13 +24,15 @@ from .correction import corrected
 from .door import refuse_matrix, refuse_nan
 
 TOLERANCE = 1e-9
-NEAR = 1e-2  # of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is
+# of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is
+NEAR = 1e-2
 FAR = 1e-4  # residuals above are not round-off
 ADVICE = "try a smaller dt or another solver, or check the data of this time"
 
 
 class CertifiedSolver:
-    """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
+    """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing
+    uncertified leaves it."""
 
     def __init__(
         self,
@@ -68,7 +72,8 @@ class CertifiedSolver:
         return self._prepared[rank]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
-        """Return (result, certificate, escalated) of the first method below tolerance; StepFailure if there is none."""
+        """Return (result, certificate, escalated) of the first method below tolerance; StepFailure
+        if there is none."""
         refuse_nan(step, lambda: self._problem.equations)
         tried = []
         for rank in range(len(self._solvers)):
@@ -93,8 +98,8 @@ class CertifiedSolver:
 
 
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
-    """Raise InputError for friction without a tangential direction, or of a wrong number of values, and for matrices
-    that are not symmetric unless the owner solves with them. Collective."""
+    """Raise InputError for friction without a tangential direction, or of a wrong number of values,
+    and for matrices that are not symmetric unless the owner solves with them. Collective."""
     surface, law = problem.surface, problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(

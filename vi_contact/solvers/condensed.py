@@ -1,4 +1,5 @@
-"""Eliminate everything but the contact unknowns: the condensed route (docs/reference/sources.md [1], sections 3, 4).
+"""Eliminate everything but the contact unknowns: the condensed route (docs/reference/sources.md
+[1], sections 3, 4).
 
 With the one factorisation of A and the unit vectors E of the normal unknowns:
 
@@ -8,8 +9,9 @@ With the one factorisation of A and the unit vectors E of the normal unknowns:
     0 <= r ⊥ q + G r >= 0              the small problem: eq. 42 in r, eqs. 46, 49 in the displacements
     x = A⁻¹ (b - E r)
 
-A step costs one forward and one backward substitution and the small problem, whatever the number of contact changes:
-``core.condensation``. With friction the tangential unknowns of the contact points are kept too: ``friction.condensed``.
+A step costs one forward and one backward substitution and the small problem, whatever the number of
+contact changes: ``core.condensation``. With friction the tangential unknowns of the contact points
+are kept too: ``friction.condensed``.
 """
 
 from collections.abc import Callable
@@ -41,18 +43,22 @@ class SmallMethod(Protocol):
     """Solve the small problem without friction: ActiveSet, Hildreth or Lemke."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
-        """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral`` (m,).
+        """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral``
+        (m,).
 
-        What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and ``guess`` (m,)."""
+        What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and
+        ``guess`` (m,)."""
 
 
 @dataclass(frozen=True)
 class Condensed:
-    """Condense each step onto its contact unknowns and solve this smaller problem, on any number of ranks.
+    """Condense each step onto its contact unknowns and solve this smaller problem, on any number of
+    ranks.
 
-    ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves it with friction:
-    FrictionNewton, NSGS, FixedPoint or GivenForces. ``rates`` is the iteration around it for laws that depend on the
-    slip rate. Matrices that are not symmetric need Lemke. For contact sets too large for a dense G use ``Iterative``.
+    ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves
+    it with friction: FrictionNewton, NSGS, FixedPoint or GivenForces. ``rates`` is the iteration
+    around it for laws that depend on the slip rate. Matrices that are not symmetric need Lemke. For
+    contact sets too large for a dense G use ``Iterative``.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
@@ -73,8 +79,9 @@ class Condensed:
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of values, for more
-        contact unknowns than a dense matrix suits, and matrices that are not symmetric unless the methods take them."""
+        """Raise InputError for friction without a tangential direction, or of a wrong number of
+        values, for more contact unknowns than a dense matrix suits, and matrices that are not
+        symmetric unless the methods take them."""
         surface = problem.surface
         if problem.frictional:
             refuse_dense(
@@ -93,7 +100,8 @@ class Condensed:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedCondensed":
-        """Return what condenses A at its first step, which tells of friction. InputError for too many conditions."""
+        """Return what condenses A at its first step, which tells of friction. InputError for too
+        many conditions."""
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 
@@ -161,8 +169,9 @@ class PreparedCondensed:
         )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
-        """Return the answers to the steps that are rows of ``many``; ``own`` makes one. None where this cannot be: on
-        several ranks, without contact unknowns last in the factor, and with other methods than ActiveSet."""
+        """Return the answers to the steps that are rows of ``many``; ``own`` makes one. None where
+        this cannot be: on several ranks, without contact unknowns last in the factor, and with
+        other methods than ActiveSet."""
         surface, rubs = self._surface, many.slip0 is not None and self._surface.total > 0
         condensed, small = (self.friction.condensed, None) if rubs else self._normal
         if surface.comm.size > 1 or not isinstance(condensed, Last):

@@ -1,4 +1,5 @@
-"""Import PETSc for the solvers, after MPI: the PETSc of PyPI finds the MPI library that mpi4py has loaded before."""
+"""Import PETSc for the solvers, after MPI: the PETSc of PyPI finds the MPI library that mpi4py has
+loaded before."""
 
 from contextlib import suppress
 

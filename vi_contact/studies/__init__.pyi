@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .cases.case import Case as Case
 from .cases.case import read_case as read_case
 from .ida.fragility import fragility_curve as fragility_curve

@@ -1,4 +1,5 @@
-"""Repeat a run with half the element size and with half the time step, and set the peaks beside each other."""
+"""Repeat a run with half the element size and with half the time step, and set the peaks beside
+each other."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -30,17 +31,20 @@ NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not
 def refine(
     folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True
 ) -> dict[str, str]:
-    """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt. Return name -> why
-    it failed. A finished run is kept, and an interrupted run is continued. Collective.
+    """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt.
+    Return name -> why it failed. A finished run is kept, and an interrupted run is continued.
+    Collective.
 
-    InputError for a folder without case file or whose run has not finished. ``allow``: as of ``read_case``."""
+    InputError for a folder without case file or whose run has not finished. ``allow``: as of
+    ``read_case``."""
     from .cases.case import read_case  # late: finite elements
 
     check("refine", "folder", folder, str | Path)
     run, failed = read_run(folder), {}
     if not is_own(run.folder / COPY):
         raise InputError(
-            f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a case's run"
+            f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a "
+            "case's run"
         )
     if run.facts.get("status") != "finished":
         raise InputError(
@@ -67,7 +71,8 @@ def _same(run: RunFolder, name: str) -> bool:
 
 
 def _halved(folder: RunFolder, name: str) -> Iterator[str]:
-    """Yield the settings that halve elements or time steps, of the same duration, without fields."""
+    """Yield the settings that halve elements or time steps, of the same duration, without
+    fields."""
     tables, dt = read_copy(folder.folder), folder.facts.get("dt")
     if "fields" in tables:
         yield "fields="
@@ -110,8 +115,8 @@ def _status(folder: Path) -> str:
 
 
 def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
-    """Return the section with the peaks of a run and of those in its folder ``refined``, or that there are none;
-    ``failed``: name -> why, of ``refine``."""
+    """Return the section with the peaks of a run and of those in its folder ``refined``, or that
+    there are none; ``failed``: name -> why, of ``refine``."""
     found = {}
     for name in NAMES:
         if name in failed:

@@ -1,4 +1,5 @@
-"""Report on the run of a case: what its folder holds, the checks that the case asks for, and its discretisation."""
+"""Report on the run of a case: what its folder holds, the checks that the case asks for, and its
+discretisation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -38,13 +39,14 @@ def report(
     columns: Sequence[Sequence[str]] | None = None,
     failed: Mapping[str, str] | None = None,
 ) -> tuple[Section, list[Path]]:
-    """Write the report on a run folder, and beside it the table peaks.csv and the pictures. Return what the report
-    says of the discretisation error, and the paths of the files.
+    """Write the report on a run folder, and beside it the table peaks.csv and the pictures. Return
+    what the report says of the discretisation error, and the paths of the files.
 
-    ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly, report.html.
-    ``columns``: groups of columns of one unit, a chart each, in place of those that move; ``failed``: what ``refine``
-    returned. What has no data is left out. InputError as of ``read_run``, for a run of one row, columns that do not
-    exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json."""
+    ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly,
+    report.html. ``columns``: groups of columns of one unit, a chart each, in place of those that
+    move; ``failed``: what ``refine`` returned. What has no data is left out. InputError as of
+    ``read_run``, for a run of one row, columns that do not exist, another kind of file, .html
+    without jinja2 and plotly, and a damaged model.json."""
     folder = Path(folder)
     case = read_copy(folder)
     run = read_run(folder)
@@ -108,7 +110,8 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
 
 @checked
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
-    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; InputError without a run."""
+    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps;
+    InputError without a run."""
     folder = Path(folder)
     table = read_copy(folder).get("check", [])
     words = Words(

@@ -1,4 +1,5 @@
-"""Solve variational inequalities of your own: a DOLFINx Function between bounds, any UFL form (docs/guide/bounds.md).
+"""Solve variational inequalities of your own: a DOLFINx Function between bounds, any UFL form
+(docs/guide/bounds.md).
 
 >>> import dolfinx, ufl, dolfinx.fem as own; from mpi4py import MPI; from vi_contact import vi
 >>> line = dolfinx.mesh.create_interval(MPI.COMM_SELF, 8, [0.0, 1.0])  # a string with load 8, ends at 0, floor at -1/2

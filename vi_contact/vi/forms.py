@@ -1,4 +1,5 @@
-"""Read a user's forms, conditions and bounds; evaluate F and its Jacobian on the unknowns that nothing clamps."""
+"""Read a user's forms, conditions and bounds; evaluate F and its Jacobian on the unknowns that
+nothing clamps."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -33,7 +34,8 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
     if isinstance(form, ufl.Form):
         if not contains(checked("F", form, 1, u), u):
             raise refused(
-                "F does not depend on u: write it with the Function that is solved for, or give (a, L)"
+                "F does not depend on u: write it with the Function that is solved for, or give "
+                "(a, L)"
             )
         return form, checked("J", ufl.derivative(form, u) if J is None else J, 2, u)
     if not isinstance(form, tuple | list) or len(form) != 2 or J is not None:
@@ -47,7 +49,8 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
 
 
 def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
-    """Return (F, J), the first and second derivative of a functional of u; InputError for others."""
+    """Return (F, J), the first and second derivative of a functional of u; InputError for
+    others."""
     if not isinstance(energy, ufl.Form) or energy.arguments():
         what = (
             f"a form of rank {len(energy.arguments())}"
@@ -86,13 +89,14 @@ def contains(form: Any, u: Any) -> bool:
 class Problem:
     """Evaluate F, its Jacobian J and the energy at the present u.
 
-    Vectors are of the unknowns of this rank that are ``free``: no Dirichlet condition holds them. The others are
-    *held*. Their values go from those of the first guess to the prescribed ones along a straight line, of which the
-    share ``left`` is still to come: 0.0 where the conditions are met.
+    Vectors are of the unknowns of this rank that are ``free``: no Dirichlet condition holds them.
+    The others are *held*. Their values go from those of the first guess to the prescribed ones
+    along a straight line, of which the share ``left`` is still to come: 0.0 where the conditions
+    are met.
 
-    Attributes:
-        constant: whether J is the same at every u, so that the problem is linear.
-        given: the values of u before the first step (of a part of the change, see ``aim``), those of ghosts too."""
+    Attributes: constant: whether J is the same at every u, so that the problem is linear. given:
+        the values of u before the first step (of a part of the change, see ``aim``), those of
+        ghosts too."""
 
     def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:
         if energy is None:
@@ -104,7 +108,8 @@ class Problem:
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
             raise refused(
-                "bcs is wrong: give a list of dirichletbc objects on the space of u or its components"
+                "bcs is wrong: give a list of dirichletbc objects on the space of u or its "
+                "components"
             )
         self.given = self._first = np.array(u.x.array)
         self._held, self._values = np.zeros(len(self.given), dtype=bool), np.zeros(len(self.given))
@@ -127,11 +132,13 @@ class Problem:
 
     @property
     def change(self) -> Array:
-        """Return the prescribed values less those of the first guess, 0 at free unknowns; ghosts too."""
+        """Return the prescribed values less those of the first guess, 0 at free unknowns; ghosts
+        too."""
         return np.where(self._held, self._values - self.given, 0.0)
 
     def put(self, x: Array, left: float = 0.0) -> None:
-        """Write the free unknowns into u, and the held ones but for the share ``left`` of their change. Collective."""
+        """Write the free unknowns into u, and the held ones but for the share ``left`` of their
+        change. Collective."""
         values = self.u.x.array
         values[self._held] = self._values[self._held]
         if left:
@@ -152,8 +159,8 @@ class Problem:
         return not largest(self.comm, not here)
 
     def places(self) -> Array:
-        """Return (n, 4) where the free unknowns are: coordinates as shares of the body's box, and the component as a
-        share of their number. Collective."""
+        """Return (n, 4) where the free unknowns are: coordinates as shares of the body's box, and
+        the component as a share of their number. Collective."""
         space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
         x = space.tabulate_dof_coordinates()[: self.owned // width]
         low = -self.comm.max(-np.min(x, axis=0, initial=np.inf))
@@ -163,13 +170,14 @@ class Problem:
         return np.column_stack([shares, component])[self.free]
 
     def put_back(self) -> None:
-        """Write the first guess into u, with the held values that it had, as if nothing had been done."""
+        """Write the first guess into u, with the held values that it had, as if nothing had been
+        done."""
         self.u.x.array[:] = self.given = self._first
         self._values = self._prescribed
 
     def aim(self, share: float) -> None:
-        """Take the present u for the first guess, and as prescribed values those that are so far on the way from the
-        values of the very first guess."""
+        """Take the present u for the first guess, and as prescribed values those that are so far on
+        the way from the values of the very first guess."""
         self.given = np.array(self.u.x.array)
         way = self._prescribed - self._first
         self._values = self._prescribed if share == 1.0 else self._first + share * way
@@ -191,8 +199,9 @@ class Problem:
         return self.linearised(0.0)[0]
 
     def linearised(self, left: float) -> tuple[PetscMatrix, Array]:
-        """Return (J at u on the free unknowns, what F of these will gain, to first order, by the share ``left`` of the
-        change of the held ones); the J that it returned before is freed. Collective."""
+        """Return (J at u on the free unknowns, what F of these will gain, to first order, by the
+        share ``left`` of the change of the held ones); the J that it returned before is freed.
+        Collective."""
         gain = np.zeros(np.count_nonzero(self.free))
         if self._jacobian is None or left or not self.constant:
             self.close()
@@ -219,10 +228,12 @@ class Problem:
         self._jacobian = None
 
     def bounds(self, lower: Any, upper: Any) -> tuple[Array, Array]:
-        """Return (lower, upper) of the free unknowns; InputError, on all ranks, for what contradicts.
+        """Return (lower, upper) of the free unknowns; InputError, on all ranks, for what
+        contradicts.
 
-        What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is beyond a bound stays as
-        it is, and where lower is above upper the unknown is held at lower."""
+        What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is
+        beyond a bound stays as it is, and where lower is above upper the unknown is held at
+        lower."""
         low, high = self._bound("lower", lower, -np.inf), self._bound("upper", upper, np.inf)
         u, space = (
             np.where(self._held, self._values, self.given)[: self.owned],
@@ -259,7 +270,8 @@ class Problem:
         return low[self.free], np.maximum(low, high)[self.free]
 
     def moves(self, low: Array, high: Array) -> bool:
-        """Say whether conditions or bounds change the first guess by more than rounding; after ``bounds``. Collective."""
+        """Say whether conditions or bounds change the first guess by more than rounding; after
+        ``bounds``. Collective."""
         x = self.given[: self.owned][self.free]
         most = max(max_abs(self.change), max_abs(x - np.clip(x, low, high)))
         return largest(self.comm, most) > OFF * self.size
@@ -277,11 +289,13 @@ class Problem:
             return np.tile(np.broadcast_to(number, (width,)), self.owned // width)
         except (TypeError, ValueError):
             raise refused(
-                f"{name} is {shown(given)}; give a Function on u.function_space itself, a number (or "
+                f"{name} is {shown(given)}; give a Function on u.function_space itself, a number "
+                "(or "
                 f"{width}, one for a component), or None"
             ) from None
 
 
 def given_alike(bound: Any) -> Any:
-    """Return what of a bound all ranks give alike: numbers and the value of a Constant; of a Function the kind."""
+    """Return what of a bound all ranks give alike: numbers and the value of a Constant; of a
+    Function the kind."""
     return bound.value if isinstance(bound, compat.fem.Constant) else bound

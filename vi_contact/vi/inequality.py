@@ -1,8 +1,9 @@
-"""Find u between bounds: F(u; v - u) >= 0 for all v with lower <= v <= upper, at the points of a Function's space.
+"""Find u between bounds: F(u; v - u) >= 0 for all v with lower <= v <= upper, at the points of a
+Function's space.
 
-Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F (``solve_linear``) and goes
-towards the answer as far as makes the natural residual u - mid(lower, u - F/J_ii, upper) smaller by a part of what the
-slope promises. A linear problem takes one step."""
+Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F
+(``solve_linear``) and goes towards the answer as far as makes the natural residual u - mid(lower, u
+- F/J_ii, upper) smaller by a part of what the slope promises. A linear problem takes one step."""
 
 import logging
 import time
@@ -47,13 +48,15 @@ NEWTON_STEPS, DESCENT_STEPS = 50, 500  # at most, unless told otherwise
 class Result:
     """Hold the answer of ``solve``: u, the Function that was given, and what is known of it.
 
-    ``lambda_lower``, ``lambda_upper``: Functions of the multipliers, forces at points in the unit of F >= 0. With F the
-    vector of F(u; phi_i), F = lambda_lower - lambda_upper where bcs prescribe nothing, and zero off the bounds.
-    ``active``: how many unknowns are on their lower and upper bounds, those where the multiplier is above zero.
-    ``certificate``: relative residuals (``core.certificate``): equilibrium of inactive unknowns, distance of active
-    ones from their bound (complementarity), signs of distances (penetration) and of multipliers (tension).
-    ``iterations``, ``inner``: steps, and iterations of ``method`` in them, of conjugate gradients for an energy.
-    ``reason``: why it ended, and whether u is a local minimum. ``seconds``: of this rank's processor.
+    ``lambda_lower``, ``lambda_upper``: Functions of the multipliers, forces at points in the unit
+    of F >= 0. With F the vector of F(u; phi_i), F = lambda_lower - lambda_upper where bcs prescribe
+    nothing, and zero off the bounds. ``active``: how many unknowns are on their lower and upper
+    bounds, those where the multiplier is above zero. ``certificate``: relative residuals
+    (``core.certificate``): equilibrium of inactive unknowns, distance of active ones from their
+    bound (complementarity), signs of distances (penetration) and of multipliers (tension).
+    ``iterations``, ``inner``: steps, and iterations of ``method`` in them, of conjugate gradients
+    for an energy. ``reason``: why it ended, and whether u is a local minimum. ``seconds``: of this
+    rank's processor.
     """
 
     u: Any
@@ -83,22 +86,24 @@ def solve(
     tolerance: float = 1e-9,
     iterations: int | None = None,
 ) -> Result:
-    """Solve F(u; v - u) >= 0 for all v between the bounds, or find a local minimum of an energy between them; u holds
-    the first guess, and the answer.
+    """Solve F(u; v - u) >= 0 for all v between the bounds, or find a local minimum of an energy
+    between them; u holds the first guess, and the answer.
 
-    ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v). ``energy``: in its place a
-    functional Pi(u), whose derivative is F; F need not be monotone then. The answer satisfies the same conditions, and
-    no direction of negative curvature is found there. ``lower``, ``upper``: Functions on the space of u, Constants,
-    numbers, one or one for each component, or None. ``bcs``: dirichletbc on that space or its components; what they
-    change in u goes into it with the first step. ``J``: the Jacobian, else the derivative of F.
-    ``method``: TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes the first two where J is
-    symmetric, the last two elsewhere. ``petsc_options``: for it, and of an energy for the preconditioner of conjugate
-    gradients, e.g. {"pc_type": "hypre"}; under ``prefix`` on the command line.
+    ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v).
+    ``energy``: in its place a functional Pi(u), whose derivative is F; F need not be monotone then.
+    The answer satisfies the same conditions, and no direction of negative curvature is found there.
+    ``lower``, ``upper``: Functions on the space of u, Constants, numbers, one or one for each
+    component, or None. ``bcs``: dirichletbc on that space or its components; what they change in u
+    goes into it with the first step. ``J``: the Jacobian, else the derivative of F. ``method``:
+    TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes the first two where
+    J is symmetric, the last two elsewhere. ``petsc_options``: for it, and of an energy for the
+    preconditioner of conjugate gradients, e.g. {"pc_type": "hypre"}; under ``prefix`` on the
+    command line.
 
-    The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which for degrees above
-    one is not everywhere. InputError for forms, bounds and bcs that do not fit; StepFailure when the certificate stays
-    above ``tolerance`` after ``iterations`` steps (None: 50, and 500 of an energy), with the best u so far kept.
-    Collective."""
+    The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which
+    for degrees above one is not everywhere. InputError for forms, bounds and bcs that do not fit;
+    StepFailure when the certificate stays above ``tolerance`` after ``iterations`` steps (None: 50,
+    and 500 of an energy), with the best u so far kept. Collective."""
     start = time.process_time()
     most = NEWTON_STEPS if energy is None else DESCENT_STEPS
     limit = whole("vi.solve", "iterations", most if iterations is None else iterations, least=1)
@@ -106,7 +111,8 @@ def solve(
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
         raise refused(
-            "the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed"
+            "the unknowns of u are not values of one field at points: take Lagrange or DG0, not "
+            "mixed"
         )
     refuse_choices(form, energy, J, method)
     agree(
@@ -172,7 +178,8 @@ def solve(
 
 
 def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
-    """Raise InputError unless there is a form or an energy, and not both, nor what an energy has no use for."""
+    """Raise InputError unless there is a form or an energy, and not both, nor what an energy has no
+    use for."""
     if form is None and energy is None:
         raise refused(
             "there is nothing to solve: give the form F(u; v), or energy=, a functional of u"
@@ -197,7 +204,8 @@ def preconditioner(ranks: int) -> Mapping[str, object | None]:
 
 
 def curves_down(found: Found, layers: OptionLayers) -> bool:
-    """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u. Collective."""
+    """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u.
+    Collective."""
     best = found.best
     problem = best.problem
     if best.broken or problem.constant:
@@ -215,8 +223,8 @@ def curves_down(found: Found, layers: OptionLayers) -> bool:
 
 
 def failed(problem: Problem, found: Found, sentence: str) -> StepFailure:
-    """Write the best values into u, or the first guess where conditions were never met, and return the error.
-    Collective."""
+    """Write the best values into u, or the first guess where conditions were never met, and return
+    the error. Collective."""
     if found.best.left:
         problem.put_back()
         return StepFailure(f"{sentence} (u holds the first guess)")

@@ -1,4 +1,5 @@
-"""Judge a u: linearise F about it, compute its certificate, and measure by one number how far it is from the answer."""
+"""Judge a u: linearise F about it, compute its certificate, and measure by one number how far it is
+from the answer."""
 
 import numpy as np
 
@@ -9,24 +10,25 @@ from .forms import Problem
 
 DIAGONAL = 1e-8  # of the largest: smaller entries of the Jacobian's diagonal count as this
 
-# Of the size of the field: how small u may be and still be judged by its own size, where F is not linear. Such an F is
-# computed from numbers like 1 + grad u, and bounds from coordinates: both keep rounding errors of 1e-16 of the field,
-# which of a smaller u would be more than the tolerance.
+# Of the size of the field: how small u may be and still be judged by its own size, where F is not
+# linear. Such an F is computed from numbers like 1 + grad u, and bounds from coordinates: both keep
+# rounding errors of 1e-16 of the field, which of a smaller u would be more than the tolerance.
 SMALL = 1e-6
 
 
 class Judged:
     """Hold what is known at the present u of a problem; arrays are of its free unknowns.
 
-    Attributes:
-        x, F: the free unknowns and the residual F(u; phi_i) at u.
-        A, b: the linear problem about u, F(u) + J (x_new - x) = A x_new - b. Where held unknowns are not yet at their
-            prescribed values (``left``), b moves them there: F in it has ``gain``, what F gains by that.
+    Attributes: x, F: the free unknowns and the residual F(u; phi_i) at u. A, b: the linear problem
+        about u, F(u) + J (x_new - x) = A x_new - b. Where held unknowns are not yet at their
+            prescribed values (``left``), b moves them there: F in it has ``gain``, what F gains by
+                that.
         left: the share of the change of the held unknowns that is still to come.
         diagonal: sizes of the diagonal entries of A, none of them zero.
         push: the multipliers (lower, upper), zero where the bound does not act.
         broken: whether something is not a finite number.
-        certificate: the relative residuals; all infinite where broken, or while something is ``left``."""
+        certificate: the relative residuals; all infinite where broken, or while something is
+            ``left``."""
 
     def __init__(self, problem: Problem, lower: Array, upper: Array, left: float = 0.0) -> None:
         self.problem, self.lower, self.upper, self.left = problem, lower, upper, left
@@ -46,14 +48,15 @@ class Judged:
         x_ref = max(x_max, least) or 1.0
         r_ref = max(b_max, F_max, most * least) or 1.0
 
-        # A bound acts where the multiplier, in units of forces, exceeds the distance, in units of u.
+        # A bound acts where the multiplier, in units of forces, exceeds the distance, in units of
+        # u.
         below, above = self.x - lower, upper - self.x
         with np.errstate(invalid="ignore"):  # a broken point may have no size
             at_lower, at_upper = below * r_ref < self.F * x_ref, above * r_ref < -self.F * x_ref
         self.push = np.where(at_lower, self.F, 0.0), np.where(at_upper, -self.F, 0.0)
 
-        # The certificate: forces that no bound carries; distances below zero; multipliers below zero; distances from
-        # bounds that act.
+        # The certificate: forces that no bound carries; distances below zero; multipliers below
+        # zero; distances from bounds that act.
         balance = max_abs(self.F - self.push[0] + self.push[1])
         away = max(max_abs(below[at_lower]), max_abs(above[at_upper]))
         behind, wrong = (max(map(lowest, pair)) for pair in ((below, above), self.push))
@@ -64,7 +67,8 @@ class Judged:
         self.certificate = Certificate(*(worst.tolist() if known else [np.inf] * len(worst)))
 
     def natural(self, x: Array, F: Array) -> float:
-        """Return sum J_ii r², r = x - mid(lower, x - F / J_ii, upper) the natural residual, J_ii those of this u.
+        """Return sum J_ii r², r = x - mid(lower, x - F / J_ii, upper) the natural residual, J_ii
+        those of this u.
 
         It is zero at the answer only. Infinite where F is not a number. Collective."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -73,8 +77,8 @@ class Judged:
         return found if np.isfinite(found) else np.inf
 
     def put(self, x: Array, left: float) -> Array:
-        """Write another x into u, and the held unknowns but for ``left``; return the F there, with what it will gain
-        by the rest of their change. Collective."""
+        """Write another x into u, and the held unknowns but for ``left``; return the F there, with
+        what it will gain by the rest of their change. Collective."""
         self.problem.put(x, left)
         F = self.problem.residual()
         return F + (left / self.left) * self.gain if left else F

@@ -1,4 +1,5 @@
-"""Solve a linear problem between bounds, lower <= x <= upper with A x - b, by the methods of the volume route."""
+"""Solve a linear problem between bounds, lower <= x <= upper with A x - b, by the methods of the
+volume route."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,8 +27,8 @@ def is_symmetric(A: PetscMatrix, comm: MpiComm) -> bool:
 class LinearSteps:
     """Solve the linear problems of one call of ``vi.solve`` one after another.
 
-    ``given``: the methods to try; those that suit A if there are none. A method that failed is tried last from then
-    on: the tangents of one problem are alike."""
+    ``given``: the methods to try; those that suit A if there are none. A method that failed is
+    tried last from then on: the tangents of one problem are alike."""
 
     def __init__(self, settings: Volume, given: Sequence[Method], comm: MpiComm) -> None:
         self.settings, self.given, self.comm = settings, given, comm
@@ -38,7 +39,8 @@ class LinearSteps:
         """Return the methods to try, in this order; InputError for one that does not suit A."""
         if self.given and isinstance(self.given[0], TaoTron) and not symmetric:
             raise refused(
-                f"{self.given[0]} minimises, and the form is not symmetric, so there is nothing to minimise: "
+                f"{self.given[0]} minimises, and the form is not symmetric, so there is nothing to "
+                "minimise: "
                 "leave method out, or take ReducedNewton() or SemismoothNewton()"
             )
         suited: list[Method] = (
@@ -49,18 +51,20 @@ class LinearSteps:
     def solve(
         self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array
     ) -> tuple[Array, int, str]:
-        """Return (x, iterations, name of the method) of the first method that finds x; StepFailure with what all said.
-        Every unknown is the one of a contact condition. Collective."""
+        """Return (x, iterations, name of the method) of the first method that finds x; StepFailure
+        with what all said. Every unknown is the one of a contact condition. Collective."""
         numbers, comm = np.arange(A.rows), self.comm
         symmetric = is_symmetric(A, comm)
         methods = self.methods(symmetric)
 
-        # A start from nothing: along b as far as energy and bounds say, which tells the solvers the size of x.
+        # A start from nothing: along b as far as energy and bounds say, which tells the solvers the
+        # size of x.
         bAb, bb, some = (total(comm, one) for one in (b @ (A @ b), b @ b, np.any(start)))
         if bAb > 0.0 and not some:
             start = np.clip(bb / bAb * b, lower, upper)
 
-        # The problem as a step of a body whose every unknown is in contact, with obstacles on both sides.
+        # The problem as a step of a body whose every unknown is in contact, with obstacles on both
+        # sides.
         zero, none = np.zeros(A.rows), np.zeros(A.rows, dtype=bool)
         surface = replace(
             empty_surface(comm, 1), owned=numbers, gap0=zero, compliance=zero, bilateral=none
@@ -86,14 +90,16 @@ class LinearSteps:
 
 
 def reduced_step(point: Judged) -> Array:
-    """Return where one step of Newton's method for the natural residual leads. Where a bound holds an unknown in that
-    residual, lower + F/J_ii >= x or x >= upper + F/J_ii, the step goes to the bound; the others are free:
+    """Return where one step of Newton's method for the natural residual leads. Where a bound holds
+    an unknown in that residual, lower + F/J_ii >= x or x >= upper + F/J_ii, the step goes to the
+    bound; the others are free:
 
         A_ff d_f = -F_f - A_fh d_h,    d_h = bound - x_h
 
-    The residual falls along this direction, whatever the signs of the eigenvalues of A are. The target may lie beyond
-    bounds. By LU; StepFailure where A_ff is singular. Reference: the active set step of M. Hintermüller, K. Ito and
-    K. Kunisch, 2003, The primal-dual active set strategy as a semismooth Newton method. Collective."""
+    The residual falls along this direction, whatever the signs of the eigenvalues of A are. The
+    target may lie beyond bounds. By LU; StepFailure where A_ff is singular. Reference: the active
+    set step of M. Hintermüller, K. Ito and K. Kunisch, 2003, The primal-dual active set strategy as
+    a semismooth Newton method. Collective."""
     x, F, comm = point.x, point.F, point.problem.comm
     aim = x - F / point.diagonal
     held = (aim <= point.lower) | (aim >= point.upper)

@@ -1,10 +1,11 @@
 """Find a local minimum of an energy between bounds, by Newton's method with a trust region.
 
-Each step makes the quadratic model q(s) = F·s + ½ s·J s of the energy small, for x + s between the bounds and |s| not
-above a radius, in the norm |s|² = sum J_ii s_i². The radius grows where the energy falls as the model says and shrinks
-where it does not, also where the energy at x + s is no number. J need not be positive definite: along a direction of
-negative curvature the step goes to the edge of the region. Reference: C.-J. Lin and J. J. Moré, 1999, Newton's method
-for large bound-constrained optimization problems (TRON)."""
+Each step makes the quadratic model q(s) = F·s + ½ s·J s of the energy small, for x + s between the
+bounds and |s| not above a radius, in the norm |s|² = sum J_ii s_i². The radius grows where the
+energy falls as the model says and shrinks where it does not, also where the energy at x + s is no
+number. J need not be positive definite: along a direction of negative curvature the step goes to
+the edge of the region. Reference: C.-J. Lin and J. J. Moré, 1999, Newton's method for large
+bound-constrained optimization problems (TRON)."""
 
 import numpy as np
 
@@ -33,8 +34,9 @@ NO_DESCENT = (
 def minimise(
     problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
 ) -> Found:
-    """Return where the descent ends: at a point whose certificate is below the tolerance and where no direction of
-    negative curvature is found, or with a failure. ``layers``: options of the preconditioner. Collective."""
+    """Return where the descent ends: at a point whose certificate is below the tolerance and where
+    no direction of negative curvature is found, or with a failure. ``layers``: options of the
+    preconditioner. Collective."""
     found = Found(begin(problem, lower, upper), method="trust region")
     while found.best.left and not found.failure:
         carry_conditions(found, layers)
@@ -44,7 +46,8 @@ def minimise(
 
 
 def carry_conditions(found: Found, layers: OptionLayers) -> None:
-    """Take one step that carries Dirichlet conditions and bounds into the body, as far as the energy is a number."""
+    """Take one step that carries Dirichlet conditions and bounds into the body, as far as the
+    energy is a number."""
     point = found.best
     problem = point.problem
     model = Model(point, layers)
@@ -80,11 +83,13 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
         return
     model = Model(point, layers)
     radius = first = FIRST_RADIUS * model.jacobi_step()
-    shrunk = 1.0  # the length of a step along negative curvature, as a share of the first one that is tried
+    # the length of a step along negative curvature, as a share of the first one that is tried
+    shrunk = 1.0
     while True:
         done = point.certificate.worst <= tolerance
         if done:
-            # First-order conditions hold. A maximum or a saddle is left along a direction of negative curvature.
+            # First-order conditions hold. A maximum or a saddle is left along a direction of
+            # negative curvature.
             step, its = model.downward(shrunk)
             found.inner += its
             if step is None:

@@ -1,11 +1,13 @@
 """Find the answer by Newton's method for variational inequalities, when F(u; v) is given.
 
-Each step solves F(u_k) + J(u_k) (u - u_k) in the place of F between the same bounds (N. H. Josephy, 1979, Newton's
-method for generalized equations) and goes towards the answer as far as makes the natural residual smaller.
+Each step solves F(u_k) + J(u_k) (u - u_k) in the place of F between the same bounds (N. H. Josephy,
+1979, Newton's method for generalized equations) and goes towards the answer as far as makes the
+natural residual smaller.
 
-The first step begins at the u that was given, *before* Dirichlet conditions and bounds have changed it, and carries
-their change through the body with the linear step. Written into u by themselves they would turn the cells beside a
-clamped side inside out as soon as the change is larger than a cell."""
+The first step begins at the u that was given, *before* Dirichlet conditions and bounds have changed
+it, and carries their change through the body with the linear step. Written into u by themselves
+they would turn the cells beside a clamped side inside out as soon as the change is larger than a
+cell."""
 
 import logging
 from collections.abc import Sequence
@@ -59,9 +61,10 @@ class Found:
 def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -> Judged:
     """Write where to begin into u, and judge it. Collective.
 
-    Where conditions and bounds change a problem that is not linear, this is u as it was given; a small change, which
-    leaves forces hardly larger than the linear step that carries it would, is written into u at once unless told to
-    ``carry`` it. Else, and where F is not a number at this u, it is u with the conditions and between the bounds."""
+    Where conditions and bounds change a problem that is not linear, this is u as it was given; a
+    small change, which leaves forces hardly larger than the linear step that carries it would, is
+    written into u at once unless told to ``carry`` it. Else, and where F is not a number at this u,
+    it is u with the conditions and between the bounds."""
     given = problem.x
     if not problem.constant and problem.moves(lower, upper):
         problem.put(given, 1.0)
@@ -86,8 +89,9 @@ def solve_in_parts(
     *,
     carry: bool = True,
 ) -> Found:
-    """Return where Newton's method ends. Where it fails as Dirichlet conditions change the first guess too much at
-    once, they change it in parts, each from the answer of the part before. Collective."""
+    """Return where Newton's method ends. Where it fails as Dirichlet conditions change the first
+    guess too much at once, they change it in parts, each from the answer of the part before.
+    Collective."""
     moves = not problem.constant and problem.moves(lower, upper)
     whole = newton(problem, lower, upper, settings, methods, limit, carry=False)
     if not whole.failure or not moves:
@@ -122,7 +126,8 @@ def newton(
     *,
     carry: bool = True,
 ) -> Found:
-    """Return where Newton's method ends: below the tolerance of the settings, or with a failure. Collective."""
+    """Return where Newton's method ends: below the tolerance of the settings, or with a failure.
+    Collective."""
     point = begin(problem, lower, upper, carry=carry)
     found = Found(point, at_once=point.left == 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
@@ -146,10 +151,12 @@ def newton(
 
 
 def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
-    """Take one step from a point, in u: towards the answer of the linear problem between the bounds or, where this one
-    is not found or leads nowhere, a reduced step. Return the share of the change of held unknowns that is then left;
-    None, and the reason in ``found``, where neither helps. Collective."""
-    # Where all methods have failed before, the tangents are not positive: a reduced step costs one factor.
+    """Take one step from a point, in u: towards the answer of the linear problem between the bounds
+    or, where this one is not found or leads nowhere, a reduced step. Return the share of the change
+    of held unknowns that is then left; None, and the reason in ``found``, where neither helps.
+    Collective."""
+    # Where all methods have failed before, the tangents are not positive: a reduced step costs one
+    # factor.
     ways = [linear_step, reduced] if steps.helps else [reduced, linear_step]
     if point.problem.constant:
         ways = [linear_step]
@@ -162,7 +169,8 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
 
 
 def linear_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
-    """Go towards the answer of the linear problem between the bounds; None if that fails. Collective."""
+    """Go towards the answer of the linear problem between the bounds; None if that fails.
+    Collective."""
     start = np.clip(point.x, point.lower, point.upper)
     try:
         x, its, found.method = steps.solve(point.A, point.b, point.lower, point.upper, start)
@@ -189,13 +197,14 @@ def reduced(found: Found, point: Judged, steps: LinearSteps) -> float | None:
 
 
 def advance(point: Judged, target: Array) -> float | None:
-    """Go from a point towards the target as far as is an improvement, in u; return the share of the change of held
-    unknowns that is then left, None where no length helps. Collective."""
+    """Go from a point towards the target as far as is an improvement, in u; return the share of the
+    change of held unknowns that is then left, None where no length helps. Collective."""
     problem = point.problem
     if problem.constant:
         problem.put(target)
         return 0.0
-    # Bounds widened by both ends, which may lie outside: on the way nothing leaves them but by rounding.
+    # Bounds widened by both ends, which may lie outside: on the way nothing leaves them but by
+    # rounding.
     lower = np.minimum(point.lower, np.minimum(point.x, target))
     upper = np.maximum(point.upper, np.maximum(point.x, target))
     step, natural = target - point.x, point.natural(point.x, point.F)

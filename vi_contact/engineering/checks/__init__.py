@@ -1,4 +1,5 @@
-"""Check a run against the formulas of textbooks: each prints its formula, inputs and range, docs/guide/checks.md."""
+"""Check a run against the formulas of textbooks: each prints its formula, inputs and range,
+docs/guide/checks.md."""
 
 from ...core.lazy import lazy
 

@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .earth_pressure_seismic import MononobeOkabe as MononobeOkabe
 from .earth_pressure_seismic import VeletsosYounan as VeletsosYounan
 from .earth_pressure_seismic import Wood as Wood

@@ -1,4 +1,5 @@
-"""Set what a run found beside what a formula expects: what all checks of ``engineering.checks`` have in common."""
+"""Set what a run found beside what a formula expects: what all checks of ``engineering.checks``
+have in common."""
 
 import math
 import tomllib
@@ -25,9 +26,9 @@ _SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(
 class Comparison:
     """Hold a number of a run beside that of a formula, both in ``unit``.
 
-    name, formula, source: of the check; inputs: name -> (value, unit) of what went into the formula; applies: empty, or
-    the sentence that says why the formula does not apply: then ``expected`` is nan. found: nan without its columns.
-    range: where it applies, in words."""
+    name, formula, source: of the check; inputs: name -> (value, unit) of what went into the
+    formula; applies: empty, or the sentence that says why the formula does not apply: then
+    ``expected`` is nan. found: nan without its columns. range: where it applies, in words."""
 
     name: str
     formula: str
@@ -47,15 +48,18 @@ class Comparison:
 
 @dataclass(frozen=True, kw_only=True)
 class Check(ABC):
-    """Compare a run with a formula: base of all checks, frozen dataclasses with fields in SI units, angles in radians.
+    """Compare a run with a formula: base of all checks, frozen dataclasses with fields in SI units,
+    angles in radians.
 
-    checks.toml tells what each says of itself. InputError for numbers that are not above zero, or beyond its limits."""
+    checks.toml tells what each says of itself. InputError for numbers that are not above zero, or
+    beyond its limits."""
 
     of: str = ""
 
     @property
     def said(self) -> Mapping[str, Any]:
-        """Return formula, source, range, fields and answers with their units, and the columns that are read."""
+        """Return formula, source, range, fields and answers with their units, and the columns that
+        are read."""
         return _SAID[type(self).__name__]
 
     def __post_init__(self) -> None:
@@ -73,7 +77,8 @@ class Check(ABC):
 
     @abstractmethod
     def numbers(self, history: History) -> Numbers:
-        """Return both numbers, why they cannot be compared, and the inputs of the run, which has the columns."""
+        """Return both numbers, why they cannot be compared, and the inputs of the run, which has
+        the columns."""
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
@@ -84,7 +89,8 @@ class Check(ABC):
         }
 
     def compare(self, history: History) -> Comparison:
-        """Return the comparison for the history of a run: column -> values (rows,), as of a solution or run folder."""
+        """Return the comparison for the history of a run: column -> values (rows,), as of a
+        solution or run folder."""
         lacking = [
             name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history
         ]

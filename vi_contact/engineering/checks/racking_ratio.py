@@ -1,4 +1,5 @@
-"""Expect how far the ground shears a buried box, a thin frame that neither slips nor opens (Wang 1993)."""
+"""Expect how far the ground shears a buried box, a thin frame that neither slips nor opens (Wang
+1993)."""
 
 from dataclasses import dataclass
 
@@ -15,7 +16,8 @@ LARGEST, SHALLOWEST = (
 def flexibility(
     shear_modulus: float, width: float, height: float, wall: float, roof: float, invert: float
 ) -> float:
-    """Return F = G W/(S H) [-] of a box, 0 if it is rigid; S: force at its roof for a unit racking; E I [N m²/m]."""
+    """Return F = G W/(S H) [-] of a box, 0 if it is rigid; S: force at its roof for a unit racking;
+    E I [N m²/m]."""
     a1, a2 = roof / invert, roof * height / (wall * width)
     psi = (3.0 * a2**2 + 2.0 * (1.0 + a1) * a2 + a1) / (1.0 + a1 + 6.0 * a2)
     return shear_modulus * height * width**2 / (12.0 * roof) * psi
@@ -30,9 +32,10 @@ def racking_ratio(flexible: float, nu: float) -> float:
 class RackingRatio(Check):
     """Expect the racking of a box over that of the free field, both recorded by ``Racking``.
 
-    width, height: of the frame's centre lines [m]; wall, roof, invert: bending stiffness per metre E I [N m²/m], E/(1 -
-    nu²) for E in plane strain; shear_modulus [Pa], nu: of the ground; depth: of the box's centre [m]; box, free: labels
-    of the box and of four points of the ground far away, at the same depths. It applies up to F = 10, from 1.5 H down.
+    width, height: of the frame's centre lines [m]; wall, roof, invert: bending stiffness per metre
+    E I [N m²/m], E/(1 - nu²) for E in plane strain; shear_modulus [Pa], nu: of the ground; depth:
+    of the box's centre [m]; box, free: labels of the box and of four points of the ground far away,
+    at the same depths. It applies up to F = 10, from 1.5 H down.
     """
 
     width: float

@@ -1,9 +1,11 @@
-"""Let whole facets carry what is covered of a facet beside them, at the edge of what side 1 has in front of it.
+"""Let whole facets carry what is covered of a facet beside them, at the edge of what side 1 has in
+front of it.
 
-A node t of side 1 beyond that edge has but a share of its facets in front of side 2. A multiplier of its own would be
-that of a sliver: its reaction over its weight is no pressure of the interface, and its condition asks for the gap at
-t, where there is none. So t has no condition if little of its facets is covered. Displacements and pressures of the
-nearest whole facet, with nodes k, are carried on linearly to t instead:
+A node t of side 1 beyond that edge has but a share of its facets in front of side 2. A multiplier
+of its own would be that of a sliver: its reaction over its weight is no pressure of the interface,
+and its condition asks for the gap at t, where there is none. So t has no condition if little of its
+facets is covered. Displacements and pressures of the nearest whole facet, with nodes k, are carried
+on linearly to t instead:
 
     u(t) = sum_k E_tk u_k,   sum_k E_tk = 1,   sum_k E_tk x_k = x_t
 
@@ -11,9 +13,10 @@ and on the partly covered facet these nodes get D_k = sum_t E_tk D_t and the fun
 
     psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k),   b = (1, x) or (1, x, y),   ∫ over its part in front of side 2
 
-so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a uniform pressure passes through exactly, forces
-and moments of both sides are in balance, and every pressure is one over a patch that is covered. Badia, Verdugo and
-Martín, Comput. Methods Appl. Mech. Engrg. 336 (2018), 533-553 carry displacements on in the same way."""
+so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a uniform pressure passes
+through exactly, forces and moments of both sides are in balance, and every pressure is one over a
+patch that is covered. Badia, Verdugo and Martín, Comput. Methods Appl. Mech. Engrg. 336 (2018),
+533-553 carry displacements on in the same way."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,7 +26,8 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 
-LEAST_SHARE = 0.5  # of a node's facets beyond the edge, weighted with its function: less of it is carried (CHOSEN)
+# of a node's facets beyond the edge, weighted with its function: less of it is carried (CHOSEN)
+LEAST_SHARE = 0.5
 LEAST_COVERED = 1e-3  # of a facet: less is no contact where no other facet carries it
 LEAST_WEIGHT = 0.25  # of the weight that a node has without what it carries
 
@@ -32,11 +36,10 @@ LEAST_WEIGHT = 0.25  # of the weight that a node has without what it carries
 class Covered:
     """Hold what is covered of the k facets of side 1 in front of which something lies.
 
-    Attributes:
-        facets: (k, v) their nodes; middles: (k, d) middles of their covered parts.
-        weights, full: (k, v) integrals of the functions of their nodes, over the covered part and over all of it.
-        inside: (k, v) nodes that are in front of side 2 themselves; parts: (k,) covered shares of the facets.
-        common: (m,) nodes of side 1 that are nodes of side 2 too."""
+    Attributes: facets: (k, v) their nodes; middles: (k, d) middles of their covered parts. weights,
+        full: (k, v) integrals of the functions of their nodes, over the covered part and over all
+        of it. inside: (k, v) nodes that are in front of side 2 themselves; parts: (k,) covered
+        shares of the facets. common: (m,) nodes of side 1 that are nodes of side 2 too."""
 
     facets: Indices
     middles: Array
@@ -54,7 +57,8 @@ class Covered:
 
     @property
     def share(self) -> Array:
-        """Return the covered share (m,) of the facets of each node beyond the edge, 1 for all other nodes."""
+        """Return the covered share (m,) of the facets of each node beyond the edge, 1 for all other
+        nodes."""
         full = self.sums(self.full)
         share = self.sums(self.weights) / np.where(full > 0.0, full, 1.0)
         beyond = (full > 0.0) & (self.sums(self.inside.astype(float)) == 0.0)
@@ -63,8 +67,8 @@ class Covered:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Say which nodes (m,) of side 1 are carried, by the nodes (k, v) of which facet on each covered facet, and which
-    facets (k,) are used at all."""
+    """Say which nodes (m,) of side 1 are carried, by the nodes (k, v) of which facet on each
+    covered facet, and which facets (k,) are used at all."""
 
     nodes: Mask
     by: Indices
@@ -72,7 +76,8 @@ class Carried:
 
 
 def carried_by(covered: Covered, asked: Mask) -> Carried:
-    """Return the nodes that are carried of those ``asked`` for (m,), by the facets whose middle is the nearest.
+    """Return the nodes that are carried of those ``asked`` for (m,), by the facets whose middle is
+    the nearest.
 
     None is where there is no whole facet to carry them, and none of a facet at a weld."""
     facets, common = covered.facets, covered.common
@@ -97,7 +102,8 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
 
 
 def extrapolation(corners: Array, points: Array) -> Array:
-    """Return E (k, p, v): what each of the corners (k, v, c) of facets counts at points (k, p, c), linearly."""
+    """Return E (k, p, v): what each of the corners (k, v, c) of facets counts at points (k, p, c),
+    linearly."""
     middle = corners.mean(axis=1, keepdims=True)
     size = np.abs(corners - middle).max(axis=(1, 2))[:, None, None]
     known, wanted = (
@@ -108,11 +114,12 @@ def extrapolation(corners: Array, points: Array) -> Array:
 
 
 def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
-    """Return the carried nodes (m,) that leave too little of its own weight to a node which carries them: the one with
-    the largest weight for each of these. ``weights``: (m,) with what is carried [m], [m²].
+    """Return the carried nodes (m,) that leave too little of its own weight to a node which carries
+    them: the one with the largest weight for each of these. ``weights``: (m,) with what is carried
+    [m], [m²].
 
-    A linear function that is positive at one node of a facet and beyond is negative at the other: where much is
-    carried far this one would be pulled."""
+    A linear function that is positive at one node of a facet and beyond is negative at the other:
+    where much is carried far this one would be pulled."""
     own = covered.sums(covered.weights)
     light = ~(carried.nodes | covered.common) & (own > 0.0) & (weights < LEAST_WEIGHT * own)
     found = np.zeros(len(own), dtype=bool)
@@ -126,8 +133,9 @@ def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Coupled:
-    """Hold D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node, the carried
-    nodes (m,), which have no row in either, and the covered share (m,) of the facets of each node."""
+    """Hold D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node,
+    the carried nodes (m,), which have no row in either, and the covered share (m,) of the facets of
+    each node."""
 
     D: Array
     M: sp.csr_matrix
@@ -139,7 +147,8 @@ class Coupled:
 def coupled(
     covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
 ) -> Coupled:
-    """Return the coupling in which whole facets carry the nodes that have little covered, as far as they can."""
+    """Return the coupling in which whole facets carry the nodes that have little covered, as far as
+    they can."""
     share = covered.share
     asked = share < LEAST_SHARE
     while True:

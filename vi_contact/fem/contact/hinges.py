@@ -1,8 +1,10 @@
-"""Find nodes at which two bodies hang together by a point, or by a line in space: a contact is glued there.
+"""Find nodes at which two bodies hang together by a point, or by a line in space: a contact is
+glued there.
 
-Bodies that are drawn between the same corner points share these nodes, although each has sides of its own. The tip of a
-crack is a shared node too, but there the material goes on: its cells hang together through their facets, round the tip.
-So a node is a hinge if its cells do not hang together through facets at the node."""
+Bodies that are drawn between the same corner points share these nodes, although each has sides of
+its own. The tip of a crack is a shared node too, but there the material goes on: its cells hang
+together through their facets, round the tip. So a node is a hinge if its cells do not hang together
+through facets at the node."""
 
 from collections.abc import Sequence
 
@@ -23,8 +25,9 @@ NAMED = 4  # hinges that a message names
 def hinges(space: FemSpace, numbers: Indices) -> Indices:
     """Return those of these numbers of nodes, the same on every rank, that are hinges. Collective.
 
-    Things that are connected are pairs of a node and a facet at it: all those of one cell, and so, as a facet is of two
-    cells and may be of two ranks, all those round the node. Mid-points of edges and sides are no hinges."""
+    Things that are connected are pairs of a node and a facet at it: all those of one cell, and so,
+    as a facet is of two cells and may be of two ranks, all those round the node. Mid-points of
+    edges and sides are no hinges."""
     mesh, d = space.mesh, space.mesh.topology.dim
     names, vertices = node_numbers(mesh), len(compat.sub_entities(mesh, 0))
     corners = names[compat.geometry_dofmap(mesh)[:, :vertices]]
@@ -76,7 +79,8 @@ def hinges_of(space: FemSpace, nodes: Nodes) -> Mask:
 
 
 def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
-    """Raise InputError for hinges at these points (k, d), ordered, if there are any; ``names``: of the boundaries."""
+    """Raise InputError for hinges at these points (k, d), ordered, if there are any; ``names``: of
+    the boundaries."""
     if not len(points):
         return
     places = " and ".join(at(point) for point in points[:NAMED])
@@ -88,8 +92,10 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
     if len(points) == 1:
         shared = shared.replace(" 1 nodes", " a node")
     raise InputError(
-        f"{owner}: {shared}, {where}, where bodies would hang together although they may part beside: give each body "
-        "corner points of its own there, or say hinges=True (in a case file hinges = true in this [[contact]]) where "
+        f"{owner}: {shared}, {where}, where bodies would hang together although they may part "
+        "beside: give each body "
+        "corner points of its own there, or say hinges=True (in a case file hinges = true in this "
+        "[[contact]]) where "
         "a hinge is meant"
     )
 

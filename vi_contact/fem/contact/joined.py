@@ -1,4 +1,5 @@
-"""Join several contact surfaces of one system: more than one pair of bodies, pairs and obstacles, corners."""
+"""Join several contact surfaces of one system: more than one pair of bodies, pairs and obstacles,
+corners."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -18,13 +19,14 @@ Motion = Callable[[float], Array]
 def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     """Return one surface with the conditions of all, in the order given.
 
-    A node that is on several of them, at the edge of a channel, has a condition for each, at any angle between them.
-    Beside friction such nodes are refused unless they may slide freely (``with_frictionless_corners``); in space they
-    rub along the edge then, with the normal force of the first of them: name the surface that carries the body first.
-    A node of side 2 of a pair may touch an obstacle, but not be on side 1 of another pair.
+    A node that is on several of them, at the edge of a channel, has a condition for each, at any
+    angle between them. Beside friction such nodes are refused unless they may slide freely
+    (``with_frictionless_corners``); in space they rub along the edge then, with the normal force of
+    the first of them: name the surface that carries the body first. A node of side 2 of a pair may
+    touch an obstacle, but not be on side 1 of another pair.
 
-    Raises:
-        InputError: surfaces of different systems; directions of a node that are parallel (a boundary or a pair listed
+    Raises: InputError: surfaces of different systems; directions of a node that are parallel (a
+        boundary or a pair listed
             twice) or depend on one another; a node on side 1 of one pair and side 2 of another."""
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if (
@@ -76,7 +78,8 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
 
 
 def _slide(made: Sequence[FemSurface]) -> Motion | None:
-    """The slides of all conditions, those of nodes with several along the vectors that are left to them."""
+    """The slides of all conditions, those of nodes with several along the vectors that are left to
+    them."""
     joined = _joined(
         [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made]
     )

@@ -1,4 +1,5 @@
-"""Find the nodes of side 2 that a contact node of side 1 faces: u_2 at the point opposite node s is sum_j P_sj u_j.
+"""Find the nodes of side 2 that a contact node of side 1 faces: u_2 at the point opposite node s is
+sum_j P_sj u_j.
 
 The rows of P sum to one, so that a common translation of both bodies opens and closes nothing."""
 
@@ -15,7 +16,8 @@ from .nodes import Nodes
 from .partners import Surface, one_of
 
 NEARBY = 8  # nodes of side 2 that are looked at first
-EDGE_ON = 0.01  # cosine of the angle between a normal and what it is seen from: under less no side faces another
+# cosine of the angle between a normal and what it is seen from: under less no side faces another
+EDGE_ON = 0.01
 BESIDE = 0.01  # of the distance to the next node: how far beside a normal a partner may lie
 ONE_PLACE = (
     1e-6  # of the distance that a partner may lie beside a normal: nodes as close as this coincide
@@ -25,10 +27,11 @@ DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of their places.
+    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows
+    of their places.
 
-    ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all components, -1 for others.
-    None: there are no such nodes."""
+    ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all
+    components, -1 for others. None: there are no such nodes."""
 
     name: str
     nodes: Nodes
@@ -37,8 +40,8 @@ class Side:
 
 
 def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld, or tied to
-    one of side 2, which is the same; -1 for others."""
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a
+    weld, or tied to one of side 2, which is the same; -1 for others."""
     places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
     places[own] = others
@@ -49,13 +52,13 @@ def common_nodes(one: Side, two: Side) -> Indices:
 class Matched:
     """Hold the m nodes of side 1 that face side 2.
 
-    Attributes:
-        rows: their rows among those of side 1; P: (m, nodes of side 2).
-        weights: (m,) of their shares of the interface [m] or [m²].
-        overlap: (m,) by how much the sides may overlap there [m] and count as touching.
-        covered: (m,) share of the facets around a node that is in front of side 2, where the node itself is not; 1 for
+    Attributes: rows: their rows among those of side 1; P: (m, nodes of side 2). weights: (m,) of
+        their shares of the interface [m] or [m²]. overlap: (m,) by how much the sides may overlap
+        there [m] and count as touching. covered: (m,) share of the facets around a node that is in
+        front of side 2, where the node itself is not; 1 for
             all others, and by default.
-        carried: rows of further nodes whose shares those of others contain, so that they have no condition."""
+        carried: rows of further nodes whose shares those of others contain, so that they have no
+            condition."""
 
     rows: Indices
     P: sp.csr_matrix
@@ -90,12 +93,14 @@ class Matching(Protocol):
 
 @dataclass(frozen=True)
 class NodeToNode:
-    """Match conforming sides: every node of side 1 has one node of side 2 at its place, or opposite along its normal.
+    """Match conforming sides: every node of side 1 has one node of side 2 at its place, or opposite
+    along its normal.
 
-    ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the next node of side 1.
-    Of several nodes at one place, of bodies that meet there, the partner is the one whose facets lie in front of all
-    facets of the node. InputError where there is none, as for a stone on two stones, for nodes without a partner, two
-    nodes with the same one, and sides that do not face each other."""
+    ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the
+    next node of side 1. Of several nodes at one place, of bodies that meet there, the partner is
+    the one whose facets lie in front of all facets of the node. InputError where there is none, as
+    for a stone on two stones, for nodes without a partner, two nodes with the same one, and sides
+    that do not face each other."""
 
     tolerance: float = BESIDE
 
@@ -107,8 +112,10 @@ class NodeToNode:
         missing = np.flatnonzero(partner < 0)
         if len(missing):
             raise InputError(
-                f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of '{two.name}' "
-                f"opposite, the first at {at(one.nodes.points[missing[0]])}: mesh both sides alike, make "
+                f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of "
+                f"'{two.name}' "
+                f"opposite, the first at {at(one.nodes.points[missing[0]])}: mesh both sides "
+                "alike, make "
                 "the smaller side the first, or use matching=DualMortar()"
             )
         first, counts = np.unique(partner, return_counts=True)
@@ -136,8 +143,8 @@ class NodeToNode:
         partner, along, turned, crowds = _opposite(
             one.nodes, two.nodes, np.sort(nearby, axis=1), reach
         )
-        # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it was looked at, all
-        # nodes are
+        # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it
+        # was looked at, all nodes are
         unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
         for rows in (
             np.array_split(unsure, -(-len(unsure) * count // DISTANCES)) if len(unsure) else ()
@@ -171,8 +178,8 @@ class NodeToNode:
         return partner
 
 
-# row of a node -> several nodes in front of it, the first the one whose normal is the most opposite, and how far along
-# the normal they are [m]
+# row of a node -> several nodes in front of it, the first the one whose normal is the most
+# opposite, and how far along the normal they are [m]
 Crowds = dict[int, tuple[Indices, Array]]
 
 
@@ -181,8 +188,9 @@ def _opposite(
 ) -> tuple[Indices, Array, Mask, Crowds]:
     """Find what each node of side 1 faces among these ``places`` (m, k) on side 2.
 
-    Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the normal, infinite for none;
-    whether all that are there face away; where several are about as near)."""
+    Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the
+    normal, infinite for none; whether all that are there face away; where several are about as
+    near)."""
     offset = two.points[places] - one.points[:, None, :]
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
@@ -190,7 +198,8 @@ def _opposite(
     slope = np.einsum("ijk,ik->ij", two.normals[places], one.normals)
     distance = np.where(near & (slope < -EDGE_ON), np.abs(along), np.inf)
     least = distance.min(axis=1)
-    # where several bodies meet they have a node each at one place, told apart by their normals first
+    # where several bodies meet they have a node each at one place, told apart by their normals
+    # first
     alike = distance <= least[:, None] + ONE_PLACE * reach[:, None]
     rows, nearest = np.arange(len(reach)), np.where(alike, slope, np.inf).argmin(axis=1)
     found = np.isfinite(least)
@@ -205,7 +214,8 @@ def _opposite(
 
 
 def _refuse_several(one: Side, two: Side, row: int) -> None:
-    """Raise InputError for a node of side 1 that faces several nodes of side 2, each with a part of what it faces."""
+    """Raise InputError for a node of side 1 that faces several nodes of side 2, each with a part of
+    what it faces."""
     where = f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of '{two.name}' at one place"
     d = one.nodes.points.shape[1]
     if d == 1:
@@ -221,14 +231,15 @@ def _refuse_several(one: Side, two: Side, row: int) -> None:
 def refuse_same_way(one: str, two: str, point: Array) -> None:
     """Raise InputError for sides whose outward normals point the same way."""
     raise InputError(
-        f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same way: "
+        f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same "
+        "way: "
         "choose the two boundaries between the bodies"
     )
 
 
 def _spacing(points: Array, size: float) -> Array:
-    """Distance of each node to the next one of the same side that is not at its place [m]; the size of the mesh for a
-    single node."""
+    """Distance of each node to the next one of the same side that is not at its place [m]; the size
+    of the mesh for a single node."""
     if len(points) == 1:
         return np.array([size])
     from scipy.spatial import cKDTree

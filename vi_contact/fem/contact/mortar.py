@@ -1,24 +1,26 @@
 """Couple sides of bodies that are not meshed alike: mortar coupling with dual Lagrange multipliers.
 
-The gap is asked not at points but in the mean, weighted with functions psi_s on side 1, one per node,
+The gap is asked not at points but in the mean, weighted with functions psi_s on side 1, one per
+node,
 
     D_s (u_1 at s) = sum_j M_sj u_j,   D_s = ∫ psi_s,   M_sj = ∫ psi_s phi_j,   P = D⁻¹ M
 
-over the part of side 1 that faces side 2. In the plane, side 2 is projected onto each segment of side 1 along the
-segment's normal, which cuts it into pieces where all functions are polynomials; two Gauss points are exact. For space
-see ``mortar_in_space``. On each segment
+over the part of side 1 that faces side 2. In the plane, side 2 is projected onto each segment of
+side 1 along the segment's normal, which cuts it into pieces where all functions are polynomials;
+two Gauss points are exact. For space see ``mortar_in_space``. On each segment
 
     psi = A phi,   A = diag(∫ phi_k) (∫ phi phiᵀ)⁻¹
 
-over its part in front of side 2 (``covering``: at the edge of what is covered, whole segments carry parts of others),
-so that ∫ psi_s phi_k = 0 for the other node k (biorthogonal) and sum_s psi_s = 1.
-Then every linear field is matched exactly (P x_2 = x_1 on fitting sides) and a uniform pressure passes through exactly
-(the patch test). Nodes t of both sides, at the tip of a crack or beside a weld, have no function; the other nodes of a
-facet share theirs and, which keeps P x_2 = x_1, pass ∫ psi_t to u_t: pressure is uniform up to the weld, which carries
-what a multiplier of t would.
+over its part in front of side 2 (``covering``: at the edge of what is covered, whole segments carry
+parts of others), so that ∫ psi_s phi_k = 0 for the other node k (biorthogonal) and sum_s psi_s = 1.
+Then every linear field is matched exactly (P x_2 = x_1 on fitting sides) and a uniform pressure
+passes through exactly (the patch test). Nodes t of both sides, at the tip of a crack or beside a
+weld, have no function; the other nodes of a facet share theirs and, which keeps P x_2 = x_1, pass ∫
+psi_t to u_t: pressure is uniform up to the weld, which carries what a multiplier of t would.
 
-Literature: Wohlmuth, SIAM J. Numer. Anal. 38 (2000); Hüeber and Wohlmuth, Comput. Methods Appl. Mech. Engrg. 194
-(2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200 (2011)."""
+Literature: Wohlmuth, SIAM J. Numer. Anal. 38 (2000); Hüeber and Wohlmuth, Comput. Methods Appl.
+Mech. Engrg. 194 (2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200
+(2011)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -40,13 +42,15 @@ AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Match sides of plane and solid bodies with any meshes by the mortar method with dual Lagrange multipliers.
+    """Match sides of plane and solid bodies with any meshes by the mortar method with dual Lagrange
+    multipliers.
 
-    A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is covered, where that is at
-    least half of its share of the facets around it; else the nodes inside carry it, and it has none (``covering``).
-    Initial gaps are means too; where facets of the same curved face overlap by no more than their distance from it,
-    some h²/(8R) on a curve of radius R, the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off
-    only. InputError for bars, for sides that do not face each other, in space for facets that are slivers or not
+    A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is
+    covered, where that is at least half of its share of the facets around it; else the nodes inside
+    carry it, and it has none (``covering``). Initial gaps are means too; where facets of the same
+    curved face overlap by no more than their distance from it, some h²/(8R) on a curve of radius R,
+    the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only. InputError
+    for bars, for sides that do not face each other, in space for facets that are slivers or not
     convex."""
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
@@ -55,12 +59,15 @@ class DualMortar:
         d = one.nodes.points.shape[1]
         if d == 1:
             raise InputError(
-                "DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for bars"
+                "DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for "
+                "bars"
             )
         if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
             raise InputError(
-                f"DualMortar joins facets of first order and those of '{one.name}' and '{two.name}' have "
-                "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use degree=1"
+                f"DualMortar joins facets of first order and those of '{one.name}' and "
+                f"'{two.name}' have "
+                "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use "
+                "degree=1"
             )
         found = in_space(one, two) if d == 3 else _in_plane(one, two)
         D = found.D
@@ -79,15 +86,17 @@ def _refuse(one: Side, two: Side) -> None:
     if np.all(some @ others.T > EDGE_ON):
         refuse_same_way(one.name, two.name, one.nodes.points[0])
     raise InputError(
-        f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose the "
+        f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: "
+        "choose the "
         "two boundaries between the bodies"
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Segment:
-    """Hold a segment of side 1 in front of side 2: nodes, ends, pieces, ∫ phi phiᵀ (2, 2), by segment of side 2
-    ∫ phi_i phi_j (2, 2), and by how much polygons of one curve may overlap on it [m]."""
+    """Hold a segment of side 1 in front of side 2: nodes, ends, pieces, ∫ phi phiᵀ (2, 2), by
+    segment of side 2 ∫ phi_i phi_j (2, 2), and by how much polygons of one curve may overlap on it
+    [m]."""
 
     nodes: Array
     ends: Array
@@ -124,7 +133,8 @@ def _in_plane(one: Side, two: Side) -> Coupled:
 def _overlap(
     pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array
 ) -> float:
-    """By how much the polygon of side 2, of curvature H at its segments, may overlap a segment of side 1 [m]."""
+    """By how much the polygon of side 2, of curvature H at its segments, may overlap a segment of
+    side 1 [m]."""
     segment = [piece[2] for piece in pieces]
     share = np.array([0.0, 0.5, 1.0])
     own = np.array([low + share * (high - low) for low, high, *_ in pieces])
@@ -159,7 +169,8 @@ def _covered(segments: list[_Segment], common: Mask) -> Covered:
 def _assembled(
     one: Side, two: Side, segments: list[_Segment], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
-    """D (m,), M (m, n) and by how much polygons of one curve may overlap at each node of side 1 (m,) [m]."""
+    """D (m,), M (m, n) and by how much polygons of one curve may overlap at each node of side 1
+    (m,) [m]."""
     m, n = len(one.nodes.points), len(two.nodes.points)
     D, M, overlap, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
     for part, by, used in zip(segments, carried.by, carried.used, strict=True):
@@ -195,7 +206,8 @@ def _carry(
     by: Indices,
     carried: Mask,
 ) -> None:
-    """Add to D and M what a segment adds of which some node is carried by the nodes of another (``covering``)."""
+    """Add to D and M what a segment adds of which some node is carried by the nodes of another
+    (``covering``)."""
     weights, inverse = part.own.sum(axis=1), np.linalg.inv(part.own)
     there = part.places(points[by])[None, :, None]
     shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
@@ -221,8 +233,8 @@ def _normals(side: Side, ends: Array) -> Array:
 def _pieces(
     ends: Array, normal: Array, ends2: Array, normals2: Array
 ) -> Iterator[tuple[float, float, int, Array]]:
-    """(low, high, segment of side 2, its coordinates at low and high) of each piece of a segment of side 1, in its
-    coordinate from 0 to 1: where several segments lie opposite, the nearest."""
+    """(low, high, segment of side 2, its coordinates at low and high) of each piece of a segment of
+    side 1, in its coordinate from 0 to 1: where several segments lie opposite, the nearest."""
     along = ends[1] - ends[0]
     place = (ends2 - ends[0]) @ along / (along @ along)  # (k, 2): projections of the ends of side 2
     height = (ends2 - ends[0]) @ normal

@@ -1,13 +1,15 @@
-"""Make contact between two deformable bodies: the unknowns of side 1 become displacements relative to side 2.
+"""Make contact between two deformable bodies: the unknowns of side 1 become displacements relative
+to side 2.
 
-Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s = Q_sᵀ u_s, the
-unknowns û of the nodal frames are written in new ones ǔ,
+Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s
+= Q_sᵀ u_s, the unknowns û of the nodal frames are written in new ones ǔ,
 
     û = R ǔ,   û_s = ǔ_s + Q_sᵀ sum_j P_sj u_j   at contact nodes of side 1,   û = ǔ elsewhere
 
-so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0 is the condition, friction acts on ǔ_t,
-and the work of a reaction on ǔ is that of the pair of forces r on side 1 and -P_sjᵀ r on side 2: action is reaction.
-n is the outward normal of side 1, from side 1 to side 2. Displacements are small: nobody's partner changes."""
+so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0 is the condition,
+friction acts on ǔ_t, and the work of a reaction on ǔ is that of the pair of forces r on side 1 and
+-P_sjᵀ r on side 2: action is reaction. n is the outward normal of side 1, from side 1 to side 2.
+Displacements are small: nobody's partner changes."""
 
 import logging
 from collections.abc import Sequence
@@ -54,32 +56,36 @@ def contact_pair(
     feature_angle: float = FEATURE_ANGLE,
     hinges: bool = False,
 ) -> ContactSurface:
-    """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
+    """Make the contact conditions between two boundaries of deformable bodies, or two faces of a
+    crack.
 
-    Each node of side 1 has a condition, with the normals, weights (times the section's thickness) and forces of side 1;
-    r_n / weights is the pressure. Either side may be the first. Pressures are smoothest where side 1 is that of the
-    softer body, or its facets are the smaller ones: those of a stiff side with facets a little larger than those of a
-    soft side 2 zigzag. A body that rocks turns about its own edge where its base is side 1; where the ground is, about
-    the ground's node next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no condition
-    where less than half of their share is covered: the nodes inside carry it. Initial gaps are measured along the
-    normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
-    nodes that are clamped on both sides, or tied to the other side, have none either. Shared nodes round which the
-    material does not go on, at the rim of a contact between bodies that are drawn between the same points, are refused
-    unless ``hinges``. Nodes that are tied to one another share one. Prescribed nodes of side 2 move as they are
-    prescribed, like a moving obstacle.
+    Each node of side 1 has a condition, with the normals, weights (times the section's thickness)
+    and forces of side 1; r_n / weights is the pressure. Either side may be the first. Pressures are
+    smoothest where side 1 is that of the softer body, or its facets are the smaller ones: those of
+    a stiff side with facets a little larger than those of a soft side 2 zigzag. A body that rocks
+    turns about its own edge where its base is side 1; where the ground is, about the ground's node
+    next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no
+    condition where less than half of their share is covered: the nodes inside carry it. Initial
+    gaps are measured along the normals of side 1. Nodes that both sides share, at the tip of a
+    crack, have no condition, and nodes that are clamped on both sides, or tied to the other side,
+    have none either. Shared nodes round which the material does not go on, at the rim of a contact
+    between bodies that are drawn between the same points, are refused unless ``hinges``. Nodes that
+    are tied to one another share one. Prescribed nodes of side 2 move as they are prescribed, like
+    a moving obstacle.
 
-    Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
-    has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
+    Where side 1 turns by more than the feature angle its faces are matched one by one, and a node
+    on several of them has one condition for each, as if every face were a pair of its own, joined
+    by ``joined_surfaces``.
 
-    Args:
-        matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
-        points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in this order.
-        feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
-        hinges: True where bodies may hang together by nodes of these boundaries, as by a pin.
-    Raises:
-        InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies
-            that overlap, sides of one and the same
-            boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
+    Args: matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
+        points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in
+        this order. feature_angle: angle [rad]; facets around a node that turn by less from one
+        another are one smooth face. hinges: True where bodies may hang together by nodes of these
+        boundaries, as by a pin.
+    Raises: InputError: nodes that only glue two bodies together, sides that do not pair or do not
+        face each other, bodies
+            that overlap, sides of one and the same boundary, contact directions that are partly
+            prescribed, clamped nodes that face free ones."""
     space = contact_space(
         "contact_pair",
         system,
@@ -100,14 +106,16 @@ def contact_pair(
     flag("contact_pair", "hinges", hinges)
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
         raise InputError(
-            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh both "
+            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
+            "both "
             "sides alike, or use degree=1"
         )
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
     if shared.all():
         raise InputError(
-            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
+            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
+            "mesh the "
             "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
         )
     _refuse_common(one, two)
@@ -174,7 +182,8 @@ def contact_pair(
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
-    """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
+    """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers.
+    Collective."""
     nodes = everywhere(space.comm, nodes_on(space, facets))
     rows = np.concatenate(
         space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices)))
@@ -184,8 +193,8 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 
 def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
-    """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers of those in front of
-    side 2, and of those that are clamped."""
+    """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers
+    of those in front of side 2, and of those that are clamped."""
     numbers = one.nodes.numbers
     return {
         "shared by both sides": shared,
@@ -199,8 +208,10 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
     if len(little) and space.comm.rank == 0:
         where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
         log.warning(
-            "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of their facets, "
-            "and no whole facet is near: their pressures are left out of the largest ones; make '%s' the first "
+            "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of "
+            "their facets, "
+            "and no whole facet is near: their pressures are left out of the largest ones; make "
+            "'%s' the first "
             "side, or mesh '%s' finer",
             len(little),
             one.name,
@@ -212,7 +223,8 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
 
 
 def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
-    """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved. Collective."""
+    """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved.
+    Collective."""
     sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
     moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
@@ -221,8 +233,8 @@ def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
 def _watched(
     space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
-    """What watches nodes of side 1, given of all ranks, that are held in every component in front of others that are.
-    Collective."""
+    """What watches nodes of side 1, given of all ranks, that are held in every component in front
+    of others that are. Collective."""
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
     nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
@@ -239,7 +251,8 @@ def _watched(
 def _borrowed(
     space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
-    """What nodes of side 1 without a pressure of their own take of neighbours, not those in front of nothing."""
+    """What nodes of side 1 without a pressure of their own take of neighbours, not those in front
+    of nothing."""
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
     ]
@@ -247,7 +260,8 @@ def _borrowed(
 
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
-    """Return which nodes of side 1 only glue bodies together; InputError unless they are ``allowed``. Collective."""
+    """Return which nodes of side 1 only glue bodies together; InputError unless they are
+    ``allowed``. Collective."""
     numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
     found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
@@ -262,8 +276,9 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
 
 
 def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all components; of several, as
-    where ties meet, the nearest; -1 for others. They cannot part, as the two sides of a weld."""
+    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all
+    components; of several, as where ties meet, the nearest; -1 for others. They cannot part, as the
+    two sides of a weld."""
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
@@ -283,13 +298,15 @@ def _refuse_common(one: Side, two: Side) -> None:
     for facet in np.flatnonzero(np.isin(own, others))[:1]:
         where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
         raise InputError(
-            f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch itself, "
+            f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch "
+            "itself, "
             "so list it on one side only"
         )
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1, with normals and weights of their own, and the nodes' over the whole side."""
+    """Return the smooth faces of side 1, with normals and weights of their own, and the nodes' over
+    the whole side."""
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
@@ -304,7 +321,8 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(
-                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
+                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two "
+                "boundaries "
                 "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)"
             )
         tied = None if one.tied is None else one.tied[used]
@@ -317,10 +335,11 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
 def _by_face(
     faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
-    """(nodes with the normals and weights of their faces, what they face), ordered by number; ``carried`` are numbers
-    of nodes then.
+    """(nodes with the normals and weights of their faces, what they face), ordered by number;
+    ``carried`` are numbers of nodes then.
 
-    Faces in front of nothing are left out where the matching leaves out parts of sides, unless all are."""
+    Faces in front of nothing are left out where the matching leaves out parts of sides, unless all
+    are."""
     refusal, found = None, []
     for side, mean in faces:
         try:
@@ -354,9 +373,9 @@ def _by_face(
 
 
 def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
-    """What a face of side 1 faces: along its own normals or, since across a gap the partner of a corner lies on the
-    bisector, along the ``mean`` normals of its nodes; not where a matching leaves out what faces nothing: sides of a
-    block would see the ground beside its base."""
+    """What a face of side 1 faces: along its own normals or, since across a gap the partner of a
+    corner lies on the bisector, along the ``mean`` normals of its nodes; not where a matching
+    leaves out what faces nothing: sides of a block would see the ground beside its base."""
     try:
         return matching.match(side, two, size)
     except InputError:
@@ -370,13 +389,15 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 
 def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Return what is matched and not clamped; InputError for clamped nodes facing free ones, or with none left."""
+    """Return what is matched and not clamped; InputError for clamped nodes facing free ones, or
+    with none left."""
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
     if len(lost):
         raise InputError(
-            f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
+            f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free "
+            "node of "
             f"'{two.name}': make '{two.name}' the first side, or clamp less"
         )
     if clamped.all():
@@ -392,16 +413,21 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
 def _gap(
     space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
-    """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0."""
+    """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of
+    polygons count as 0."""
     gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(
-            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the "
-            "bodies overlap there, or these are not the boundaries between them; choose the sides that "
-            "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the strain of "
-            "the body that is too large, or by quasi_static on surface.moving(towards=…), its overlap"
+            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: "
+            "the "
+            "bodies overlap there, or these are not the boundaries between them; choose the sides "
+            "that "
+            "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the "
+            "strain of "
+            "the body that is too large, or by quasi_static on surface.moving(towards=…), its "
+            "overlap"
         )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning(

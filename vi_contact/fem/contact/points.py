@@ -1,4 +1,5 @@
-"""Make contact conditions of listed nodes: of a user's own matrices, where nothing is known of facets."""
+"""Make contact conditions of listed nodes: of a user's own matrices, where nothing is known of
+facets."""
 
 from typing import Any
 
@@ -29,21 +30,26 @@ def contact_points(
     obstacle: Obstacle | None = None,
     opposite: Any = None,
 ) -> ContactSurface:
-    """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order; also node against node.
+    """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order; also node
+    against node.
 
-    All ranks give the same. Nodes at which the normal is oblique get frames of their own, and tangents for friction.
+    All ranks give the same. Nodes at which the normal is oblique get frames of their own, and
+    tangents for friction.
 
-    Args:
-        system: of ``system_from_arrays`` or ``fem.system_from_matrices``, whose numbers of nodes count.
-        nodes: (m,) numbers; a node that is listed with several normals has a condition for each of these.
-        normals: (m, d), or (d,) for all, from the body to what it may touch, of any length.
-        weights: (m,) or one for all: the length times thickness [m²], or area, of each, so that r_n / weight is a
+    Args: system: of ``system_from_arrays`` or ``fem.system_from_matrices``, whose numbers of nodes
+        count. nodes: (m,) numbers; a node that is listed with several normals has a condition for
+        each of these. normals: (m, d), or (d,) for all, from the body to what it may touch, of any
+        length. weights: (m,) or one for all: the length times thickness [m²], or area, of each, so
+        that r_n / weight is a
             pressure. None: 1, what is called a pressure then is the force in newtons.
-        gap0: (m,) or one for all, the initial gap [m], >= 0. None: zero, or what lies between node and opposite node.
-        obstacle: HalfSpace(…), AnalyticGap(…) or another, which says contact directions and gaps instead.
-        opposite: (m,) numbers of nodes of another body, each of which the node faces: the gap is gap0 - (u - u_opp)·n.
-    Raises:
-        InputError: a system of another kind, nodes that do not exist, normals of no length or along components that
+        gap0: (m,) or one for all, the initial gap [m], >= 0. None: zero, or what lies between node
+            and opposite node.
+        obstacle: HalfSpace(…), AnalyticGap(…) or another, which says contact directions and gaps
+            instead.
+        opposite: (m,) numbers of nodes of another body, each of which the node faces: the gap is
+            gap0 - (u - u_opp)·n.
+    Raises: InputError: a system of another kind, nodes that do not exist, normals of no length or
+        along components that
             stand still, gaps below zero, directions of one node that depend on one another."""
     instance(
         OWNER,
@@ -125,7 +131,8 @@ def _nodes(
     found = space.at_nodes(numbers, own)
     for number in numbers[found[:, 0] == 0.0]:
         raise InputError(
-            f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers from 0 "
+            f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers "
+            "from 0 "
             "on, in the order of its coordinates"
         )
     points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)

@@ -1,4 +1,5 @@
-"""Make contact conditions of facets of a mesh: nodal normals, weights, gaps and the rotated basis."""
+"""Make contact conditions of facets of a mesh: nodal normals, weights, gaps and the rotated
+basis."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -45,26 +46,28 @@ def contact_surface(
 ) -> ContactSurface:
     """Make the contact conditions of a part of the boundary, or of listed points of it only.
 
-    Nodal weights are ∫ phi_i times the thickness of the section, so that r_n / weights is in Pa. Nodal normals have the
-    direction of ∫ phi_i n over the facets; on rollers (a symmetry plane) the held component is left out. Nodes that are
-    prescribed in every component, where the boundary meets a clamped or a moved part, have no condition; a motion that
-    drives one of them into the obstacle is refused when it does. Nodes that move as one
-    (``fem.Tied`` in all components) have one condition with the weights of all. P2 tetrahedra have their conditions at
-    the vertices, for means of the gap around them (``fem.contact.bubbles``).
+    Nodal weights are ∫ phi_i times the thickness of the section, so that r_n / weights is in Pa.
+    Nodal normals have the direction of ∫ phi_i n over the facets; on rollers (a symmetry plane) the
+    held component is left out. Nodes that are prescribed in every component, where the boundary
+    meets a clamped or a moved part, have no condition; a motion that drives one of them into the
+    obstacle is refused when it does. Nodes that move as one (``fem.Tied`` in all components) have
+    one condition with the weights of all. P2 tetrahedra have their conditions at the vertices, for
+    means of the gap around them (``fem.contact.bubbles``).
 
-    Where the facets turn by more than the feature angle the boundary has faces, and a node on several of them has one
-    condition for each, with the normal and the weight of this face, at any angle between them (``fem.contact.faces``).
-    Where the obstacle gives all faces of a node one direction, as a HalfSpace does, the node has one condition.
+    Where the facets turn by more than the feature angle the boundary has faces, and a node on
+    several of them has one condition for each, with the normal and the weight of this face, at any
+    angle between them (``fem.contact.faces``). Where the obstacle gives all faces of a node one
+    direction, as a HalfSpace does, the node has one condition.
 
-    Args:
-        obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for every face of a node.
-        points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is kept.
-        feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
-        hinges: True where the body may hang together with another one by nodes of this boundary, as by a pin.
-    Raises:
-        InputError: no contact nodes, nodes that only glue two bodies together, a listed point that is clamped or not on
-            the facets, a contact direction that is
-            partly prescribed, initial penetration, a node with more faces than the body has dimensions."""
+    Args: obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
+        every face of a node. points: (k, d) coordinates; each is replaced by the nearest node of
+        the facets. The order is kept. feature_angle: angle [rad]; facets around a node that turn by
+        less from one another are one smooth face. hinges: True where the body may hang together
+        with another one by nodes of this boundary, as by a pin.
+    Raises: InputError: no contact nodes, nodes that only glue two bodies together, a listed point
+        that is clamped or not on
+            the facets, a contact direction that is partly prescribed, initial penetration, a node
+            with more faces than the body has dimensions."""
     space = contact_space(
         "contact_surface",
         system,
@@ -131,8 +134,8 @@ def contact_surface(
 
 
 def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
-    """Return ``motion`` and ``slide`` of this rank's conditions where what they face, or bubbles are measured from, is
-    moved. Collective."""
+    """Return ``motion`` and ``slide`` of this rank's conditions where what they face, or bubbles
+    are measured from, is moved. Collective."""
     parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
     moves = bool(parts) and any(condition.moves for condition in space.prescribed)
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
@@ -145,8 +148,9 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
 def moved_by_held(
     space: FemSpace, conditions: Sequence[NodalConditions]
 ) -> Callable[[Array], tuple[Array, Array]]:
-    """Return a function that tells how far nodal displacements (k, d) of held components move the obstacles of these
-    conditions towards their nodes, (m,), and along their tangents, (m, d-1). Both are collective."""
+    """Return a function that tells how far nodal displacements (k, d) of held components move the
+    obstacles of these conditions towards their nodes, (m,), and along their tangents, (m, d-1).
+    Both are collective."""
     frames, free = (
         NodalFrames(*given(conditions)),
         ~joined_nodes([one.nodes for one in conditions]).held,
@@ -185,8 +189,8 @@ def moved_by_held(
 def _obstacle(
     obstacle: Obstacle | None, size: float, name: str, angle: float, count: int
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """What an obstacle answers: directions and initial gaps at points with these normals, of all ``count`` of a
-    boundary or of those of a rank."""
+    """What an obstacle answers: directions and initial gaps at points with these normals, of all
+    ``count`` of a boundary or of those of a rank."""
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         if not len(points):  # users' functions need not cope with none
@@ -203,8 +207,9 @@ def _obstacle(
 def _watched(
     space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None
 ) -> tuple[Watched, ...]:
-    """What watches nodes of this rank that are prescribed in every component, at each of their faces that looks towards
-    the obstacle. InputError where such a face is in the obstacle at the start. Collective."""
+    """What watches nodes of this rank that are prescribed in every component, at each of their
+    faces that looks towards the obstacle. InputError where such a face is in the obstacle at the
+    start. Collective."""
     slots = slots_of(space.comm, nodes.numbers)
     directions, gap = asked(
         space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals
@@ -216,8 +221,8 @@ def _watched(
 def _looking(
     obstacle: Obstacle | None, size: float
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """What an obstacle answers at points with these normals, directions of zero where they do not lead out of the body
-    or the obstacle has no answer."""
+    """What an obstacle answers at points with these normals, directions of zero where they do not
+    lead out of the body or the obstacle has no answer."""
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         directions, gap = np.zeros_like(points), np.zeros(len(points))
@@ -249,7 +254,8 @@ def _rows_of(nodes: Nodes, chosen: Indices) -> Indices:
 
 
 def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
-    """What orders the conditions of all ranks: the numbers of their nodes, or their places in a list of nodes."""
+    """What orders the conditions of all ranks: the numbers of their nodes, or their places in a
+    list of nodes."""
     if chosen is None:
         return nodes.numbers
     order = np.argsort(chosen)
@@ -259,7 +265,8 @@ def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
 def one_per_direction(
     whole: Nodes, nodes: Nodes, directions: Array, gap: Array
 ) -> tuple[Nodes, Array, Array]:
-    """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights added, smaller gap.
+    """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights
+    added, smaller gap.
 
     ``whole``: the nodes with the weights of all their faces."""
     if len(nodes.numbers) == len(whole.numbers):
@@ -289,8 +296,8 @@ def one_per_direction(
 def contact_space(
     owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any, **others: Any
 ) -> FemSpace:
-    """Return the space of a system; InputError for another kind, groups of another mesh, and a list of no points, and
-    where ranks give other ``groups``, ``points`` or ``others``. Collective."""
+    """Return the space of a system; InputError for another kind, groups of another mesh, and a list
+    of no points, and where ranks give other ``groups``, ``points`` or ``others``. Collective."""
     space = space_of(owner, system)
     agree(space.comm, owner, {**groups, "points": points, **others})
     for meaning, group in groups.items():
@@ -317,7 +324,8 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
         )
     if largest(space.comm, not weights.all()):
         raise InputError(
-            f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its "
+            f"boundary group '{facets.name}' lies inside the body, where cells on both sides share "
+            "its "
             "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
         )
     length = np.linalg.norm(sums, axis=1)[:, None]
@@ -333,7 +341,8 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     count = round(total(space.comm, clamped.sum()))
     if not largest(space.comm, (~clamped).any()):
         raise InputError(
-            f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point cannot "
+            f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point "
+            "cannot "
             "be clamped and in contact: choose another boundary or clamp less"
         )
     if count:
@@ -342,7 +351,8 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
 
 
 def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
-    """Return the numbers of those nodes, given of all ranks, that are nearest to the listed points, in their order."""
+    """Return the numbers of those nodes, given of all ranks, that are nearest to the listed points,
+    in their order."""
     rows = []
     for point in points:
         x = np.asarray(point, dtype=float)
@@ -352,7 +362,8 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         row = int(np.argmin(distance))
         if distance[row] > 0.05 * space.size:
             raise InputError(
-                f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group '{name}': "
+                f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group "
+                f"'{name}': "
                 "give a point on it"
             )
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
@@ -365,7 +376,8 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
             raise InputError(f"contact point {at(x)} is also clamped: leave it out, or clamp less")
         if row in rows:
             raise InputError(
-                f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list each "
+                f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list "
+                "each "
                 "once"
             )
         rows.append(row)
@@ -379,10 +391,12 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
 def merged(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float
 ) -> tuple[Nodes, Array, Any]:
-    """Return (nodes, directions, shares (k, m)) of the k conditions that are left of the m of all ranks when nodes that
-    move as one (tied boundaries) have one for each face: sums of weights, means with shares by weight.
+    """Return (nodes, directions, shares (k, m)) of the k conditions that are left of the m of all
+    ranks when nodes that move as one (tied boundaries) have one for each face: sums of weights,
+    means with shares by weight.
 
-    InputError for a node that is tied in some components only, or to one without such a condition."""
+    InputError for a node that is tied in some components only, or to one without such a
+    condition."""
     leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
     for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
         alike = np.flatnonzero(nodes.numbers == leaders[row])
@@ -398,7 +412,8 @@ def merged(
                 "tie all components" if partly else "add the boundary of that node to the group"
             )
             raise InputError(
-                f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing the "
+                f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing "
+                "the "
                 f"others as points=, or {remedy}"
             )
         target[row] = alike[turn.argmax()]
@@ -415,7 +430,8 @@ def merged(
 def with_ties(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float
 ) -> Any:
-    """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``. Collective."""
+    """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``.
+    Collective."""
     tied = np.isin(nodes.numbers, space.tied_nodes)
     parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
     every, (n, g) = (

@@ -1,1 +1,2 @@
-"""Write fields of a run, and resultants that need elements: reactions, section forces, nodal work."""
+"""Write fields of a run, and resultants that need elements: reactions, section forces, nodal
+work."""

@@ -1,9 +1,12 @@
-"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several, in the order of the input mesh.
+"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several, in the order
+of the input mesh.
 
-Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
-moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
+Every file is replaced as a whole and the index names only frames that are complete, so that
+ParaView can open it at any moment, also while the run goes on or after it was killed. Nothing in
+the files depends on the number of ranks.
 
-What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick."""
+What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all
+closed nodes stick."""
 
 import logging
 import os
@@ -38,12 +41,15 @@ log = logging.getLogger(__name__)
 
 
 class VonMises:
-    """Compute the mean von Mises stress of owned cells [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma).
+    """Compute the mean von Mises stress of owned cells [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s =
+    dev(sigma).
 
-    Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without viscous stresses."""
+    Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without
+    viscous stresses."""
 
     def __init__(self, forms: Any) -> None:
-        """``forms``: the ElasticForms of a system, whose constants carry the thickness as a factor."""
+        """``forms``: the ElasticForms of a system, whose constants carry the thickness as a
+        factor."""
         import ufl  # late, as compat: frames of own matrices need no DOLFINx
 
         from .. import compat
@@ -89,9 +95,11 @@ _RUBBING = ("contact_traction_t", "slip")
 
 @dataclass(frozen=True)
 class XDMF:
-    """Write a frame every so many steps, and one of the initial state. InputError unless both numbers are >= 1.
+    """Write a frame every so many steps, and one of the initial state. InputError unless both
+    numbers are >= 1.
 
-    ``frames_per_file``: each time so many frames have files of their own they are put into one: some systems want few.
+    ``frames_per_file``: each time so many frames have files of their own they are put into one:
+    some systems want few.
     """
 
     every: int = 10
@@ -103,7 +111,8 @@ class XDMF:
     def open(
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
     ) -> "FrameWriter":
-        """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
+        """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder.
+        Collective."""
         space = problem.system.space
         if isinstance(space, MatrixSpace):
             cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
@@ -114,7 +123,8 @@ class XDMF:
 
 @dataclass(frozen=True)
 class Cells:
-    """Hold the cells of a frame: XDMF's name of them, nodes of the owned ones, their numbers, and their stress."""
+    """Hold the cells of a frame: XDMF's name of them, nodes of the owned ones, their numbers, and
+    their stress."""
 
     kind: str
     nodes: Indices
@@ -182,7 +192,8 @@ class FrameWriter:
                 remove(folder / name)
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
-        """Write a frame of state, acceleration of its step (both in the rotated basis) and report. Collective."""
+        """Write a frame of state, acceleration of its step (both in the rotated basis) and report.
+        Collective."""
         problem, space = self._problem, self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)
@@ -247,7 +258,8 @@ class FrameWriter:
         """fields.xdmf with all complete frames."""
         frames = "".join(self._grid(k, t) for k, t in self._times.items())
         text = (
-            '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" GridType="Collection" '
+            '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" '
+            'GridType="Collection" '
             f'CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n'
         )
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
@@ -273,7 +285,8 @@ class FrameWriter:
             attributes.append(attribute("von_mises", "Cell", cells))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
-            f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" NodesPerElement="{corners}">'
+            f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" '
+            f'NodesPerElement="{corners}">'
             f"{_item((cells, corners), f'{mesh}:/cells', 'Int')}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
             f"{''.join(attributes)}</Grid>\n"
@@ -281,8 +294,9 @@ class FrameWriter:
 
 
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
-    """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of several faces of a
-    node the pressure of the one that is pressed most, and the highest status. Collective."""
+    """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of
+    several faces of a node the pressure of the one that is pressed most, and the highest status.
+    Collective."""
     space, blocks = cast(NodalSpace, problem.system.space), blocks_of_conditions(problem)
     surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
@@ -300,8 +314,9 @@ def blocks_of_conditions(problem: ContactProblem) -> Indices:
 
 
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:
-    """Return nodal values (k, c), where conditions are those of vertices only with those of the mid-points of contact
-    facets: linear from end to end, zero at ends without a condition, so that ∫ p = sum r_n. Collective."""
+    """Return nodal values (k, c), where conditions are those of vertices only with those of the
+    mid-points of contact facets: linear from end to end, zero at ends without a condition, so that
+    ∫ p = sum r_n. Collective."""
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:
         return nodal

@@ -1,11 +1,14 @@
-"""Hand out states and stored frames as DOLFINx Functions, along the axes and with the values of ghosts.
+"""Hand out states and stored frames as DOLFINx Functions, along the axes and with the values of
+ghosts.
 
-u and v are on the space of the system, ``system.space.V``, with the components that are prescribed or tied. The stress
-sigma(u), without viscous parts, is the L2 projection onto discontinuous fields: constant in a cell of triangles and
-tetrahedra, where that of P1 is so, (bi)linear in others; of P2 and Q2 one degree higher. The contact pressure
-r_n / weight is nodal, zero off the contact surface; of several faces of a node it is that of the one which is pressed
-most. Nodes of the contact boundary without a condition (held ones, and those that both sides share) and those that are
-hardly covered take the mean of their neighbours on its facets: there ∫ p is more than the sum of reactions."""
+u and v are on the space of the system, ``system.space.V``, with the components that are prescribed
+or tied. The stress sigma(u), without viscous parts, is the L2 projection onto discontinuous fields:
+constant in a cell of triangles and tetrahedra, where that of P1 is so, (bi)linear in others; of P2
+and Q2 one degree higher. The contact pressure r_n / weight is nodal, zero off the contact surface;
+of several faces of a node it is that of the one which is pressed most. Nodes of the contact
+boundary without a condition (held ones, and those that both sides share) and those that are hardly
+covered take the mean of their neighbours on its facets: there ∫ p is more than the sum of
+reactions."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -35,14 +38,17 @@ SAME = 1e-9  # of the size of the mesh, and of the longest time
 def as_function(
     problem: ContactProblem, state: State, name: str, *, continuous: bool = False
 ) -> Any:
-    """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
+    """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or
+    "contact_pressure" [Pa].
 
-    Where a node of the contact boundary has no pressure of its own, as one that is held, the function has the mean of
-    those of its neighbours, so that the error of a right pressure falls with the size of the facets there too.
+    Where a node of the contact boundary has no pressure of its own, as one that is held, the
+    function has the mean of those of its neighbours, so that the error of a right pressure falls
+    with the size of the facets there too.
 
-    ``state``: of simulate, march, static_equilibrium or quasi_static of this problem. ``continuous``: the stress
-    projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau. Every call makes a Function of its own.
-    Collective. InputError for a state of another problem, and a system without a mesh."""
+    ``state``: of simulate, march, static_equilibrium or quasi_static of this problem.
+    ``continuous``: the stress projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau.
+    Every call makes a Function of its own. Collective. InputError for a state of another problem,
+    and a system without a mesh."""
     space = _checked("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
@@ -59,8 +65,8 @@ def as_function(
 
 
 def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
-    """Return nodal contact pressures (k, 1) in which the nodes of contact boundaries that have none of their own take
-    the mean of those of their neighbours (``contact.borrowing``). Collective."""
+    """Return nodal contact pressures (k, 1) in which the nodes of contact boundaries that have none
+    of their own take the mean of those of their neighbours (``contact.borrowing``). Collective."""
     space, surface = space_of("contact_pressure", problem.system), problem.surface
     blocks = blocks_of_conditions(problem)
     told = np.zeros(len(space.nodes), dtype=bool)
@@ -85,10 +91,12 @@ def read_function(
     frame: int | None = None,
     continuous: bool = False,
 ) -> Any:
-    """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a state.
+    """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a
+    state.
 
-    ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the last. The run may
-    have had any number of ranks. Collective. InputError for a time without a frame, and fields of another mesh."""
+    ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the
+    last. The run may have had any number of ranks. Collective. InputError for a time without a
+    frame, and fields of another mesh."""
     space = _checked("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
     optional(
@@ -133,7 +141,8 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
 def _function(
     problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False
 ) -> Any:
-    """The Function of values at the owned nodes, (k,) or (k, d), at a time; the stress is that of displacements."""
+    """The Function of values at the owned nodes, (k,) or (k, d), at a time; the stress is that of
+    displacements."""
     system, space = problem.system, space_of(name, problem.system)
     V = (
         system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
@@ -160,7 +169,8 @@ def _blocks(of: Any, among: Any) -> Indices:
 
 
 class Stress:
-    """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate gradients."""
+    """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate
+    gradients."""
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
         d, degree = (

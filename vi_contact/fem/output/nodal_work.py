@@ -1,8 +1,10 @@
-"""Work of a group of cells on virtual displacements: the resultants of nodal forces without making the forces.
+"""Work of a group of cells on virtual displacements: the resultants of nodal forces without making
+the forces.
 
-The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these cells alone, with a
-the absolute acceleration and f their loads. For a nodal field r, rᵀq is a number, and as K, C, M are symmetric it is
-(K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products a step, however many cells there are."""
+The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these
+cells alone, with a the absolute acceleration and f their loads. For a nodal field r, rᵀq is a
+number, and as K, C, M are symmetric it is (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products
+a step, however many cells there are."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -31,8 +33,9 @@ log = logging.getLogger(__name__)
 Beyond = Callable[
     [Array | float, Any], Array
 ]  # (density, its load or None) -> (motions, owned components)
-# (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of local cells of the
-# group, ghosts too, None for all; what is taken away of inertia, its damping and loads, or None)
+# (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of
+# local cells of the group, ghosts too, None for all; what is taken away of inertia, its damping and
+# loads, or None)
 Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 
 
@@ -46,11 +49,10 @@ def check_actions(owner: str, loads: Any, gravity: Any) -> None:
 class NodalWork:
     """Compute rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
 
-    Args:
-        owner: what is recorded, for messages.
-        problem: its system is made by ``fem.assemble``; InputError otherwise.
-        loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their balance.
-        gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells."""
+    Args: owner: what is recorded, for messages. problem: its system is made by ``fem.assemble``;
+        InputError otherwise. loads: those given to ``fem.assemble``: what acts on cells of the
+        group belongs to their balance. gravity: acceleration (d,) [m/s²] of ``with_weight``, which
+        acts on the mass of the cells."""
 
     def __init__(
         self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None
@@ -100,8 +102,8 @@ class NodalWork:
         self._tell_constant_loads(owner)
 
     def _tell_constant_loads(self, owner: str) -> None:
-        """Warn when the system has constant loads and none were given: who forgets the weight measures reactions that
-        do not carry it. Collective."""
+        """Warn when the system has constant loads and none were given: who forgets the weight
+        measures reactions that do not carry it. Collective."""
         system, space = self._problem.system, self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
         if (
@@ -111,7 +113,8 @@ class NodalWork:
         ):
             text = ", ".join(f"{x:.4g}" for x in theirs)
             log.warning(
-                "%s: the system has constant loads of (%s) N in all, and none were given here: if they act on "
+                "%s: the system has constant loads of (%s) N in all, and none were given here: if "
+                "they act on "
                 "these elements, give the loads of fem.assemble or the gravity of with_weight",
                 owner,
                 text,
@@ -123,14 +126,17 @@ class NodalWork:
             cells is not None or beyond is not None for _, _, cells, beyond in parts
         ):
             raise InputError(
-                "section forces: the part of a LinearForm on the cells of a cut is unknown; give these "
+                "section forces: the part of a LinearForm on the cells of a cut is unknown; give "
+                "these "
                 "loads as Traction and BodyForce, or record Reactions"
             )
         forms, ours = [*self._forms, *self._load_forms], self.space.forms
         if not ours.densities and any(beyond for *_, beyond in parts):
             raise InputError(
-                "a section goes through elements, and with forms=… the mass of their parts is unknown: "
-                "let it run along element sides, or give a material for the density in place of mass="
+                "a section goes through elements, and with forms=… the mass of their parts is "
+                "unknown: "
+                "let it run along element sides, or give a material for the density in place of "
+                "mass="
             )
         densities = [
             (ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")
@@ -166,7 +172,8 @@ class NodalWork:
         self._still: dict[int, Array] = {}
 
     def at_rest(self, state: State) -> Array:
-        """Return the work of a state without acceleration, (count,): a static one, or the start of a run."""
+        """Return the work of a state without acceleration, (count,): a static one, or the start of
+        a run."""
         problem, space, t = self._problem, self.space, state.t
         motion = [
             space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))
@@ -176,9 +183,11 @@ class NodalWork:
         )
 
     def of_step(self, report: Report) -> Array:
-        """Return the work in a step's equation of motion (``Report.balance``), with absolute accelerations, (count,).
+        """Return the work in a step's equation of motion (``Report.balance``), with absolute
+        accelerations, (count,).
 
-        Loads, prescribed and ground motion are taken between the ends of the step where the balance has its u."""
+        Loads, prescribed and ground motion are taken between the ends of the step where the balance
+        has its u."""
         problem, space, balance = self._problem, self.space, report.balance
         late, t0, t1 = self._place(report), report.old.t, report.new.t
 
@@ -206,7 +215,8 @@ class NodalWork:
     def _sum(
         self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance
     ) -> Array:
-        """The numbers for nodal u, v, a (owned, d), less contact forces on held ones; ``at`` evaluates functions."""
+        """The numbers for nodal u, v, a (owned, d), less contact forces on held ones; ``at``
+        evaluates functions."""
         total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
@@ -243,7 +253,8 @@ class NodalWork:
 
 
 def rigid_motions(points: Array, centre: Array) -> Array:
-    """Return (motions, k, d) unit translations and, but on a line, rotations about a centre of points (k, d)."""
+    """Return (motions, k, d) unit translations and, but on a line, rotations about a centre of
+    points (k, d)."""
     d, arms = points.shape[1], points - centre
     shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
     turns = [np.column_stack([-arms[:, 1], arms[:, 0]])] if d == 2 else []

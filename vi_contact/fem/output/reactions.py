@@ -18,31 +18,34 @@ from .nodal_work import Loads, NodalWork, check_actions
 
 @dataclass
 class Reactions:
-    """Record what a prescribed or absorbing boundary does to its body: force [N] and moment about a centre [N m].
+    """Record what a prescribed or absorbing boundary does to its body: force [N] and moment about a
+    centre [N m].
 
-    On the components c of the nodes of the facets that are held, and on all of those with dashpots, with the loads f on
-    them, K, C, M of the elements and the absolute acceleration a + a_g:
+    On the components c of the nodes of the facets that are held, and on all of those with dashpots,
+    with the loads f on them, K, C, M of the elements and the absolute acceleration a + a_g:
 
         R = (K u + C v + M (a + r a_g) - f)_c
 
-    On held components they are rows of the equation of motion that the elimination of prescribed displacements took
-    out, less contact forces (on a prescribed side 2 of a pair and on edges of P2 tetrahedra); at nodes with dashpots
-    what these and the waves that come in (CompliantBase, FreeField) do to the elements, and contact if there is any at
-    these nodes. Nodes that two boundaries share count in both. In the relative frame the inertia load of the ground
-    motion is M r a_g, of the held nodes too, so that R is the same force as with the ground moved by ``Prescribed``,
-    and balances all masses, loads and contact forces of the body (with ``base_inertia=True``, the default of
-    ``assemble``; K, C, M are those of the elements, whatever a time scheme does to the mass of contact nodes). Values
-    are those of the step's equation of motion, its mean or end, as the contact reactions are; row 0 is that of the
-    initial state at rest.
+    On held components they are rows of the equation of motion that the elimination of prescribed
+    displacements took out, less contact forces (on a prescribed side 2 of a pair and on edges of P2
+    tetrahedra); at nodes with dashpots what these and the waves that come in (CompliantBase,
+    FreeField) do to the elements, and contact if there is any at these nodes. Nodes that two
+    boundaries share count in both. In the relative frame the inertia load of the ground motion is M
+    r a_g, of the held nodes too, so that R is the same force as with the ground moved by
+    ``Prescribed``, and balances all masses, loads and contact forces of the body (with
+    ``base_inertia=True``, the default of ``assemble``; K, C, M are those of the elements, whatever
+    a time scheme does to the mass of contact nodes). Values are those of the step's equation of
+    motion, its mean or end, as the contact reactions are; row 0 is that of the initial state at
+    rest.
 
-    Columns reaction_x_<name>, reaction_y_<name>, …: the force on the body; reaction_M_<name> about the centre,
-    anticlockwise positive (reaction_M_x_<name>, … in three dimensions). Base shear is reaction_x, the overturning
-    moment of the body on its base is -reaction_M.
+    Columns reaction_x_<name>, reaction_y_<name>, …: the force on the body; reaction_M_<name> about
+    the centre, anticlockwise positive (reaction_M_x_<name>, … in three dimensions). Base shear is
+    reaction_x, the overturning moment of the body on its base is -reaction_M.
 
-    Args:
-        facets: a boundary with prescribed components or dashpots; other components of its nodes are not counted.
-        loads: those given to ``assemble``: their part on the held nodes goes straight into the support.
-        gravity: acceleration (d,) [m/s²] of ``with_weight``, (0, -9.80665) for example: likewise.
+    Args: facets: a boundary with prescribed components or dashpots; other components of its nodes
+        are not counted. loads: those given to ``assemble``: their part on the held nodes goes
+        straight into the support. gravity: acceleration (d,) [m/s²] of ``with_weight``, (0,
+        -9.80665) for example: likewise.
     Raises:
         InputError: nothing is prescribed on the facets, and they have no dashpots."""
 
@@ -74,7 +77,8 @@ class Reactions:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Prepare the work of rigid motions of the held nodes; return the row of the state at rest. Collective."""
+        """Prepare the work of rigid motions of the held nodes; return the row of the state at rest.
+        Collective."""
         owner = f"reactions '{self.name}'"
         self._work = NodalWork(owner, problem, self.loads, self.gravity)
         space: FemSpace = self._work.space
@@ -90,7 +94,8 @@ class Reactions:
             held[space.facet_blocks(np.intersect1d(self.facets.indices, one.facets.indices))] = True
         if not largest(space.comm, held.any()):
             raise InputError(
-                f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots, "
+                f"nothing is prescribed on boundary group '{self.facets.name}', and it has no "
+                "dashpots, "
                 "so it has no reactions: give a boundary that is held"
             )
         self._parts = {1: ["x"], 2: ["x", "y", "M"], 3: ["x", "y", "z", "M_x", "M_y", "M_z"]}[

@@ -1,4 +1,5 @@
-"""Record section forces N, V, M of plane cuts through walls, slabs and columns, along element sides or through them."""
+"""Record section forces N, V, M of plane cuts through walls, slabs and columns, along element sides
+or through them."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,9 @@ from ..space import FemSpace
 from .cut_cells import work_beyond
 from .nodal_work import Loads, NodalWork, Rigid, check_actions, rigid_motions
 
-ON_LINE = 1e-6  # of the length of the cut: what counts as lying on it, and how far a rectangle's angles may be from 90°
+# of the length of the cut: what counts as lying on it, and how far a rectangle's angles may be from
+# 90°
+ON_LINE = 1e-6
 UNCOVERED = 1e-3  # of the length of a cut in the plane: what the elements on it may miss
 _QUANTITIES = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
@@ -31,31 +34,35 @@ _QUANTITIES = tomllib.loads(
 
 @dataclass
 class SectionForces:
-    """Record the resultants of plane cuts: label -> its ends a, b in the plane, corners a, b, c of a rectangle [m].
+    """Record the resultants of plane cuts: label -> its ends a, b in the plane, corners a, b, c of
+    a rectangle [m].
 
-    In the plane e is the unit vector from a to b and n the one to its left, F the force that the part on the left
-    exerts through the cut on the part on the right, and c the middle of the cut:
+    In the plane e is the unit vector from a to b and n the one to its left, F the force that the
+    part on the left exerts through the cut on the part on the right, and c the middle of the cut:
 
         N = F·n  (tension positive),   V = F·e,   M = (moment of F about c, anticlockwise) = ∫ s sigma_n ds
 
-    so that M > 0 is tension at b. In space e_2 points from a to b, e_3 from a to c at right angles, n = e_2 x e_3, and
-    F is what the part before the cut, where n points, exerts on the one behind it. With the moment M of F about the
-    middle of the rectangle, s_2 and s_3 the distances from there, the columns are
+    so that M > 0 is tension at b. In space e_2 points from a to b, e_3 from a to c at right angles,
+    n = e_2 x e_3, and F is what the part before the cut, where n points, exerts on the one behind
+    it. With the moment M of F about the middle of the rectangle, s_2 and s_3 the distances from
+    there, the columns are
 
         N = F·n,  V_2 = F·e_2,  V_3 = F·e_3,  M_t = M·n,  M_2 = M·e_2 = ∫ s_3 sigma_n,  M_3 = M·e_3 = -∫ s_2 sigma_n
 
-    A cut may run along element sides or, of P1 and Q1, through elements, at any inclination. F is minus the sum of the
-    nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at their nodes on one side, without inertia
-    and loads of the parts of cells on this side: not integrated stresses, but the forces by which these elements are in
-    equilibrium, exact on any mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself,
-    of P2 tetrahedra on held ones too, belong to neither side and are left out. Values are those of the step's equation
-    of motion, row 0 those of the initial state at rest; per thickness of the section (plane strain: per metre).
+    A cut may run along element sides or, of P1 and Q1, through elements, at any inclination. F is
+    minus the sum of the nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at
+    their nodes on one side, without inertia and loads of the parts of cells on this side: not
+    integrated stresses, but the forces by which these elements are in equilibrium, exact on any
+    mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself, of P2
+    tetrahedra on held ones too, belong to neither side and are left out. Values are those of the
+    step's equation of motion, row 0 those of the initial state at rest; per thickness of the
+    section (plane strain: per metre).
 
-    Args:
-        cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both sides needs it.
-        loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of ``with_weight``, if these cells weigh.
-    Raises:
-        InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes through cells of degree
+    Args: cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both
+        sides needs it. loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of
+        ``with_weight``, if these cells weigh.
+    Raises: InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes
+        through cells of degree
             2; corners of no rectangle."""
 
     cuts: Mapping[str, Sequence[Sequence[float]]]
@@ -76,7 +83,8 @@ class SectionForces:
             shape = shape_of(ends)
             if len(shape) == 2 and shape not in ((2, 2), (3, 3)):
                 raise InputError(
-                    f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} coordinates; "
+                    f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} "
+                    "coordinates; "
                     "give 2 ends (x, y) in the plane, 3 corners (x, y, z) of a rectangle in space"
                 )
             d = 3 if shape[:1] == (3,) else 2
@@ -91,7 +99,8 @@ class SectionForces:
         check_actions("SectionForces", self.loads, self.gravity)
 
     def columns(self) -> Columns:
-        """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2, M_3."""
+        """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2,
+        M_3."""
         return {
             f"{quantity}_{label}": (unit, f"{text}, section {label}")
             for label, ends in self.cuts.items()
@@ -103,7 +112,8 @@ class SectionForces:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Find the cuts; return the row of the state at rest, of a static stage for example. Collective."""
+        """Find the cuts; return the row of the state at rest, of a static stage for example.
+        Collective."""
         work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
         found = [find_cut(work.space, *item, self.cells) for item in self.cuts.items()]
         work.take([part for part, _ in found])
@@ -118,7 +128,8 @@ class SectionForces:
 
 
 def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
-    """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of a cut (d, d)."""
+    """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of
+    a cut (d, d)."""
     size = np.linalg.norm(corners[1:] - corners[0], axis=1)
     if not size.all():
         raise InputError(
@@ -135,15 +146,17 @@ def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
 
 
 def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tuple[Rigid, Array]:
-    """Return (what moves on one side of a cut with ends or corners (d, d), the matrix that makes N, V, M, … of its
-    work). InputError, on all ranks, unless the cut goes through all of the group that it reaches. Collective.
+    """Return (what moves on one side of a cut with ends or corners (d, d), the matrix that makes N,
+    V, M, … of its work). InputError, on all ranks, unless the cut goes through all of the group
+    that it reaches. Collective.
 
-    The nodes on the cut and behind it move, and the cells before them hold them; the other way round where sides of
-    cells lie on the cut behind it only, as at a foot."""
+    The nodes on the cut and behind it move, and the cells before them hold them; the other way
+    round where sides of cells lie on the cut behind it only, as at a foot."""
     corners, mesh = np.asarray(given, dtype=float), space.mesh
     if len(corners) != space.dimension:
         raise InputError(
-            f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of a "
+            f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of "
+            "a "
             f"rectangle in space; this mesh has {space.dimension} dimensions"
         )
     axes, size = axes_of(name, corners)
@@ -179,7 +192,8 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     if not cover > 0.0 or (space.dimension == 2 and abs(cover - size[0]) > UNCOVERED * size[0]):
         raise InputError(
             f"section '{name}': elements cover {cover:.4g} of its {size.prod():.4g} m"
-            f"{'²' * (space.dimension - 2)}: let it reach from one surface of the group of cells to the "
+            f"{'²' * (space.dimension - 2)}: let it reach from one surface of the group of cells "
+            "to the "
             "other"
         )
     sign = 1.0 if left >= right else -1.0
@@ -204,11 +218,13 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
 
 class _Trace:
-    """What the plane of a cut leaves in cells, by boxes round it along the sides of the cut, low, high (cells, d - 1).
+    """What the plane of a cut leaves in cells, by boxes round it along the sides of the cut, low,
+    high (cells, d - 1).
 
-    left, right: cells with vertices before and behind the plane; touches: with a point of the cut; beyond: (2 (d - 1),
-    cells) those of them that go on over one of its ends; cover: (3, cells) how much [m] of the cut (in space, [m²], of
-    boxes round it) sides of cells on its left, of cells on its right, and cells that it goes through cover."""
+    left, right: cells with vertices before and behind the plane; touches: with a point of the cut;
+    beyond: (2 (d - 1), cells) those of them that go on over one of its ends; cover: (3, cells) how
+    much [m] of the cut (in space, [m²], of boxes round it) sides of cells on its left, of cells on
+    its right, and cells that it goes through cover."""
 
     def __init__(self, s: Array, d: Array, size: Array, tol: float) -> None:
         self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0

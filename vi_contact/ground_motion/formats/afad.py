@@ -1,4 +1,5 @@
-"""Read text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in gal."""
+"""Read text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in
+gal."""
 
 from ...core.errors import InputError
 from ..record import Record
@@ -8,7 +9,8 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the title of the national network, or its columns and their count, stand in the header."""
+    """Tell whether the title of the national network, or its columns and their count, stand in the
+    header."""
     head = [line.strip().upper() for line in text.heads[:60]]
     titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)
     columns = any(tuple(line.split()) == COMPONENTS for line in head)
@@ -16,7 +18,8 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is subtracted."""
+    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is
+    subtracted."""
     channel = text.chosen(COMPONENTS)
     start = next(
         (k + 1 for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None
@@ -36,7 +39,8 @@ def read(text: TextFile) -> Record:
     for index, row in zip(data, text.rows(data), strict=True):
         if len(row) != 3:
             raise InputError(
-                f"{text.at(index)}: {len(row)} values instead of N-S, E-W and U-D; get the file again"
+                f"{text.at(index)}: {len(row)} values instead of N-S, E-W and U-D; get the file "
+                "again"
             )
         samples.append(row[channel])
     text.refuse_other_count(

@@ -24,7 +24,8 @@ _UNITS = re.compile(r"\bunits?\s*+(?:of|are|is|in|[=:])\s*+(\([^()]*+\)|[^\s,;]+
 
 
 def begin_data(text: TextFile) -> int | None:
-    """Return the index of the first line of numbers after `*** Begin data ***`, NPTS and DT skipped, or None."""
+    """Return the index of the first line of numbers after `*** Begin data ***`, NPTS and DT
+    skipped, or None."""
     start = next((k + 1 for k, line in enumerate(text.heads) if _BEGIN.search(line)), None)
     while start is not None and start < len(text.lines) and _states(text.heads[start]):
         start += 1
@@ -37,8 +38,8 @@ def _states(line: str) -> bool:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first lines say NPTS, outside "#" comments, or a `*** Begin data ***` line stands before rows of
-    accelerations, and not before times and accelerations."""
+    """Tell whether the first lines say NPTS, outside "#" comments, or a `*** Begin data ***` line
+    stands before rows of accelerations, and not before times and accelerations."""
     start = begin_data(text)
     if start is not None:
         rows = list(text.rows(text.filled(start)))
@@ -53,7 +54,8 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an AT2 file; units and dt are needed only where the file does not state them."""
+    """Return the record of an AT2 file; units and dt are needed only where the file does not state
+    them."""
     npts, stated_dt, start = _header(text)
     told = [index for index in range(start) if text.heads[index].strip()]
     told = [
@@ -85,20 +87,22 @@ def read(text: TextFile) -> Record:
 
 
 def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | None]:
-    """Return the line that states the units, and the units; InputError where two lines state different ones."""
+    """Return the line that states the units, and the units; InputError where two lines state
+    different ones."""
     found = [(index, match[1]) for index in told for match in _UNITS.finditer(text.heads[index])]
     for index, units in found[1:]:
         if known_units(units) is not None and known_units(units) != known_units(found[0][1]):
             raise InputError(
-                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} states "
+                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} "
+                "states "
                 f"them as {found[0][1]}; correct the file, or get it again"
             )
     return found[0] if found else (None, None)
 
 
 def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float] | None, int]:
-    """Return the line of NPTS and NPTS, the line of DT and DT, None where they are not stated, and the index of the
-    first data line."""
+    """Return the line of NPTS and NPTS, the line of DT and DT, None where they are not stated, and
+    the index of the first data line."""
     counts: list[tuple[int, float]] = []
     steps: list[tuple[int, float]] = []
     begin, last = begin_data(text), 0
@@ -120,7 +124,8 @@ def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float]
         for index in range(start)
         if not _states(text.heads[index]) and not (text.heads[0].startswith(OURS) and index == 1)
     ]
-    # a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one, says the same as NPTS and DT
+    # a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one, says the same
+    # as NPTS and DT
     sentences = stated_steps(text, prose)
     if len({value for _, value in sentences}) == 1:
         steps += sentences

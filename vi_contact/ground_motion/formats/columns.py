@@ -1,9 +1,11 @@
-"""Read plain columns: times and one or more accelerations, or accelerations alone, with or without a heading.
+"""Read plain columns: times and one or more accelerations, or accelerations alone, with or without
+a heading.
 
-Accelerations alone are the path series of OpenSees (.th, .g3, .acc): values in one column or row by row. Lines before
-the numbers are read for units, time step, number of samples and names of columns (``statements``, ``headings``); what
-they say is believed, and what the caller says must agree. Lines with "#" among the numbers and empty lines are skipped;
-columns are separated by blanks, commas or semicolons. Units are never guessed."""
+Accelerations alone are the path series of OpenSees (.th, .g3, .acc): values in one column or row by
+row. Lines before the numbers are read for units, time step, number of samples and names of columns
+(``statements``, ``headings``); what they say is believed, and what the caller says must agree.
+Lines with "#" among the numbers and empty lines are skipped; columns are separated by blanks,
+commas or semicolons. Units are never guessed."""
 
 import re
 from collections.abc import Sequence
@@ -47,7 +49,8 @@ _WHOLE = re.compile(r"[\s\d+,;-]++")
 
 @dataclass
 class _Found:
-    """Hold what the header says: units and their line, time step, number of samples, columns; and what is doubted."""
+    """Hold what the header says: units and their line, time step, number of samples, columns; and
+    what is doubted."""
 
     units: tuple[int, str] | None = None
     step: tuple[int, float] | None = None
@@ -58,12 +61,14 @@ class _Found:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of a file of columns; `units` and `dt` are needed where the file does not state them.
+    """Return the record of a file of columns; `units` and `dt` are needed where the file does not
+    state them.
 
-    Uneven times are refused unless resample_dt [s] is given: see ``time_step``. The first time of the file becomes
-    t = 0. A first column that counts up evenly is a time, or the number of the sample. channel: which of several
-    components, from 1, or its name in the heading. With dt and without channel, rows of three or more values are read
-    one after the other, unless the first column is a time."""
+    Uneven times are refused unless resample_dt [s] is given: see ``time_step``. The first time of
+    the file becomes t = 0. A first column that counts up evenly is a time, or the number of the
+    sample. channel: which of several components, from 1, or its name in the heading. With dt and
+    without channel, rows of three or more values are read one after the other, unless the first
+    column is a time."""
     header, lines = _parts(text)
     rows = list(text.rows(lines))
     header, lines, rows, found = _header(text, header, lines, rows)
@@ -77,7 +82,8 @@ def read(text: TextFile) -> Record:
         return _series(text, header, lines, rows, found)
     if len(rows[-1]) != len(rows[0]):
         raise InputError(
-            f"{text.at(lines[-1])}: {len(rows[-1])} columns instead of {len(rows[0])}; a value is missing, "
+            f"{text.at(lines[-1])}: {len(rows[-1])} columns instead of {len(rows[0])}; a value is "
+            "missing, "
             "get the complete file"
         )
     return _component(text, header, lines, np.array(rows), found, leading)
@@ -120,11 +126,13 @@ def _is_words(line: str) -> bool:
 def _header(
     text: TextFile, header: list[int], lines: list[int], rows: list[list[float]]
 ) -> tuple[list[int], list[int], list[list[float]], _Found]:
-    """Return the lines of the header, those of the numbers, the numbers, and what the header says."""
+    """Return the lines of the header, those of the numbers, the numbers, and what the header
+    says."""
     found = _Found()
     ours = next((index for index in header if _OURS.match(text.heads[index])), None)
     if ours is not None and (match := _OURS.match(text.heads[ours])):
-        # our own files: title, this line, then notes of what was done, which speak of other files and former steps
+        # our own files: title, this line, then notes of what was done, which speak of other files
+        # and former steps
         found.units = (ours, canonical_units(text.at(ours), match[1]))
         found.step = (ours, text.number(ours, match[2]))
         return header, lines, rows, found
@@ -154,10 +162,12 @@ def _header(
 
 
 def _count_and_step(rows: Sequence[Sequence[float]]) -> tuple[float, ...] | None:
-    """Return the number of samples, and the time step, that stand before the samples in the first row or two.
+    """Return the number of samples, and the time step, that stand before the samples in the first
+    row or two.
 
-    They are two numbers before rows of one, of which the first is whole; or one number, or two on two lines, before
-    exactly as many numbers as it says. A third member tells that two rows were taken."""
+    They are two numbers before rows of one, of which the first is whole; or one number, or two on
+    two lines, before exactly as many numbers as it says. A third member tells that two rows were
+    taken."""
     first, others = rows[0], rows[1:]
     count = first[0]
     if count != round(count) or count < 2.0:
@@ -179,8 +189,8 @@ def _leading(
 ) -> list[int]:
     """Return the columns that are no motion: numbers of samples and, the last of them, the time.
 
-    The heading decides. Without one they are the first columns that count up evenly; of two columns the first one, if
-    it rises. Rows that follow one another rise together, and have no time."""
+    The heading decides. Without one they are the first columns that count up evenly; of two columns
+    the first one, if it rises. Rows that follow one another rise together, and have no time."""
     width = len(rows[0])
     if found.columns is not None and len(found.columns) == width:
         numbers = [k for k, one in enumerate(found.columns) if one.kind == "number"]
@@ -233,7 +243,8 @@ def _is_series(
     found: _Found,
     step_known: bool,
 ) -> bool:
-    """Tell whether rows are one series; InputError where columns are components, or nobody can tell."""
+    """Tell whether rows are one series; InputError where columns are components, or nobody can
+    tell."""
     width, values = len(rows[0]), sum(len(row) for row in rows)
     if width == 1:
         return True
@@ -252,16 +263,19 @@ def _is_series(
             "columns are components"
         )
         raise InputError(
-            f"{text.at(lines[0])}: {width} columns instead of 2, and none is a time ({names}); {remedy}"
+            f"{text.at(lines[0])}: {width} columns instead of 2, and none is a time ({names}); "
+            f"{remedy}"
         )
     table = np.array(rows)
     across = float(np.mean(np.abs(np.diff(table.ravel()))))
     along = float(np.mean(np.abs(np.diff(table, axis=0)))) if len(rows) > 1 else np.inf
-    # a series is smoother from value to value than from row to row, components are smoother down their columns
+    # a series is smoother from value to value than from row to row, components are smoother down
+    # their columns
     components = along < INTERLEAVED * across and len(rows) > 9 and width < 5
     if components or width < 4 and along < across / INTERLEAVED:
         raise InputError(
-            f"{text.at(lines[0])}: {width} columns of which none is a time ({names}); pass channel= for one "
+            f"{text.at(lines[0])}: {width} columns of which none is a time ({names}); pass "
+            "channel= for one "
             "of them, or write one value a line where the rows follow one another"
         )
     found.doubts.append(
@@ -293,7 +307,8 @@ def _series(
         and not all(_WHOLE.fullmatch(text.lines[index]) for index in lines)
     ):
         raise InputError(
-            f"{text.at(lines[0])}: {shown(text.lines[lines[0]].strip())} are whole numbers and others are "
+            f"{text.at(lines[0])}: {shown(text.lines[lines[0]].strip())} are whole numbers and "
+            "others are "
             "not, so that they may belong to the header; begin lines of the header with #"
         )
     if text.channel is not None:
@@ -332,7 +347,8 @@ def _component(
         line = columns[0].line
         kinds = ", ".join(f"{one.name}: {one.kind}" for one in columns)
         raise InputError(
-            f"{text.at(line)}: the heading names no acceleration ({kinds}); get the file of accelerations"
+            f"{text.at(line)}: the heading names no acceleration ({kinds}); get the file of "
+            "accelerations"
         )
     if found.count is not None:
         text.refuse_other_count(found.count[0], found.count[1], table.shape[0])
@@ -373,7 +389,8 @@ def _timed(
     column: Column,
     leading: Sequence[int],
 ) -> tuple[Array, float | None, float]:
-    """Return the samples on even times, their step [s], None where the numbers are counts, and its rounding."""
+    """Return the samples on even times, their step [s], None where the numbers are counts, and its
+    rounding."""
     unit, stated = (
         TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s")),
         found.step and found.step[1],
@@ -415,7 +432,8 @@ def _timed(
         step = told if rounding > SAME_STEP else step
     elif stated is not None:
         raise InputError(
-            f"{text.at(found.step[0] if found.step else 0)}: the header states a time step of {stated:g} s "
+            f"{text.at(found.step[0] if found.step else 0)}: the header states a time step of "
+            f"{stated:g} s "
             f"but the times count up by {step:g} s; correct the file, or get it again"
         )
     if times[0] != 0.0:

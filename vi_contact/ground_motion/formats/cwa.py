@@ -1,4 +1,5 @@
-"""Read files of the Central Weather Administration of Taiwan: "#Key: value" lines, then time and columns."""
+"""Read files of the Central Weather Administration of Taiwan: "#Key: value" lines, then time and
+columns."""
 
 import math
 import re
@@ -22,13 +23,15 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one column; channel: 1 for the one after the time, or its name such as "U"."""
+    """Return the record of one column; channel: 1 for the one after the time, or its name such as
+    "U"."""
     header = _header(text)
     sequence_line, sequence = text.entry(header, "DATASEQUENCE")
     first, *names = [" ".join(part.split()) for part in re.split(r"[;\s]+", sequence) if part]
     if first.lower() != "time" or not names:
         raise InputError(
-            f"{text.at(sequence_line)}: the columns {sequence!r} do not begin with the time; get the file "
+            f"{text.at(sequence_line)}: the columns {sequence!r} do not begin with the time; get "
+            "the file "
             "again"
         )
     form_line, form = text.entry(header, "DATA")
@@ -46,7 +49,8 @@ def read(text: TextFile) -> Record:
         row = text.fixed(index, int(match[2]))
         if len(row) != len(names) + 1:
             raise InputError(
-                f"{text.at(index)}: {len(row)} values instead of {len(names) + 1}; a value is missing or "
+                f"{text.at(index)}: {len(row)} values instead of {len(names) + 1}; a value is "
+                "missing or "
                 "too many, get the complete file"
             )
         rows.append(row)
@@ -57,18 +61,21 @@ def read(text: TextFile) -> Record:
     seconds = text.entry_number(header, "RECORDLENGTH(SEC)")
     if rate <= 0.0 or len(rows) < 2:
         raise InputError(
-            f"{text.at(rate_line)}: {len(rows)} samples at {rate:g} Hz are no record; get the complete file"
+            f"{text.at(rate_line)}: {len(rows)} samples at {rate:g} Hz are no record; get the "
+            "complete file"
         )
     if not abs(len(rows) - seconds * rate) <= 0.5:
         raise InputError(
-            f"{text.at(text.entry(header, 'RECORDLENGTH(SEC)')[0])}: {seconds:g} s at {rate:g} Hz are "
+            f"{text.at(text.entry(header, 'RECORDLENGTH(SEC)')[0])}: {seconds:g} s at {rate:g} Hz "
+            "are "
             f"announced but {len(rows)} samples follow; get the complete file"
         )
     table = np.array(rows)
     step, rounding, uneven = time_step(text, lines, table[:, 0], decimals=int(match[3]))
     if uneven or not math.isclose(step, 1.0 / rate, rel_tol=max(rounding, SAME_STEP)):
         raise InputError(
-            f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} s; get the "
+            f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} "
+            "s; get the "
             "complete file"
         )
     units_line, units = text.entry(header, "AMPLITUDEUNIT")

@@ -1,6 +1,8 @@
-"""Read files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY: value", then samples.
+"""Read files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY:
+value", then samples.
 
-One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record on."""
+One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record
+on."""
 
 import re
 from itertools import takewhile
@@ -13,7 +15,8 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether line 1 is an entry "KEY: value" and one of the first 100 is NDATA or SAMPLING_INTERVAL_S."""
+    """Tell whether line 1 is an entry "KEY: value" and one of the first 100 is NDATA or
+    SAMPLING_INTERVAL_S."""
     keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
     entries = [_entry(line) for line in text.heads[:100]]
     return entries[0] is not None and any(
@@ -28,7 +31,8 @@ def read(text: TextFile) -> Record:
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
         raise InputError(
-            f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)"
+            f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations "
+            "(.ACC.ASC)"
         )
     values, lines = text.series(len(entries))
     text.refuse_other_count(

@@ -13,11 +13,12 @@ _HUGE = 1e20, 1e40  # between them a number is a mark (1e30, 1.7e38) and no moti
 
 
 def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], str]) -> None:
-    """Raise InputError where a sample is a mark of a missing one; place: gives file and line of sample k.
+    """Raise InputError where a sample is a mark of a missing one; place: gives file and line of
+    sample k.
 
-    The mark is a number of nines only, or -12345, or a huge one, that no other sample reaches or that stands apart: it
-    is farther from both its neighbours than any other two neighbours are from one another. A sample may be 999.0 by
-    chance, between 997.2 and 1001.4."""
+    The mark is a number of nines only, or -12345, or a huge one, that no other sample reaches or
+    that stands apart: it is farther from both its neighbours than any other two neighbours are from
+    one another. A sample may be 999.0 by chance, between 997.2 and 1001.4."""
     values = np.asarray(samples, dtype=float)
     marks = np.array([_is_mark(value) for value in np.abs(values)], dtype=bool)
     if not np.any(marks):
@@ -35,13 +36,15 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
         whole = values[k] == round(values[k])
         if abs(values[k]) > (1.0 if whole else 1.5) * most or apart:
             raise InputError(
-                f"{place(int(k))}: the sample {values[k]:.10g} stands for a missing value; fill the gap "
+                f"{place(int(k))}: the sample {values[k]:.10g} stands for a missing value; fill "
+                "the gap "
                 "or use another record"
             )
 
 
 def _is_mark(size: float) -> bool:
-    """Tell whether a number is made of nines only, at least three of them before the point, or is huge."""
+    """Tell whether a number is made of nines only, at least three of them before the point, or is
+    huge."""
     if _HUGE[0] <= size <= _HUGE[1] or size == _SAC:
         return True
     if size < 999.0 or not math.isfinite(size):

@@ -1,8 +1,10 @@
-"""Read files of GeoNet (New Zealand), .V1A and .V2A: three components, one after the other, accelerations in mm/s².
+"""Read files of GeoNet (New Zealand), .V1A and .V2A: three components, one after the other,
+accelerations in mm/s².
 
-Each component has 16 lines of text, 4 lines of 10 integers and 6 lines of 10 reals in columns of 8, then blocks of
-accelerations, velocities and displacements, ten a line in columns of 8. Integers 34 to 36 are the numbers of
-accelerations, velocities and displacements. Velocities and displacements are skipped."""
+Each component has 16 lines of text, 4 lines of 10 integers and 6 lines of 10 reals in columns of 8,
+then blocks of accelerations, velocities and displacements, ten a line in columns of 8. Integers 34
+to 36 are the numbers of accelerations, velocities and displacements. Velocities and displacements
+are skipped."""
 
 import re
 from collections.abc import Iterator
@@ -32,7 +34,8 @@ _PEAK = re.compile(rf"^\s*+acceleration:\s*+peak\s*+({NUMBER})\s*+mm/s/s", re.IG
 
 @dataclass(frozen=True)
 class _Part:
-    """Describe one component: its first line, its name, and the numbers of its three blocks of samples."""
+    """Describe one component: its first line, its name, and the numbers of its three blocks of
+    samples."""
 
     start: int
     name: str
@@ -50,7 +53,8 @@ class _Part:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether two of three signs are there: the first line, "Accelerogram … Processed", and a peak in mm/s/s."""
+    """Tell whether two of three signs are there: the first line, "Accelerogram … Processed", and a
+    peak in mm/s/s."""
     head = text.heads[:TEXT_LINES]
     signs = (
         _FIRST.search(head[0]) is not None,
@@ -61,7 +65,8 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 for the first of the file, or its name such as "S16W"."""
+    """Return the record of one component; channel: 1 for the first of the file, or its name such as
+    "S16W"."""
     parts = list(_parts(text))
     part = parts[text.chosen([part.name for part in parts])]
     values, lines = _samples(text, part)
@@ -69,7 +74,8 @@ def read(text: TextFile) -> Record:
     count = _first(text, header, _POINTS, "Number of points")
     if count[1] != part.counts[0]:
         raise InputError(
-            f"{text.at(count[0])}: {count[1]:g} points are announced but the integers of the header say "
+            f"{text.at(count[0])}: {count[1]:g} points are announced but the integers of the "
+            "header say "
             f"{part.counts[0]}; get the file again"
         )
     step = _first(text, header, _STEP, "the interval of the samples")
@@ -85,7 +91,8 @@ def read(text: TextFile) -> Record:
         ()
         if peak is None or abs(found - abs(peak)) <= 0.01 * abs(peak) + 0.1
         else (
-            f"the header says that the peak is {abs(peak):g} mm/s2, and the samples have {found:g} mm/s2",
+            f"the header says that the peak is {abs(peak):g} mm/s2, and the samples have {found:g} "
+            "mm/s2",
         )
     )
     words = [" ".join(text.heads[index].split()) for index in header]
@@ -131,7 +138,8 @@ def _parts(text: TextFile) -> Iterator[_Part]:
         )
         if part.counts[0] < 2 or min(part.counts) < 0 or part.end > total:
             raise InputError(
-                f"{text.at(start + TEXT_LINES + 3)}: {part.counts[0]} accelerations, {part.counts[1]} "
+                f"{text.at(start + TEXT_LINES + 3)}: {part.counts[0]} accelerations, "
+                f"{part.counts[1]} "
                 f"velocities and {part.counts[2]} displacements are announced but the file has "
                 f"{total - part.data} lines for them; get the complete file"
             )
@@ -146,7 +154,8 @@ def _fields(text: TextFile, start: int, lines: int) -> list[float]:
         row = text.fixed(index, WIDTH) if index < len(text.lines) else []
         if len(row) != PER_LINE:
             raise InputError(
-                f"{text.path}, line {index + 1}: {len(row)} header values instead of {PER_LINE}; get the "
+                f"{text.path}, line {index + 1}: {len(row)} header values instead of {PER_LINE}; "
+                "get the "
                 "file again"
             )
         values += row
@@ -161,7 +170,8 @@ def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
         row, wanted = text.fixed(index, WIDTH), min(PER_LINE, part.counts[0] - len(values))
         if len(row) != wanted:
             raise InputError(
-                f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is missing "
+                f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is "
+                "missing "
                 "or too many, get the complete file"
             )
         values += row
@@ -180,7 +190,8 @@ def _first(text: TextFile, header: range, pattern: re.Pattern[str], what: str) -
 
 
 def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: float) -> None:
-    """Raise InputError unless the step agrees with the one among the reals, and with the duration."""
+    """Raise InputError unless the step agrees with the one among the reals, and with the
+    duration."""
     index = part.start + TEXT_LINES + INTEGER_LINES + STEP // PER_LINE
     column = STEP % PER_LINE
     word = text.lines[index][WIDTH * column : WIDTH * (column + 1)].strip()
@@ -198,6 +209,7 @@ def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: flo
             seconds = text.number(place, match[1])
             if not abs(seconds - count * step[1]) <= 1.01 * step[1] + 0.01:
                 raise InputError(
-                    f"{text.at(place)}: {seconds:g} s are announced but {count:g} points at {step[1]:g} s "
+                    f"{text.at(place)}: {seconds:g} s are announced but {count:g} points at "
+                    f"{step[1]:g} s "
                     "follow; get the complete file"
                 )

@@ -1,7 +1,9 @@
-"""Read NIED K-NET and KiK-net files: 17 header lines, then integer counts, eight a row, one component a file.
+"""Read NIED K-NET and KiK-net files: 17 header lines, then integer counts, eight a row, one
+component a file.
 
-Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's offset, so their mean
-is removed, as the agency does before it prints "Max. Acc.". NIED forbids passing these files on."""
+Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's
+offset, so their mean is removed, as the agency does before it prints "Max. Acc.". NIED forbids
+passing these files on."""
 
 import re
 
@@ -33,7 +35,8 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only checked."""
+    """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only
+    checked."""
     header = {
         key: index
         for key in KEYS
@@ -51,7 +54,8 @@ def read(text: TextFile) -> Record:
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
     if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(
-            f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "
+            f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are "
+            "announced but "
             f"{len(counts)} samples follow; get the complete file"
         )
     lines = tuple(" ".join(line.split()) for line in text.heads[: header["Memo."]])
@@ -75,7 +79,8 @@ def _scale(text: TextFile, index: int) -> tuple[float, str]:
     match = _SCALE.search(text.heads[index])
     if match is None or text.number(index, match[3]) == 0.0:
         raise InputError(
-            f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file again"
+            f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file "
+            "again"
         )
     return text.number(index, match[1]) / text.number(index, match[3]), canonical_units(
         text.at(index), match[2]

@@ -1,4 +1,5 @@
-"""Read a record file of any known format; the format is recognised by content, never by the file's name."""
+"""Read a record file of any known format; the format is recognised by content, never by the file's
+name."""
 
 import math
 import os
@@ -44,22 +45,26 @@ def read_record(
     channel: int | str | None = None,
     largest: float = LARGEST_PEAK,
 ) -> Record:
-    """Read one component of ground motion from a file of any format listed in docs/guide/records.md.
+    """Read one component of ground motion from a file of any format listed in
+    docs/guide/records.md.
 
-    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required where the file does not state them, elsewhere
-    only checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time
-    step [s] the record is brought to by `resampled`; it also allows uneven times. channel: which component of a file
-    that holds several: its number, from 1, times not counted, or its name in the file ("N00E", "north"). largest: the
-    greatest peak acceleration [m/s²] that is believed; give more where the motion is that strong.
-    Raises InputError with one sentence that names the file and, where there is one, the line: for a velocity or
-    displacement, no or another number of samples than announced, entries of the header or samples that are missing,
-    unknown or no numbers, units or a step that nobody states or that contradict each other."""
+    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required where the file does not state
+    them, elsewhere only checked against what the file states. dt: time step [s], for files that do
+    not state one. resample_dt: time step [s] the record is brought to by `resampled`; it also
+    allows uneven times. channel: which component of a file that holds several: its number, from 1,
+    times not counted, or its name in the file ("N00E", "north"). largest: the greatest peak
+    acceleration [m/s²] that is believed; give more where the motion is that strong. Raises
+    InputError with one sentence that names the file and, where there is one, the line: for a
+    velocity or displacement, no or another number of samples than announced, entries of the header
+    or samples that are missing, unknown or no numbers, units or a step that nobody states or that
+    contradict each other."""
     text = load_text(path, units=units, dt=dt, resample_dt=resample_dt, channel=channel)
     refuse_unread(text)
     reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)
     if channel is not None and reader not in (*SEVERAL, columns):
         raise InputError(
-            f"{text.path}: channel={shown(channel)} was passed but the file holds one record; leave "
+            f"{text.path}: channel={shown(channel)} was passed but the file holds one record; "
+            "leave "
             "channel out"
         )
     number("read_record", "largest", largest, positive=True, unit="m/s²")
@@ -67,19 +72,23 @@ def read_record(
     peak = float(np.max(np.abs(record.acceleration)))
     if peak > largest:
         raise InputError(
-            f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = {peak:.4g} m/s2 "
-            f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the motion "
+            f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = "
+            f"{peak:.4g} m/s2 "
+            f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the "
+            "motion "
             "is that strong"
         )
     if 0.0 < peak < DOUBTED[0] or peak > DOUBTED[1]:
         doubt = (
-            f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the unit, which "
+            f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the "
+            "unit, which "
             f"comes from: {record.units_from}"
         )
         record = replace(record, doubts=(*record.doubts, doubt))
     if not STEPS[0] <= record.dt <= STEPS[1]:
         raise InputError(
-            f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; give "
+            f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; "
+            "give "
             f"seconds from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples"
         )
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):

@@ -1,8 +1,10 @@
-"""Read USGS SMC files (National Strong-Motion Program), type 2 CORRECTED ACCELEROGRAM, accelerations in cm/s².
+"""Read USGS SMC files (National Strong-Motion Program), type 2 CORRECTED ACCELEROGRAM,
+accelerations in cm/s².
 
-Layout: 11 lines of text; 6 lines of 8 integers in columns of 10; 10 lines of 5 reals in columns of 15; comment lines
-starting with "|"; the samples, 8 a line in columns of 10 that touch, so they are cut by column and not by blanks. The
-first integer and the first real are the marks of an undefined value (-32768 and 1.7E38)."""
+Layout: 11 lines of text; 6 lines of 8 integers in columns of 10; 10 lines of 5 reals in columns of
+15; comment lines starting with "|"; the samples, 8 a line in columns of 10 that touch, so they are
+cut by column and not by blanks. The first integer and the first real are the marks of an undefined
+value (-32768 and 1.7E38)."""
 
 import re
 
@@ -35,11 +37,13 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate undefined."""
+    """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate
+    undefined."""
     kind = text.heads[0].strip()
     if kind.upper().startswith("1"):
         raise InputError(
-            f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before instrument "
+            f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before "
+            "instrument "
             "correction; get the file of type '2 CORRECTED ACCELEROGRAM'"
         )
     if not kind.upper().startswith("2"):
@@ -56,7 +60,8 @@ def read(text: TextFile) -> Record:
         not line.startswith("|") for line in comments
     ):
         raise InputError(
-            f"{text.at(TEXT_LINES + 1)}: the header announces {integers[COMMENTS]:g} comment lines but "
+            f"{text.at(TEXT_LINES + 1)}: the header announces {integers[COMMENTS]:g} comment lines "
+            "but "
             "as many lines starting with '|' do not follow; get the file again"
         )
     rate = reals[SAMPLING_RATE]
@@ -93,7 +98,8 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
         row = text.fixed(index, width) if index < len(text.lines) else []
         if len(row) != per_line:
             raise InputError(
-                f"{text.at(index)}: {len(row)} header values instead of {per_line}; get the file again"
+                f"{text.at(index)}: {len(row)} header values instead of {per_line}; get the file "
+                "again"
             )
         values += row
     return values
@@ -109,7 +115,8 @@ def _samples(text: TextFile, start: int, count: float) -> tuple[list[float], lis
     for index, row in zip(lines, rows, strict=True):
         if any(abs(value) >= UNDEFINED for value in row):
             raise InputError(
-                f"{text.at(index)}: a sample is marked as undefined; fill the gap or use another record"
+                f"{text.at(index)}: a sample is marked as undefined; fill the gap or use another "
+                "record"
             )
         values += row
     text.refuse_other_count(TEXT_LINES + 2, count, len(values))

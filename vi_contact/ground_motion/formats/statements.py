@@ -1,4 +1,5 @@
-"""Find what the lines of a header say in words: units, time step, number of samples, kind of motion."""
+"""Find what the lines of a header say in words: units, time step, number of samples, kind of
+motion."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -9,7 +10,8 @@ from .text import NUMBER, TextFile
 
 _SECONDS = rf"({NUMBER})\s*+-?s(?:ec(?:ond)?s?)?\b"
 _STEP_NAME = (
-    r"\b(?:dt|delta[ _]?t|(?:time|sampl(?:e|ing))[ _]?(?:step|increments?|intervals?|spacing|period)|"
+    r"\b(?:dt|delta[ _]?t|(?:time|sampl(?:e|ing))[ "
+    r"_]?(?:step|increments?|intervals?|spacing|period)|"
     r"sampling[ _]interval[ _]s|intervalo de muestreo)\b"
 )
 _STEP = re.compile(
@@ -31,7 +33,8 @@ _PROSE = (
     re.compile(rf"{_SECONDS}\.?\s++(?:time\s++)?(?:spacing|steps?|intervals?)\b", re.IGNORECASE),
 )
 _COUNT = re.compile(
-    r"\b(?:npts|ndata|n(?:umber|um|o)?\.?[ _]*+(?:of[ _])?(?:total[ _])?(?:data|points?|samples?|values?|pts)"
+    r"\b(?:npts|ndata|n(?:umber|um|o)?\.?[ _]*+(?:of[ _])?(?:total[ "
+    r"_])?(?:data|points?|samples?|values?|pts)"
     r"(?:[ _]points?)?)\s*+(?:[:=]|is)?\s*+(\d++)(?![\d.])",
     re.IGNORECASE,
 )
@@ -61,7 +64,8 @@ _MOTION = re.compile(
     re.IGNORECASE,
 )
 _NO_MOTION = re.compile(
-    r"\b(?:wave|shear|apparent|propagation|rupture|vs30)[ -]*velocit\w*+|\bvelocity (?:structure|model)\b|"
+    r"\b(?:wave|shear|apparent|propagation|rupture|vs30)[ -]*velocit\w*+|\bvelocity "
+    r"(?:structure|model)\b|"
     r"\baccording\b|\baccess\w*+|\baccount\w*+|\baccura\w*+|\bdisplay\w*+",
     re.IGNORECASE,
 )
@@ -121,7 +125,8 @@ def stated_counts(text: TextFile, indices: Iterable[int]) -> list[Found]:
 def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
     """Return the lines that state units of acceleration, and the units, as keys of UNITS.
 
-    Lines about peaks and filters are left out: a peak may be given in other units than the samples."""
+    Lines about peaks and filters are left out: a peak may be given in other units than the
+    samples."""
     found: list[tuple[int, str]] = []
     for index in indices:
         line = text.heads[index]
@@ -142,29 +147,34 @@ def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]
 def agreed(
     text: TextFile, what: str, found: Sequence[Found], *, rounding: float = 1e-6
 ) -> Found | None:
-    """Return the first of several statements, None where there is none; InputError where they contradict."""
+    """Return the first of several statements, None where there is none; InputError where they
+    contradict."""
     for index, value in found[1:]:
         if abs(value - found[0][1]) > rounding * abs(found[0][1]):
             raise InputError(
-                f"{text.at(index)}: the header states {what} as {value:g}, but line {found[0][0] + 1} "
+                f"{text.at(index)}: the header states {what} as {value:g}, but line "
+                f"{found[0][0] + 1} "
                 f"states it as {found[0][1]:g}; correct the file, or get it again"
             )
     return found[0] if found else None
 
 
 def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int, str] | None:
-    """Return the units that all statements share, None where there are none; InputError where they contradict."""
+    """Return the units that all statements share, None where there are none; InputError where they
+    contradict."""
     for index, units in found[1:]:
         if UNITS[units] != UNITS[found[0][1]]:
             raise InputError(
-                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} states "
+                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} "
+                "states "
                 f"them as {found[0][1]}; correct the file, or get it again"
             )
     return found[0] if found else None
 
 
 def unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | None:
-    """Return the line that says "units of X" or "units: X", and X, where X is no unit of acceleration."""
+    """Return the line that says "units of X" or "units: X", and X, where X is no unit of
+    acceleration."""
     for index in indices:
         if match := _UNITS_OF.search(text.heads[index]):
             word = match[1].strip("()[] .:=")
@@ -178,10 +188,11 @@ def unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | N
 
 
 def refuse_other_motion(text: TextFile, indices: Sequence[int]) -> None:
-    """Raise InputError where a header says that the samples are velocities, displacements or counts.
+    """Raise InputError where a header says that the samples are velocities, displacements or
+    counts.
 
-    The line that speaks of a history, a series, data or units decides; without one, any word of motion does, and
-    acceleration wins."""
+    The line that speaks of a history, a series, data or units decides; without one, any word of
+    motion does, and acceleration wins."""
     said: dict[bool, list[tuple[int, str]]] = {True: [], False: []}
     for index in indices:
         line = _NO_MOTION.sub("", text.heads[index])

@@ -1,8 +1,9 @@
 """Hold a record file with what its caller says about it, and read numbers as Fortran writes them.
 
-What do commas mean? "0,12" is one number or two. With a decimal point anywhere in the data, with a blank beside a
-comma, or with two commas in one word, commas separate. With semicolons between the columns, as spreadsheets of half of
-Europe write them, they are decimal. Nobody can tell in any other case."""
+What do commas mean? "0,12" is one number or two. With a decimal point anywhere in the data, with a
+blank beside a comma, or with two commas in one word, commas separate. With semicolons between the
+columns, as spreadsheets of half of Europe write them, they are decimal. Nobody can tell in any
+other case."""
 
 import hashlib
 import math
@@ -45,7 +46,8 @@ Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line,
 
 @dataclass(frozen=True, kw_only=True)
 class TextFile:
-    """Hold a file as read: path as given, lines without ends, sha256 of its bytes; and what ``read_record`` is told."""
+    """Hold a file as read: path as given, lines without ends, sha256 of its bytes; and what
+    ``read_record`` is told."""
 
     path: str
     lines: tuple[str, ...]
@@ -57,7 +59,8 @@ class TextFile:
 
     @cached_property
     def heads(self) -> tuple[str, ...]:
-        """Return the beginning of every line, for patterns of headers: a line of data may be as long as the file."""
+        """Return the beginning of every line, for patterns of headers: a line of data may be as
+        long as the file."""
         return tuple(line[:HEAD] for line in self.lines)
 
     def at(self, index: int) -> str:
@@ -78,23 +81,27 @@ class TextFile:
         dt_rounding: float = SAME_STEP,
         **told: Any,
     ) -> Record:
-        """Return the record of ``scale`` times samples, with the units and time step [s] that the file states.
+        """Return the record of ``scale`` times samples, with the units and time step [s] that the
+        file states.
 
-        None: it does not state them. line: index of the one with the units. lines: index of the line of every sample,
-        where values are looked for that stand for missing ones. counted, dt_from: where the number of samples and the
-        time step come from. dt_rounding: relative difference to the step of the caller that is rounding.
-        told: title, notes, format, station, component, doubts. Raises InputError for what the file and its caller leave
-        open, or state differently."""
+        None: it does not state them. line: index of the one with the units. lines: index of the
+        line of every sample, where values are looked for that stand for missing ones. counted,
+        dt_from: where the number of samples and the time step come from. dt_rounding: relative
+        difference to the step of the caller that is rounding. told: title, notes, format, station,
+        component, doubts. Raises InputError for what the file and its caller leave open, or state
+        differently."""
         place = self.path if line is None else self.at(line)
         names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
         step = self.dt if dt is None else dt
         if not names:
             raise InputError(
-                f"{place}: the file does not state its units; pass units= as one of {', '.join(UNITS)}"
+                f"{place}: the file does not state its units; pass units= as one of "
+                f"{', '.join(UNITS)}"
             )
         if UNITS[names[0]] != UNITS[names[-1]]:
             raise InputError(
-                f"{place}: the file states its units as {names[0]} but units={self.units!r} was passed; "
+                f"{place}: the file states its units as {names[0]} but units={self.units!r} was "
+                "passed; "
                 "leave units out or correct the file"
             )
         if step is None:
@@ -107,7 +114,8 @@ class TextFile:
             and not math.isclose(dt, self.dt, rel_tol=dt_rounding)
         ):
             raise InputError(
-                f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was passed; "
+                f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was "
+                "passed; "
                 "leave dt out or correct the file"
             )
         if lines is not None:
@@ -126,7 +134,8 @@ class TextFile:
         )
 
     def chosen(self, components: Sequence[str]) -> int:
-        """Return which component the caller chose, from 0; InputError that lists them where none or another one is.
+        """Return which component the caller chose, from 0; InputError that lists them where none or
+        another one is.
 
         channel: its number, from 1, or its name, capitals or not."""
         if self.channel is None and len(components) == 1:
@@ -156,12 +165,14 @@ class TextFile:
         """Raise InputError unless as many samples were found as lines[index] announces."""
         if found != announced:
             raise InputError(
-                f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get the "
+                f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get "
+                "the "
                 "complete file"
             )
 
     def filled(self, start: int) -> Sequence[int]:
-        """Return the indices of the lines from `start` on that are not blank, up to a line '*** End data ***'."""
+        """Return the indices of the lines from `start` on that are not blank, up to a line '*** End
+        data ***'."""
         end = next(
             (
                 index
@@ -173,10 +184,11 @@ class TextFile:
         return [index for index in range(start, end) if self.lines[index].strip()]
 
     def series(self, start: int) -> tuple[list[float], list[int]]:
-        """Return all values on the lines from `start` on, row after row, and the index of the line of each.
+        """Return all values on the lines from `start` on, row after row, and the index of the line
+        of each.
 
-        Raises InputError where a row but the last has another length than the first, or the last one is longer: a
-        value was lost there, and those after it would be read too early."""
+        Raises InputError where a row but the last has another length than the first, or the last
+        one is longer: a value was lost there, and those after it would be read too early."""
         lines = self.filled(start)
         rows = list(self.rows(lines))
         self.refuse_uneven_rows(lines, rows)
@@ -187,18 +199,21 @@ class TextFile:
         ]
 
     def refuse_uneven_rows(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
-        """Raise InputError unless all rows have the length that most have; the last one may be shorter."""
+        """Raise InputError unless all rows have the length that most have; the last one may be
+        shorter."""
         lengths = [len(row) for row in rows]
         usual = max(set(lengths), key=lambda length: (lengths.count(length), length), default=0)
         for k, length in enumerate(lengths):
             if length != usual and not (k == len(lengths) - 1 and length < usual):
                 raise InputError(
-                    f"{self.at(lines[k])}: the row has {length} values and other rows have {usual}; a "
+                    f"{self.at(lines[k])}: the row has {length} values and other rows have "
+                    f"{usual}; a "
                     "value is missing or too many, get the complete file"
                 )
 
     def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
-        """Raise InputError for an empty line among values that stand one a line: a value is missing there.
+        """Raise InputError for an empty line among values that stand one a line: a value is missing
+        there.
 
         Empty lines between all of them are line ends that were doubled."""
         gaps = [
@@ -208,13 +223,15 @@ class TextFile:
         ]
         if gaps and len(gaps) < len(lines) - 1 and all(len(row) == 1 for row in rows):
             raise InputError(
-                f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so that a "
+                f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so "
+                "that a "
                 "value is missing; get the complete file, or take the line out where none is"
             )
 
     def refuse_misaligned(self, lines: Sequence[int]) -> None:
-        """Raise InputError for a row that is shorter than the others where nine of ten rows have numbers that end at
-        the same places: a character was lost. A longer row holds a number that is too wide for its columns."""
+        """Raise InputError for a row that is shorter than the others where nine of ten rows have
+        numbers that end at the same places: a character was lost. A longer row holds a number that
+        is too wide for its columns."""
         if len(lines) < 5:
             return
         ends = [
@@ -226,7 +243,8 @@ class TextFile:
         for index, found in zip(lines, ends, strict=True):
             if found != usual[: len(found)] and found[-1] < usual[len(found) - 1]:
                 raise InputError(
-                    f"{self.at(index)}: the row is shorter than the others, whose numbers end at the same "
+                    f"{self.at(index)}: the row is shorter than the others, whose numbers end at "
+                    "the same "
                     "places, so that a character is missing; get the complete file"
                 )
 
@@ -237,14 +255,17 @@ class TextFile:
         return (self.numbers(index, decimal) for index in indices)
 
     def numbers(self, index: int, decimal_commas: bool = False) -> list[float]:
-        """Return the values on lines[index], divided by blanks, commas or semicolons, or by the sign of the next.
+        """Return the values on lines[index], divided by blanks, commas or semicolons, or by the
+        sign of the next.
 
-        Raises InputError naming file, line and word for anything else, "1.234.567" included: where two unsigned
-        numbers touch nobody can tell where the first one ends. An empty cell between two commas is refused too."""
+        Raises InputError naming file, line and word for anything else, "1.234.567" included: where
+        two unsigned numbers touch nobody can tell where the first one ends. An empty cell between
+        two commas is refused too."""
         values = []
         if _EMPTY_CELL.search(self.lines[index]):
             raise InputError(
-                f"{self.at(index)}: a cell is empty between two separators, so that a value is missing; "
+                f"{self.at(index)}: a cell is empty between two separators, so that a value is "
+                "missing; "
                 "get the complete file"
             )
         for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(
@@ -277,10 +298,12 @@ class TextFile:
         )
 
     def fixed(self, index: int, width: int, offset: int = 0) -> list[float]:
-        """Return the values on lines[index] in columns of `width` characters from `offset` on, which may touch.
+        """Return the values on lines[index] in columns of `width` characters from `offset` on,
+        which may touch.
 
-        Raises InputError naming file, line and columns for a field that is no number, or that does not end at the end
-        of its columns as numbers written by column do: a character was lost or added on the line."""
+        Raises InputError naming file, line and columns for a field that is no number, or that does
+        not end at the end of its columns as numbers written by column do: a character was lost or
+        added on the line."""
         line = self.lines[index].rstrip()
         values = []
         for left in range(offset, len(line), width):
@@ -289,22 +312,26 @@ class TextFile:
             values.append(self.number(index, field.strip(), where))
             if len(field) < width or field[-1].isspace():
                 raise InputError(
-                    f"{self.at(index)}: {shown(field.strip())}{where} does not end where its columns do, "
+                    f"{self.at(index)}: {shown(field.strip())}{where} does not end where its "
+                    "columns do, "
                     "so that a character is missing or too many on the line; get the complete file"
                 )
         return values
 
     def number(self, index: int, word: str, where: str = "") -> float:
-        """Return a finite number, also with Fortran's exponent letter D; InputError naming file, line and word."""
+        """Return a finite number, also with Fortran's exponent letter D; InputError naming file,
+        line and word."""
         found = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
         if not math.isfinite(found):
             raise InputError(
-                f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get another file"
+                f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get "
+                "another file"
             )
         return found
 
     def entry(self, header: Entries, key: str) -> tuple[int, str]:
-        """Return the line and the value of a header's key; InputError where it is missing or empty."""
+        """Return the line and the value of a header's key; InputError where it is missing or
+        empty."""
         if not header.get(key, (0, ""))[1]:
             raise InputError(f"{self.path}: the header does not give {key}; get the complete file")
         return header[key]
@@ -314,10 +341,12 @@ class TextFile:
         return self.number(*self.entry(header, key), f" of {key}")
 
     def _refuse_cut_numbers(self, indices: Sequence[int], decimal_commas: bool) -> None:
-        """Raise InputError where the end of a number was cut off, as far as the other numbers tell it.
+        """Raise InputError where the end of a number was cut off, as far as the other numbers tell
+        it.
 
-        That is a number whose exponent has one digit where others have leading zeros ("1.2E-0" for "1.2E-02"), and a
-        last number that has fewer decimals, or no exponent, where all the others in its column have as many."""
+        That is a number whose exponent has one digit where others have leading zeros ("1.2E-0" for
+        "1.2E-02"), and a last number that has fewer decimals, or no exponent, where all the others
+        in its column have as many."""
         words: list[list[str]] = []
         split = _BETWEEN_DECIMALS if decimal_commas else _BETWEEN
         zeros = any(_LEADING_ZERO.search(self.lines[index]) for index in indices)
@@ -329,7 +358,8 @@ class TextFile:
             ]
             if zeros and short:
                 raise InputError(
-                    f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of other "
+                    f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of "
+                    "other "
                     "numbers; a digit was lost, get the complete file"
                 )
         if len(words) < 2 or not words[-1]:
@@ -345,12 +375,15 @@ class TextFile:
         found, has_exponent = _style(last)
         if found < decimals or exponent and not has_exponent:
             raise InputError(
-                f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its column "
-                f"have {decimals} decimals{' and an exponent' if exponent else ''}; get the complete file"
+                f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its "
+                "column "
+                f"have {decimals} decimals{' and an exponent' if exponent else ''}; get the "
+                "complete file"
             )
 
     def _decimal_commas(self, indices: Sequence[int]) -> bool:
-        """Tell whether commas in these lines are decimal, and do not separate; InputError where it cannot be told."""
+        """Tell whether commas in these lines are decimal, and do not separate; InputError where it
+        cannot be told."""
         data = [self.lines[index] for index in indices]
         inside = next(
             (
@@ -369,7 +402,8 @@ class TextFile:
         if semicolons and not points:
             return True
         raise InputError(
-            f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; write "
+            f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; "
+            "write "
             "decimal points, and blanks between the numbers"
         )
 
@@ -381,7 +415,8 @@ def _style(word: str) -> tuple[int, bool]:
 
 
 def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
-    """Read `path` as UTF-8 or, failing that, Latin-1, with any line ends; said: what the caller says about it.
+    """Read `path` as UTF-8 or, failing that, Latin-1, with any line ends; said: what the caller
+    says about it.
 
     Raises InputError when the file is missing, unreadable, empty, too large or not text."""
     name = os.fspath(path)

@@ -1,4 +1,5 @@
-"""Find the time step of a column of times, which are printed with few decimals or were held in single precision."""
+"""Find the time step of a column of times, which are printed with few decimals or were held in
+single precision."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +17,8 @@ COARSE = (
 
 
 def rises_evenly(times: Array, *, decimals: int | None = None) -> bool:
-    """Tell whether numbers, three or more, count up by one step, but for the rounding of their digits."""
+    """Tell whether numbers, three or more, count up by one step, but for the rounding of their
+    digits."""
     if times.size < 3 or not np.all(np.diff(times) > 0.0):
         return False
     steps = np.diff(times)
@@ -34,12 +36,14 @@ def time_step(
     decimals: int | None = None,
     unit: float = 1.0,
 ) -> tuple[float, float, bool]:
-    """Return the step of times, the relative error that their rounding leaves, and whether they are uneven.
+    """Return the step of times, the relative error that their rounding leaves, and whether they are
+    uneven.
 
-    times and the step are in s. lines: index of the line of each. decimals: of the times as they are printed in their
-    unit [s]. Uneven times are allowed only where the caller wants to interpolate; the step is then the one to
-    interpolate to: resample_dt, or the nearest whole part of it that is not longer than the usual step, so that
-    reading does not alias. Raises InputError for times that do not rise, and for uneven ones nobody asked for."""
+    times and the step are in s. lines: index of the line of each. decimals: of the times as they
+    are printed in their unit [s]. Uneven times are allowed only where the caller wants to
+    interpolate; the step is then the one to interpolate to: resample_dt, or the nearest whole part
+    of it that is not longer than the usual step, so that reading does not alias. Raises InputError
+    for times that do not rise, and for uneven ones nobody asked for."""
     steps = np.diff(times)
     usual = float(np.median(steps))
     backward = steps <= 0.0
@@ -59,7 +63,8 @@ def time_step(
     if text.resample_dt is None:
         k = int(np.argmax(odd)) + 1
         raise InputError(
-            f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, others "
+            f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, "
+            "others "
             f"{usual:.9g} s; pass resample_dt= to interpolate, or correct the time"
         )
     wanted = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
@@ -69,7 +74,8 @@ def time_step(
 
 
 def interpolated(times: Array, samples: Array, step: float) -> Array:
-    """Return the samples on even times from the first one on, read off straight lines; the last one is kept."""
+    """Return the samples on even times from the first one on, read off straight lines; the last one
+    is kept."""
     last = (times[-1] - times[0]) / step
     rounding = 2.0 * float(_rounding(times, None)) / step
     count = int(last * (1.0 + 1e-12) + min(rounding, COARSE) + 1.0)
@@ -78,14 +84,17 @@ def interpolated(times: Array, samples: Array, step: float) -> Array:
 
 
 def _rounding(times: Array, decimals: int | None) -> float:
-    """Return the largest error of times that are printed to `decimals`, or were held in single precision."""
-    # held in single precision, and computed in it: a start and a multiple of the step, each rounded once
+    """Return the largest error of times that are printed to `decimals`, or were held in single
+    precision."""
+    # held in single precision, and computed in it: a start and a multiple of the step, each rounded
+    # once
     single = float(np.spacing(np.float32(np.max(np.abs(times)))))
     return max(single, 0.0 if decimals is None else 0.5 * 10.0**-decimals)
 
 
 def _is_rounded(times: Array, rounding: float) -> bool:
-    """Tell whether times are even but for their rounding, which is too small to hide a row that was lost.
+    """Tell whether times are even but for their rounding, which is too small to hide a row that was
+    lost.
 
     A lost row moves the times at least a quarter of a step from any straight line."""
     if times.size < 3:
@@ -97,7 +106,8 @@ def _is_rounded(times: Array, rounding: float) -> bool:
 
 
 def _roundest_step(times: Array, rounding: float) -> tuple[float, float]:
-    """Return the step with the fewest digits, or the whole sampling rate, that the rounded times allow; its error."""
+    """Return the step with the fewest digits, or the whole sampling rate, that the rounded times
+    allow; its error."""
     mean = float(times[-1] - times[0]) / (times.size - 1)
     error = 2.0 * rounding / (times.size - 1)
     rate = round(1.0 / mean)

@@ -1,4 +1,5 @@
-"""Read files of UNAM (Mexico), "ARCHIVO ESTANDAR DE ACELERACION": lines "KEY : value", then a column a channel, gal."""
+"""Read files of UNAM (Mexico), "ARCHIVO ESTANDAR DE ACELERACION": lines "KEY : value", then a
+column a channel, gal."""
 
 import re
 
@@ -19,14 +20,16 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one channel; channel: its number, from 1, or its direction such as "N00E"."""
+    """Return the record of one channel; channel: its number, from 1, or its direction such as
+    "N00E"."""
     start = next(
         (k for k, line in enumerate(text.heads) if line.strip().upper() == "DATOS DE ACELERACION:"),
         None,
     )
     if start is None:
         raise InputError(
-            f"{text.path}: no line 'DATOS DE ACELERACION:' announces the columns; get the complete file"
+            f"{text.path}: no line 'DATOS DE ACELERACION:' announces the columns; get the complete "
+            "file"
         )
     header: dict[str, tuple[int, str]] = {}
     for index in range(start):
@@ -35,13 +38,15 @@ def read(text: TextFile) -> Record:
     form_line, form = _entry(text, header, "FORMATO DATOS")
     if not (match := _FORMAT.match(form)):
         raise InputError(
-            f"{text.at(form_line)}: the format {form!r} of the data is not like '3F10.4'; get the file again"
+            f"{text.at(form_line)}: the format {form!r} of the data is not like '3F10.4'; get the "
+            "file again"
         )
     channels, width = int(match[1]), int(match[2])
     names = _split(_entry(text, header, "ORIENTACION C1")[1])
     if len(names) != channels or width < 1:
         raise InputError(
-            f"{text.at(form_line)}: the data have {channels} columns and the header names {len(names)} "
+            f"{text.at(form_line)}: the data have {channels} columns and the header names "
+            f"{len(names)} "
             "directions; get the file again"
         )
     place = text.chosen(names)
@@ -52,7 +57,8 @@ def read(text: TextFile) -> Record:
         row = text.fixed(index, width)
         if len(row) != channels:
             raise InputError(
-                f"{text.at(index)}: {len(row)} values instead of {channels}, one of each channel; a value "
+                f"{text.at(index)}: {len(row)} values instead of {channels}, one of each channel; "
+                "a value "
                 "is missing or too many, get the complete file"
             )
         values.append(row[place])
@@ -84,7 +90,8 @@ def read(text: TextFile) -> Record:
 
 
 def _entry(text: TextFile, header: dict[str, tuple[int, str]], start: str) -> tuple[int, str]:
-    """Return the line and the value of the entry whose key begins so; InputError where it is missing or empty."""
+    """Return the line and the value of the entry whose key begins so; InputError where it is
+    missing or empty."""
     found = next(
         (entry for key, entry in header.items() if key.startswith(start) and entry[1]), None
     )
@@ -107,7 +114,8 @@ def _of(text: TextFile, line: int, value: str, place: int) -> float:
 def _step(
     text: TextFile, header: dict[str, tuple[int, str]], place: int, count: float
 ) -> tuple[int, float]:
-    """Return the line of the time step, and the step [s], which the sampling rate and the duration must confirm."""
+    """Return the line of the time step, and the step [s], which the sampling rate and the duration
+    must confirm."""
     line, steps = _entry(text, header, "INTERVALO DE MUESTREO, C1")
     found = [(line, _of(text, line, steps, place))]
     rate_line, rates = _entry(text, header, "VEL. DE MUESTREO, C1")
@@ -133,7 +141,8 @@ def _first_row(text: TextFile, start: int) -> int:
     ]
     if len(rulers) < 2:
         raise InputError(
-            f"{text.at(start)}: the names of the columns do not stand between two rulers '-----'; get the "
+            f"{text.at(start)}: the names of the columns do not stand between two rulers '-----'; "
+            "get the "
             "complete file"
         )
     return rulers[-1] + 1

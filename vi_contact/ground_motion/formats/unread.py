@@ -10,7 +10,8 @@ _KNOWN = (
         re.compile(
             r"^\s*+(?:response and fourier|fourier|response) (?:amplitude )?spectr", re.IGNORECASE
         ),
-        "this file holds spectra (volume 3); get the file of accelerations of the same record (volume 2, .V2)",
+        "this file holds spectra (volume 3); get the file of accelerations of the same record "
+        "(volume 2, .V2)",
     ),
     (
         re.compile(r"^\s*+<(?:\?xml|!doctype html|html|q:quakeml|fdsnstationxml)", re.IGNORECASE),
@@ -18,15 +19,18 @@ _KNOWN = (
     ),
     (
         re.compile(r"^\s*+[{\[]\s*+(?:[\"{\[\]}]|$)"),
-        "this is a JSON file, which is not read; write its accelerations to a text file, one value a line",
+        "this is a JSON file, which is not read; write its accelerations to a text file, one value "
+        "a line",
     ),
     (
         re.compile(r"^(?:WID[12]|XW01|BEGIN (?:GSE|IMS))", re.IGNORECASE),
-        "this is a GSE or IMS file, which is not read; convert it to columns, for example with ObsPy",
+        "this is a GSE or IMS file, which is not read; convert it to columns, for example with "
+        "ObsPy",
     ),
     (
         re.compile(r"^TIMESERIES \S+, \d+ samples", re.IGNORECASE),
-        "this is a TSPAIR or SLIST file of EarthScope in counts, which is not read; remove the response and "
+        "this is a TSPAIR or SLIST file of EarthScope in counts, which is not read; remove the "
+        "response and "
         "write columns, for example with ObsPy",
     ),
 )
@@ -34,7 +38,8 @@ _SAC = "this is an alphanumeric SAC file, which is not read; convert it to colum
 
 
 def refuse_unread(text: TextFile) -> None:
-    """Raise InputError where the first line of numbers or words is that of a format that is not read."""
+    """Raise InputError where the first line of numbers or words is that of a format that is not
+    read."""
     index = next((k for k, line in enumerate(text.heads) if line.strip()), 0)
     for pattern, sentence in _KNOWN:
         if pattern.search(text.heads[index]):

@@ -1,9 +1,11 @@
-"""Read uncorrected files in the layout of Volume I of Caltech: BHRC (Iran), RENADIC (Chile), USC and CSMIP.
+"""Read uncorrected files in the layout of Volume I of Caltech: BHRC (Iran), RENADIC (Chile), USC
+and CSMIP.
 
-A component has 13 lines of text, which give the number of points, the duration and "UNITS … ARE SEC AND G/10", then 7
-lines of integers, 7 lines of reals, and the samples: pairs of time and acceleration in columns of 7, five pairs a line,
-or (BHRC) accelerations alone at equal steps in columns of 13, ten a line. Lines may begin with one blank for the
-printer. A line "/&" ends a component."""
+A component has 13 lines of text, which give the number of points, the duration and "UNITS … ARE SEC
+AND G/10", then 7 lines of integers, 7 lines of reals, and the samples: pairs of time and
+acceleration in columns of 7, five pairs a line, or (BHRC) accelerations alone at equal steps in
+columns of 13, ten a line. Lines may begin with one blank for the printer. A line "/&" ends a
+component."""
 
 import re
 from collections.abc import Sequence
@@ -39,7 +41,8 @@ _INTEGERS = re.compile(r"[\s\d-]++")
 
 @dataclass(frozen=True)
 class _Part:
-    """Describe one component: lines of text, line of the first sample, and the line after the last one."""
+    """Describe one component: lines of text, line of the first sample, and the line after the last
+    one."""
 
     header: range
     data: int
@@ -48,15 +51,17 @@ class _Part:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether two of three signs of Volume I stand at the beginning: its first line, points and duration, and
-    units in seconds and g/10; and no line that announces a block of samples as in later volumes."""
+    """Tell whether two of three signs of Volume I stand at the beginning: its first line, points
+    and duration, and units in seconds and g/10; and no line that announces a block of samples as in
+    later volumes."""
     head = text.heads[:20]
     signs = [any(map(pattern.search, head)) for pattern in (_FIRST, _POINTS, _UNITS)]
     return sum(signs) >= 2 and not begins_blocks(text)
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 for the first of the file, or its name such as "N00W".
+    """Return the record of one component; channel: 1 for the first of the file, or its name such as
+    "N00W".
 
     Where times are uneven, as digitisers of films gave them, resample_dt is needed."""
     parts = _parts(text)
@@ -67,7 +72,8 @@ def read(text: TextFile) -> Record:
     )
     if not units:
         raise InputError(
-            f"{text.at(part.header[0])}: the header has no line 'UNITS ARE SEC AND'; get the complete file"
+            f"{text.at(part.header[0])}: the header has no line 'UNITS ARE SEC AND'; get the "
+            "complete file"
         )
     rows = list(range(part.data, part.end))
     pairs = _width(text, rows) == PAIR_WIDTH
@@ -88,7 +94,8 @@ def read(text: TextFile) -> Record:
         at = "times in the file"
         if abs(times[-1] - times[0] + step - seconds) > 1.5 * float(np.max(np.diff(times))) + 1e-3:
             raise InputError(
-                f"{text.at(line)}: {seconds:g} s are announced but the times end at {times[-1]:g} s; get "
+                f"{text.at(line)}: {seconds:g} s are announced but the times end at {times[-1]:g} "
+                "s; get "
                 "the complete file"
             )
         if uneven:
@@ -154,7 +161,8 @@ def _parts(text: TextFile) -> list[_Part]:
         )
         if short or not whole or _INTEGERS.fullmatch(text.lines[numbers + INTEGER_LINES]):
             raise InputError(
-                f"{text.at(numbers)}: {INTEGER_LINES} lines of integers and {REAL_LINES} lines of reals do "
+                f"{text.at(numbers)}: {INTEGER_LINES} lines of integers and {REAL_LINES} lines of "
+                "reals do "
                 "not follow the text; lines were lost or added, get the complete file"
             )
         named = (_COMPONENT.search(text.heads[k]) for k in range(start, numbers))
@@ -172,7 +180,8 @@ def _announced(text: TextFile, part: _Part) -> tuple[int, float, float]:
             count, seconds = text.number(index, match[1]), text.number(index, match[2])
             if count < 2.0 or seconds <= 0.0:
                 raise InputError(
-                    f"{text.at(index)}: {count:g} points in {seconds:g} s are announced; get the file again"
+                    f"{text.at(index)}: {count:g} points in {seconds:g} s are announced; get the "
+                    "file again"
                 )
             return index, count, seconds
     raise InputError(
@@ -181,13 +190,15 @@ def _announced(text: TextFile, part: _Part) -> tuple[int, float, float]:
 
 
 def _width(text: TextFile, rows: Sequence[int]) -> int:
-    """Return the width of the columns: of the first row, which is full unless there is one row only."""
+    """Return the width of the columns: of the first row, which is full unless there is one row
+    only."""
     row = text.lines[rows[0]].rstrip()
     return SINGLE_WIDTH if "E" in row.upper() else PAIR_WIDTH
 
 
 def _fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float], list[int]]:
-    """Return all values by column, and the index of the line of each; InputError where a row is not full."""
+    """Return all values by column, and the index of the line of each; InputError where a row is not
+    full."""
     values: list[float] = []
     lines: list[int] = []
     offset = len(text.lines[rows[0]].rstrip()) % width
@@ -200,7 +211,8 @@ def _fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float
         last = index == rows[-1]
         if len(row) != FIELDS and not (last and 0 < len(row) < FIELDS):
             raise InputError(
-                f"{text.at(index)}: the row has {len(row)} values instead of {FIELDS}; a value is missing "
+                f"{text.at(index)}: the row has {len(row)} values instead of {FIELDS}; a value is "
+                "missing "
                 "or too many, get the complete file"
             )
         values += row

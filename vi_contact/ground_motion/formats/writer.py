@@ -7,12 +7,15 @@ from ...core.errors import InputError
 from ...core.files import write_output
 from ..record import UNITS, Record, canonical_units
 
-DIGITS = 9  # significant digits of a written sample; what is read back differs by half a unit in the last of them
+# significant digits of a written sample; what is read back differs by half a unit in the last of
+# them
+DIGITS = 9
 
 
 @checked
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
+    """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time
+    step and notes."""
     samples, name = _samples(record, units)
     comments = [
         record.title,
@@ -41,7 +44,8 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
 
 @checked
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and units."""
+    """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and
+    units."""
     _write(path, _samples(record, units)[0])
 
 
@@ -56,6 +60,7 @@ def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
         write_output(path, ("\n".join(lines) + "\n").encode("utf-8"))
     except OSError as error:
         raise InputError(
-            f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, or "
+            f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, "
+            "or "
             "mend what the system says"
         ) from error

@@ -1,10 +1,13 @@
-"""Make and lock the folder a run writes into, so that no data are lost and no rank waits for another for ever.
+"""Make and lock the folder a run writes into, so that no data are lost and no rank waits for
+another for ever.
 
-Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to all ranks, which
-then raise the same sentence together. Files that must be whole are written beside their name and renamed.
+Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to
+all ranks, which then raise the same sentence together. Files that must be whole are written beside
+their name and renamed.
 
-A run takes a folder by writing ``format.json`` into it. Only in a folder with this mark are files replaced or deleted
-that were there before, and of those only the ones with names that runs write. All others are left alone."""
+A run takes a folder by writing ``format.json`` into it. Only in a folder with this mark are files
+replaced or deleted that were there before, and of those only the ones with names that runs write.
+All others are left alone."""
 
 import fcntl
 import json
@@ -97,13 +100,15 @@ _held: dict[Path, int] = {}  # locks that this process has -> the thread that to
 
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
-    """Make the folder, with parents, and try to write into it, before any work is done; InputError if not.
+    """Make the folder, with parents, and try to write into it, before any work is done; InputError
+    if not.
 
     InputError also when files of others have names that a run replaces."""
     folder = Path(path)
     if find_spec("h5py") is None:
         raise InputError(
-            f"output folder '{folder}' needs h5py, which is missing here: install it, or run without"
+            f"output folder '{folder}' needs h5py, which is missing here: install it, or run "
+            "without"
         )
 
     def make() -> None:
@@ -124,7 +129,8 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
 
 
 def is_marked(folder: Path) -> bool:
-    """Return whether a run has taken this folder: it has the mark, or a history as only runs write it."""
+    """Return whether a run has taken this folder: it has the mark, or a history as only runs write
+    it."""
     if is_own(folder / ABOUT):
         return True
     if not is_own(folder / HISTORY_CSV):
@@ -139,20 +145,23 @@ def refuse_files_of_others(folder: Path) -> None:
         return
     for path in _written_by_runs(folder):
         raise InputError(
-            f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a run would "
+            f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a "
+            "run would "
             "replace it: choose another output folder, or move the file"
         )
 
 
 def take(folder: Path) -> None:
-    """Write the mark of runs into a folder, with its lock; InputError as of ``refuse_files_of_others``."""
+    """Write the mark of runs into a folder, with its lock; InputError as of
+    ``refuse_files_of_others``."""
     refuse_files_of_others(folder)
     about = {"format": FORMAT, "vi_contact": __version__}
     write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
 
 def _written_by_runs(folder: Path) -> list[Path]:
-    """What is in a folder under names that runs write, but for the copy of a case, which has a mark of its own."""
+    """What is in a folder under names that runs write, but for the copy of a case, which has a mark
+    of its own."""
     fields = inner_folder(folder, FIELDS)
     files = [
         folder / name
@@ -163,7 +172,8 @@ def _written_by_runs(folder: Path) -> list[Path]:
 
 
 def _is_model(path: Path) -> bool:
-    """Whether a file describes a model, as ``vi-contact run --check`` writes it into a folder without a run."""
+    """Whether a file describes a model, as ``vi-contact run --check`` writes it into a folder
+    without a run."""
     if not is_own(path):
         return False
     try:
@@ -187,13 +197,15 @@ def check_format(file: Path, found: Any) -> None:
     """Raise InputError for a file of a format that this version does not know."""
     if found != FORMAT or isinstance(found, bool):
         raise InputError(
-            f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: read it "
+            f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: "
+            "read it "
             "with the version that wrote it"
         )
 
 
 def check_folder_format(folder: Path) -> None:
-    """Raise InputError likewise for a run folder; one without a number, of which files were copied, is not asked."""
+    """Raise InputError likewise for a run folder; one without a number, of which files were copied,
+    is not asked."""
     if not is_own(folder / ABOUT):
         return
     try:
@@ -213,7 +225,8 @@ def check_folder_format(folder: Path) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove what an earlier run left in the folder and a new one could be mistaken for; histories are overwritten.
+    """Remove what an earlier run left in the folder and a new one could be mistaken for; histories
+    are overwritten.
 
     The mark of runs stays. Nothing is removed from a folder without it."""
     if not is_marked(folder):
@@ -225,8 +238,8 @@ def clear(folder: Path) -> None:
 
 
 def remove_run(folder: Path) -> None:
-    """Remove the files of a run with its reports, and the folder if nothing else is in it. A folder that no run has
-    taken, and all files of others, stay as they are."""
+    """Remove the files of a run with its reports, and the folder if nothing else is in it. A folder
+    that no run has taken, and all files of others, stay as they are."""
     if not is_marked(folder):
         return
     fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
@@ -244,7 +257,8 @@ def remove_run(folder: Path) -> None:
 
 
 def move_run(folder: Path, target: Path) -> None:
-    """Move the files of a run, with its fields and stages, into another folder; files of others stay."""
+    """Move the files of a run, with its fields and stages, into another folder; files of others
+    stay."""
     fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
     for stage in filter(is_marked, _inside(stages)):
         os.replace(stage, make_inner_folder(target, STAGES) / stage.name)
@@ -271,7 +285,8 @@ def remove_if_empty(folder: Path) -> None:
 
 
 def remove_litter(folder: Path) -> None:
-    """Remove what killed processes left of files they were about to replace; with the folder's lock only."""
+    """Remove what killed processes left of files they were about to replace; with the folder's lock
+    only."""
     for place in (folder, inner_folder(folder, FIELDS)):
         for name in os.listdir(place) if place.is_dir() else ():
             if _is_temporary(name) or (_TRIAL.fullmatch(name) and place is folder):
@@ -279,7 +294,8 @@ def remove_litter(folder: Path) -> None:
 
 
 def _is_temporary(name: str) -> bool:
-    """Whether this is the name of a file that was to take the place of one of a run: ".NAME.PROCESS.tmp"."""
+    """Whether this is the name of a file that was to take the place of one of a run:
+    ".NAME.PROCESS.tmp"."""
     inside, _, process = name.removesuffix(".tmp").removeprefix(".").rpartition(".")
     return name == f".{inside}.{process}.tmp" and process.isdecimal() and _is_name_of_runs(inside)
 
@@ -293,10 +309,12 @@ def _is_name_of_runs(name: str) -> bool:
 
 @contextmanager
 def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
-    """Refuse other runs that want the folder, or this part of it, while it lasts, on all their ranks. Collective.
+    """Refuse other runs that want the folder, or this part of it, while it lasts, on all their
+    ranks. Collective.
 
-    Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody up. Within the same
-    thread it may be taken again. On a file system that knows no locks there is none, which is logged."""
+    Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody
+    up. Within the same thread it may be taken again. On a file system that knows no locks there is
+    none, which is logged."""
     mine = None if folder is None else on_root(comm, lambda: _take(folder, name))
     try:
         yield
@@ -319,12 +337,14 @@ def _take(folder: Path, name: str) -> Any:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InputError(
-                f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or choose "
+                f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or "
+                "choose "
                 "another output folder"
             ) from None
         except OSError as error:
             log.warning(
-                "'%s' is on a file system without locks (%s): make sure that no other run writes there",
+                "'%s' is on a file system without locks (%s): make sure that no other run writes "
+                "there",
                 folder,
                 error.strerror,
             )

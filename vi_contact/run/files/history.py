@@ -1,4 +1,5 @@
-"""Keep the rows of a run in files from the step they were computed in; the memory need not hold them.
+"""Keep the rows of a run in files from the step they were computed in; the memory need not hold
+them.
 
 ``history.csv``      one line per step with all numbers, written at least once a second and before every checkpoint:
                      a killed run loses no more.
@@ -44,13 +45,16 @@ PUSH, SAVE = (
     1.0,
     10.0,
 )  # seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
-GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
+# history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
+GROWTH = 1.25
 
 
 class HistoryFiles:
-    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points. Every method may raise OSError.
+    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points. Every method may
+    raise OSError.
 
-    ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are dropped) or another.
+    ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are
+    dropped) or another.
     """
 
     def __init__(
@@ -109,7 +113,8 @@ class HistoryFiles:
         self._rows, self._last = self._rows + len(rows), int(rows[-1]["k"])
 
     def checksum(self, k: int) -> str:
-        """Return the checksum of the rows up to step k; later ones are of a base step that is not at its end."""
+        """Return the checksum of the rows up to step k; later ones are of a base step that is not
+        at its end."""
         if k == self._last:
             return self._hash.hexdigest()
         stored = StoredRows(self._folder, self._table, k)
@@ -118,8 +123,8 @@ class HistoryFiles:
         return stored.hash.hexdigest()
 
     def sync(self) -> bool:
-        """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown enough; say whether
-        a checkpoint can rely on them even when the power fails."""
+        """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown
+        enough; say whether a checkpoint can rely on them even when the power fails."""
         now = time.monotonic()
         if now - self._pushed < PUSH:
             return False
@@ -132,7 +137,8 @@ class HistoryFiles:
         return True
 
     def save(self) -> None:
-        """Write history.h5 with all rows, from the memory if they are there; the journal starts anew."""
+        """Write history.h5 with all rows, from the memory if they are there; the journal starts
+        anew."""
         if self._rows == self._table.count and (known := self._table.remembered()) is not None:
             self._replace(
                 iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved
@@ -173,7 +179,8 @@ class HistoryFiles:
             file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
 
     def close(self) -> None:
-        """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
+        """Write all rows into history.h5 and leave no journal; what cannot be written stays in the
+        other files."""
         try:
             push(self._folder / HISTORY_CSV)
             self.save()
@@ -185,7 +192,8 @@ class HistoryFiles:
 
 
 def _append(*pairs: tuple[Any, bytes]) -> None:
-    """Write these bytes to the files that there are; what one has no room for is cut off from all of them."""
+    """Write these bytes to the files that there are; what one has no room for is cut off from all
+    of them."""
     begun: list[tuple[Any, int]] = []
     try:
         for file, data in pairs:

@@ -1,9 +1,10 @@
-"""Tell what makes two runs runs of the same problem, in few numbers that any ranks, machine or release give alike.
+"""Tell what makes two runs runs of the same problem, in few numbers that any ranks, machine or
+release give alike.
 
-Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t), and vᵀCw
-of two where a matrix may be skew. Such numbers depend neither on the ranks nor on their order, and round-off changes
-them in the last digits only; they are kept with their sizes and compared relative to these. Laws and schemes are texts,
-with numbers compared likewise."""
+Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw,
+w·f(t), and vᵀCw of two where a matrix may be skew. Such numbers depend neither on the ranks nor on
+their order, and round-off changes them in the last digits only; they are kept with their sizes and
+compared relative to these. Laws and schemes are texts, with numbers compared likewise."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +24,9 @@ from ...core.system import SemiDiscreteSystem, history_value
 from ..time_steps import TimeSteps, described, pieces_of
 
 ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
-SAME = 1e-8  # relative difference of numbers that count as equal: above round-off, below what anybody means to change
+# relative difference of numbers that count as equal: above round-off, below what anybody means to
+# change
+SAME = 1e-8
 PROBES = 2  # vectors w
 SAMPLES = 256  # times of functions of time alone, all over the run
 EARLY = 5  # times of other loads, which may have to be marched to: in the first steps
@@ -42,7 +45,8 @@ Identity = dict[str, Any]
 def identity(
     problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float
 ) -> Identity:
-    """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end`` [s]. Collective."""
+    """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end``
+    [s]. Collective."""
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
     pairs = [(w, w) for w in probes] + (
@@ -75,7 +79,8 @@ def identity(
 
 
 def text_of(value: Any) -> str:
-    """Return the repr of a law without addresses, and without what releases of numpy write differently."""
+    """Return the repr of a law without addresses, and without what releases of numpy write
+    differently."""
     return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
 
 
@@ -160,7 +165,8 @@ def _excitation(problem: ContactProblem, times: Array) -> Numbers:
 
 
 def _numbers_in(value: Any) -> Iterator[float]:
-    """All numbers of a value object: every sample of a record, also those between the times that are looked at."""
+    """All numbers of a value object: every sample of a record, also those between the times that
+    are looked at."""
     if is_dataclass(value):
         for one in fields(value):
             yield from _numbers_in(getattr(value, one.name))

@@ -1,4 +1,5 @@
-"""Tell what a run does while it works: ``run.log`` through the logging module, and progress with the time left."""
+"""Tell what a run does while it works: ``run.log`` through the logging module, and progress with
+the time left."""
 
 import logging
 import platform
@@ -21,8 +22,8 @@ SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or t
 
 
 class _LogFile(logging.Handler):
-    """Write lines into a file of the run folder, and keep the error of one that could not be written, for the run to
-    raise on all ranks."""
+    """Write lines into a file of the run folder, and keep the error of one that could not be
+    written, for the run to raise on all ranks."""
 
     def __init__(self, path: Path, *, append: bool) -> None:
         super().__init__()
@@ -46,10 +47,11 @@ class _LogFile(logging.Handler):
 
 
 class RunLog:
-    """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal: on rank 0.
+    """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the
+    terminal: on rank 0.
 
-    While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The root logger is left
-    out: form compilers make it print every line."""
+    While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The
+    root logger is left out: form compilers make it print every line."""
 
     turn: ClassVar[object] = None
     _open: ClassVar[int] = 0
@@ -98,7 +100,8 @@ def turn_of(run: object) -> Iterator[None]:
 
 
 def versions(*needed: str) -> dict[str, str]:
-    """Return the version of everything that computes in this process, and of what else is needed to write."""
+    """Return the version of everything that computes in this process, and of what else is needed to
+    write."""
     for name in needed:
         with suppress(ModuleNotFoundError):  # nothing is written, else the folder was refused
             import_module(name)
@@ -112,7 +115,8 @@ def versions(*needed: str) -> dict[str, str]:
 
 
 class Progress:
-    """Show the progress: by tqdm on a terminal, and a line in the log every tenth of the run or every 30 s."""
+    """Show the progress: by tqdm on a terminal, and a line in the log every tenth of the run or
+    every 30 s."""
 
     def __init__(self, total: int, *, shown: bool) -> None:
         self._total, self._done = total, 0
@@ -142,7 +146,8 @@ class Progress:
             self._told, self._next = now, self._done + SHARE * self._total
             left = (now - self._begin) / self._done * (self._total - self._done)
             log.info(
-                "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
+                "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s "
+                "left",
                 k,
                 t,
                 self._done,

@@ -1,4 +1,5 @@
-"""Read what a run left in its folder: histories, units, facts and the geometry of the contact points."""
+"""Read what a run left in its folder: histories, units, facts and the geometry of the contact
+points."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -58,10 +59,10 @@ class ContactGeometry:
 class RunFolder:
     """Hold a run read from its files, as ``Solution`` has it.
 
-    Attributes:
-        folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per contact point.
-        columns: column -> (unit, meaning). facts: summary.json; empty while a run goes on or after it was killed.
-        contact: None when history.h5 is missing, as early in a run, or the problem has no contact points."""
+    Attributes: folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per
+        contact point. columns: column -> (unit, meaning). facts: summary.json; empty while a run
+        goes on or after it was killed. contact: None when history.h5 is missing, as early in a run,
+        or the problem has no contact points."""
 
     folder: Path
     history: Mapping[str, Array]
@@ -72,10 +73,12 @@ class RunFolder:
 
 @checked
 def read_run(folder: str | Path) -> RunFolder:
-    """Read a run folder of ``simulate``. For a run that is still going on or was killed, return what is there.
+    """Read a run folder of ``simulate``. For a run that is still going on or was killed, return
+    what is there.
 
-    Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it does
-    once the run has ended). InputError when there is no history, or a file is damaged."""
+    Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has
+    all steps too (it does once the run has ended). InputError when there is no history, or a file
+    is damaged."""
     folder = Path(folder)
     if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
@@ -89,7 +92,8 @@ def read_run(folder: str | Path) -> RunFolder:
 
 
 def _of(path: Path, read: Callable[[Path], T]) -> T:
-    """What is read from a file of a run; InputError that names the file when it is missing or damaged."""
+    """What is read from a file of a run; InputError that names the file when it is missing or
+    damaged."""
     try:
         return read(path)
     except InputError:
@@ -115,7 +119,8 @@ def _short(error: Exception) -> str:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be printed."""
+    """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be
+    printed."""
     with open_to_read(path) as file:
         data = file.read(BYTES + 1)
     if len(data) > BYTES:
@@ -186,23 +191,27 @@ def _numbers(path: Path) -> dict[str, Array]:
 
 
 def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, Any]) -> None:
-    """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one of the summary."""
+    """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one
+    of the summary."""
     rows, steps = len(history["t"]), facts.get("steps")
     gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
     if len(gaps):
         raise InputError(
-            f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not follow "
+            f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not "
+            "follow "
             "each other): restore it or run again"
         )
     if isinstance(steps, int) and rows < steps + 1:
         raise InputError(
-            f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of {steps} "
+            f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of "
+            f"{steps} "
             "steps and the initial state): restore it or run again"
         )
 
 
 def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
-    """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that both have."""
+    """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that
+    both have."""
     for name, own in history.items():
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
@@ -213,7 +222,8 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
         if len(differ):
             csv = path.with_name(HISTORY_CSV)
             raise InputError(
-                f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is damaged or "
+                f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is "
+                "damaged or "
                 f"was changed; restore it, or move {HISTORY_H5} away to read the other alone"
             )
 

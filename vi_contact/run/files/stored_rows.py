@@ -1,6 +1,8 @@
-"""Read the rows that an earlier run left in its folder, block by block: what a restart goes on from.
+"""Read the rows that an earlier run left in its folder, block by block: what a restart goes on
+from.
 
-Numbers are in history.csv, arrays in history.h5, of later steps in history.journal; the checkpoint has their checksum.
+Numbers are in history.csv, arrays in history.h5, of later steps in history.journal; the checkpoint
+has their checksum.
 """
 
 import hashlib
@@ -23,7 +25,8 @@ from .table import Block, Table
 
 
 def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
-    """Return lines of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
+    """Return lines of history.csv: whole numbers stay whole, all others are floats that read back
+    to the last bit."""
     values = [
         [v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)]
         for row in rows
@@ -32,7 +35,8 @@ def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
 
 
 def records_of(table: Table, block: Block) -> list[bytes]:
-    """Return the arrays of rows as the journal has them: float64, k first; empty ones when there are none."""
+    """Return the arrays of rows as the journal has them: float64, k first; empty ones when there
+    are none."""
     n = len(block["k"])
     if not table.arrays:
         return [b""] * n
@@ -41,9 +45,11 @@ def records_of(table: Table, block: Block) -> list[bytes]:
 
 
 class StoredRows:
-    """Read rows up to step k in a folder. ``checksum``: what they must have, as of the checkpoint; "" for one without.
+    """Read rows up to step k in a folder. ``checksum``: what they must have, as of the checkpoint;
+    "" for one without.
 
-    After ``blocks`` has come to its end: ``length`` in bytes of their part of history.csv, ``hash`` of what was read.
+    After ``blocks`` has come to its end: ``length`` in bytes of their part of history.csv, ``hash``
+    of what was read.
     """
 
     def __init__(self, folder: Path, table: Table, k: int, checksum: str = "") -> None:
@@ -51,7 +57,8 @@ class StoredRows:
         self.length, self.hash = 0, hashlib.sha256()
 
     def blocks(self) -> Iterator[Block]:
-        """Return the rows, in order. InputError, one sentence, for what is missing, damaged or of other columns."""
+        """Return the rows, in order. InputError, one sentence, for what is missing, damaged or of
+        other columns."""
         check_folder_format(self.folder)
         path, names = self.folder / HISTORY_CSV, self._table.numbers
         if not is_own(path):
@@ -63,7 +70,8 @@ class StoredRows:
             header = csv.readline()
             if header.decode(errors="replace").strip() != ",".join(names):
                 raise InputError(
-                    f"'{path}' holds other columns than this run records: restart with the same recorders"
+                    f"'{path}' holds other columns than this run records: restart with the same "
+                    "recorders"
                 )
             self.length = len(header)
             for lines, block in read_blocks(csv, self._table, arrays, k=self.k):
@@ -73,7 +81,8 @@ class StoredRows:
                 yield block
             if self._checksum and self.hash.hexdigest() != self._checksum:
                 raise InputError(
-                    f"the histories in '{self.folder}' do not belong to the checkpoint, or a file is "
+                    f"the histories in '{self.folder}' do not belong to the checkpoint, or a file "
+                    "is "
                     "damaged: restore the folder or start a new run"
                 )
 
@@ -81,7 +90,8 @@ class StoredRows:
 def read_blocks(
     csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
-    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line cut short."""
+    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line
+    cut short."""
     done = first
     while True:
         lines = [line for line in islice(csv, table.block) if line.endswith(b"\n")]
@@ -89,7 +99,8 @@ def read_blocks(
         steps = numbers[:, table.numbers.index("k")]
         if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
             raise InputError(
-                f"the steps in '{csv.name}' after line {done + 1} do not follow each other: restore it or "
+                f"the steps in '{csv.name}' after line {done + 1} do not follow each other: "
+                "restore it or "
                 "start a new run"
             )
         n = len(steps) if k is None else int(np.searchsorted(steps, k, side="right"))
@@ -103,12 +114,14 @@ def read_blocks(
             if k is None:
                 return
             raise InputError(
-                f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a new run"
+                f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a "
+                "new run"
             )
 
 
 def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
-    """Return the numbers of lines (rows, width); InputError names the first line that holds something else."""
+    """Return the numbers of lines (rows, width); InputError names the first line that holds
+    something else."""
     values: list[list[float]] = []
     for i, line in enumerate(lines):
         texts = line.replace(b"_", b"?").split(b",")  # float() would read 1_0 as ten
@@ -143,7 +156,8 @@ class StoredArrays:
             self._file.close()
 
     def rows(self, first: int, steps: Array) -> Block:
-        """Return the arrays of consecutive rows, of these steps; InputError where one is missing."""
+        """Return the arrays of consecutive rows, of these steps; InputError where one is
+        missing."""
         if not self._samples:
             return {}
         n = self._in_hdf5(first, steps)
@@ -201,7 +215,8 @@ class StoredArrays:
         if not np.array_equal(part[:, 0], steps):
             missing = int(steps[len(part)] if len(part) < len(steps) else steps[0])
             raise InputError(
-                f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: restore it "
+                f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: "
+                "restore it "
                 "or start a new run"
             )
         ends = np.cumsum([one.size for one in self._samples.values()])[:-1]

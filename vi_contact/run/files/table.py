@@ -1,4 +1,5 @@
-"""Hold the histories of a run in memory: compact columns, of a run with a folder only so much of them; tally them."""
+"""Hold the histories of a run in memory: compact columns, of a run with a folder only so much of
+them; tally them."""
 
 import copy
 import os
@@ -33,11 +34,11 @@ Block = dict[
 class Table:
     """Hold columns and rows of a run: numbers on every rank, arrays on rank 0.
 
-    Attributes:
-        columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
-        numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only HDF5 holds, with a sample.
-        file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the memory lets them go.
-        block: how many rows are turned into columns, read or written together."""
+    Attributes: columns: column -> (unit, meaning). first: the row it was made with. count: rows so
+        far. numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only
+        HDF5 holds, with a sample. file: the history.h5 of a run with a folder, which has the rows
+        too: beyond KEPT bytes the memory lets them go. block: how many rows are turned into
+        columns, read or written together."""
 
     def __init__(
         self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None
@@ -64,12 +65,14 @@ class Table:
         self.append(first)
 
     def check(self, row: Row) -> None:
-        """Raise InputError for a row with other columns than its recorder has announced, or not of numbers."""
+        """Raise InputError for a row with other columns than its recorder has announced, or not of
+        numbers."""
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
         for name in sorted(row.keys() ^ self.columns.keys()):
             raise InputError(
-                f"a recorder names the column '{name}' in columns() only, or in start() and row() only: "
+                f"a recorder names the column '{name}' in columns() only, or in start() and row() "
+                "only: "
                 "let all three name the same columns"
             )
         for name, value in row.items():
@@ -77,7 +80,8 @@ class Table:
                 value, np.str_
             ):
                 raise InputError(
-                    f"column '{name}' is {shown(value)}: let its recorder return a number or an array"
+                    f"column '{name}' is {shown(value)}: let its recorder return a number or an "
+                    "array"
                 )
         self._types.update(map(type, row.values()))
 
@@ -94,7 +98,8 @@ class Table:
             self._store(self._columns(rows))
 
     def restore(self, block: Block) -> None:
-        """Add rows of an earlier run, which are those before the one that the table was made with."""
+        """Add rows of an earlier run, which are those before the one that the table was made
+        with."""
         if self.count == 1 and self._open:
             self._open, self.count = [], 0
         self.count += len(block["k"])
@@ -115,7 +120,8 @@ class Table:
             self._blocks.append(block)
 
     def remembered(self) -> Block | None:
-        """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let some go."""
+        """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let
+        some go."""
         self._gather()
         names = [*self.numbers, *self.arrays] if self._kept else []
         return {
@@ -130,8 +136,9 @@ class Table:
         return tally.facts()
 
     def history(self) -> Mapping[str, Array]:
-        """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for
-        the memory, or points for every rank, as they are in the file. Collective."""
+        """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of
+        too many rows for the memory, or points for every rank, as they are in the file.
+        Collective."""
         kept = self.remembered() or {}
         shared = [
             name
@@ -154,7 +161,8 @@ class Table:
 
 
 class StoredHistory(Mapping[str, Array]):
-    """Hold histories that are read column by column from history.h5 when somebody asks, but for those that are kept.
+    """Hold histories that are read column by column from history.h5 when somebody asks, but for
+    those that are kept.
 
     ViContactError when there is no file, or not any more, or it no longer holds these rows."""
 
@@ -195,7 +203,8 @@ class StoredHistory(Mapping[str, Array]):
 
 
 class Tally:
-    """Step, iterations, worst certificate, contact and energy ledger of a run. Row 0 is the initial state."""
+    """Step, iterations, worst certificate, contact and energy ledger of a run. Row 0 is the initial
+    state."""
 
     def __init__(self) -> None:
         self._rows = 0
@@ -259,7 +268,8 @@ class Tally:
         return facts | (self._energy() if "defect" in most else {})
 
     def _energy(self) -> dict[str, Any]:
-        """The ledger at the end [J], and its largest defect relative to the largest energy or input work of the run."""
+        """The ledger at the end [J], and its largest defect relative to the largest energy or input
+        work of the run."""
         most, last = self._most, self._last
         start = self._first["energy_kinetic"] + self._first["energy_strain"]
         size = max(most["energy"], most["work"])

@@ -1,4 +1,5 @@
-"""Solve contact with friction by nonsmooth Gauss-Seidel: one node after another, each solved exactly.
+"""Solve contact with friction by nonsmooth Gauss-Seidel: one node after another, each solved
+exactly.
 
 Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
 
@@ -6,9 +7,10 @@ Given the reactions of all other nodes, a node is open, or it sticks, or it slip
     stick  S r_t = -q'          if |r_t| <= limit(r_n(r_t))
     slip   (S + lambda) r_t = -q',   |r_t| = limit(r_n(r_t)),   lambda > 0 by a scalar root (closed form in 2D)
 
-with S and q' the tangential block and right-hand side after the elimination of r_n. Sources: Moreau (Comput. Methods
-Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is coordinate descent of a convex function and
-converges for every G; under Coulomb's it converges in practice, linearly, for friction that is not large."""
+with S and q' the tangential block and right-hand side after the elimination of r_n. Sources: Moreau
+(Comput. Methods Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is
+coordinate descent of a convex function and converges for every G; under Coulomb's it converges in
+practice, linearly, for friction that is not large."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -97,10 +99,12 @@ class _Node:
 
 
 def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
-    """Return r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r), lambda > 0.
+    """Return r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r),
+    lambda > 0.
 
-    S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| - limit is bracketed
-    in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of the eigenvalues give r: a start only."""
+    S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| -
+    limit is bracketed in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of
+    the eigenvalues give r: a start only."""
     if len(q) == 0 or not q.any():
         return np.zeros(len(q))
     values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)

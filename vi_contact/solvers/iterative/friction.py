@@ -1,9 +1,11 @@
-"""Solve a step with friction by semismooth Newton on all unknowns: closed normals and sticking tangents are a mask.
+"""Solve a step with friction by semismooth Newton on all unknowns: closed normals and sticking
+tangents are a mask.
 
-Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES (``friction_krylov``),
-to a hundredth of its residual. The first states are those of the reactions of the last step, with the slip
-that the step predicts: A x - b at a predicted x is no contact force. In the end every residual is formed afresh;
-reactions are put on their cone, and tangents that stick where they were."""
+Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES
+(``friction_krylov``), to a hundredth of its residual. The first states are those of the reactions
+of the last step, with the slip that the step predicts: A x - b at a predicted x is no contact
+force. In the end every residual is formed afresh; reactions are put on their cone, and tangents
+that stick where they were."""
 
 import numpy as np
 
@@ -23,14 +25,16 @@ from .preconditioners import Inverse
 
 SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
 AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
-ROUND = 1e-4  # of the largest friction limit: residual at which coefficients that are given are taken anew
+# of the largest friction limit: residual at which coefficients that are given are taken anew
+ROUND = 1e-4
 CIRCLES = 15  # Newton steps after which limits are given,
 GIVEN, MOST_GIVEN = 8, 256  # for so many rounds at first, and twice as many every time after
 STEPS = 150  # of Newton
 
 
 class Friction:
-    """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer before."""
+    """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer
+    before."""
 
     def __init__(
         self,
@@ -55,7 +59,8 @@ class Friction:
         self.worth = Worth(surface.comm, 3, tolerance)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
+        """Return the step; StepFailure, on all ranks, with the history of residuals when there is
+        no answer."""
         newton = Newton(self, step)
         while not newton.solved():
             newton.advance()
@@ -65,7 +70,8 @@ class Friction:
 
 
 class Newton:
-    """Iterate over one step. ``history``: residuals over the forces; ``steps``: linear problems solved."""
+    """Iterate over one step. ``history``: residuals over the forces; ``steps``: linear problems
+    solved."""
 
     def __init__(self, of: Friction, step: StepProblem) -> None:
         self.of = of
@@ -82,7 +88,8 @@ class Newton:
         self._take(self._predicted())
 
     def _predicted(self) -> States:
-        """The states of the last reactions and the predicted slip; without any, points stick where they touch."""
+        """The states of the last reactions and the predicted slip; without any, points stick where
+        they touch."""
         of, slip = self.of, self._slip()
         if of.last is None:
             none = np.zeros(len(slip))
@@ -111,8 +118,9 @@ class Newton:
         return np.where(of.surface.tangents >= 0, of.tangents.of(self.x) - self.slip0, 0.0)
 
     def _take(self, states: States, changed: Mask | None = None) -> None:
-        """Take states and the closed set of the contact: hold what they hold, and form the residual, a product, unless
-        nothing moved. ``changed``: conditions that closed or opened, None before the first residual."""
+        """Take states and the closed set of the contact: hold what they hold, and form the
+        residual, a product, unless nothing moved. ``changed``: conditions that closed or opened,
+        None before the first residual."""
         of, contact, x = self.of, self.of.contact, self.x.copy()
         self.states = states
         contact.place(x)
@@ -141,7 +149,8 @@ class Newton:
         return self.law(slip, r_n, np.linalg.norm(y_t, axis=1) / self.of.tangents.c)
 
     def _rubbed(self) -> Array:
-        """The friction (m, d - 1) that the law allows next to r_t: along a slip that is certain, or the projection."""
+        """The friction (m, d - 1) that the law allows next to r_t: along a slip that is certain, or
+        the projection."""
         limit, size = self.limits(self.r_n), np.linalg.norm(self.slip, axis=1)
         y_t = self.r_t + self.of.tangents.c[:, None] * self.slip
         along = self.slip * (limit / np.where(size > 0.0, size, 1.0))[:, None]
@@ -152,7 +161,8 @@ class Newton:
         return np.where(certain[:, None], along, project(y_t, limit))
 
     def solved(self) -> bool:
-        """Say whether x solves the step. StepFailure when it is not a number, or there were too many steps."""
+        """Say whether x solves the step. StepFailure when it is not a number, or there were too
+        many steps."""
         of = self.of
         error = np.where(of.contact.weights() > 0.0, self.residual, 0.0)
         error[of.tangents.rows] = of.tangents.flat(self.r_t - self._rubbed())

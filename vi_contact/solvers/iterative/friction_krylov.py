@@ -1,13 +1,14 @@
-"""Solve the linear problem of given friction states by PETSc's GMRES: it is not symmetric where points slip. Where none
-does, conjugate gradients serve, which do not stagnate on weak springs.
+"""Solve the linear problem of given friction states by PETSc's GMRES: it is not symmetric where
+points slip. Where none does, conjugate gradients serve, which do not stagnate on weak springs.
 
-The preconditioner is that of the frictionless step, made once: w W M⁻¹ W w, with zeros in w for closed normals and
-sticking tangents, and in the tangent plane of a point that slips
+The preconditioner is that of the frictionless step, made once: w W M⁻¹ W w, with zeros in w for
+closed normals and sticking tangents, and in the tangent plane of a point that slips
 
     W = n nᵀ + sqrt(g / (g + kappa)) (1 - n nᵀ),    g = c / 2,
 
-which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g is that of A⁻¹, and tends to the mask of a
-point that cannot turn. About half of the diagonal of A is what its neighbours leave a node of stiffness."""
+which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g is that of A⁻¹, and tends
+to the mask of a point that cannot turn. About half of the diagonal of A is what its neighbours
+leave a node of stiffness."""
 
 from typing import Any
 
@@ -24,7 +25,8 @@ from .preconditioners import Masked
 
 RESTART = 60
 LEFT = 0.5  # g over c
-SPREAD = 3.0  # a residual is a norm of rows, at most so many times the largest: the last ones are less spread
+# a residual is a norm of rows, at most so many times the largest: the last ones are less spread
+SPREAD = 3.0
 FALL = 0.1  # of the residual that is no stagnation
 
 
@@ -61,8 +63,9 @@ class Turned(Masked):
 
 
 class Gmres:
-    """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips, on the matrix of the
-    linear problem, as whose context it serves. ``free``: 1 in rows that are not held, and 0."""
+    """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips, on
+    the matrix of the linear problem, as whose context it serves. ``free``: 1 in rows that are not
+    held, and 0."""
 
     def __init__(
         self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int
@@ -98,7 +101,8 @@ class Gmres:
         values *= self.free
 
     def solve(self, residual: Array, share: float, goal: float) -> tuple[Array, float, int]:
-        """Return (dx, norm of what is left, PETSc's reason): ``share`` is left, or about ``goal`` in a row."""
+        """Return (dx, norm of what is left, PETSc's reason): ``share`` is left, or about ``goal``
+        in a row."""
         self._b.array[:] = residual
         self._x.set(0.0)
         spread = min(self._b.norm() / (self._b.norm(PETSc.NormType.INFINITY) or 1.0), SPREAD)

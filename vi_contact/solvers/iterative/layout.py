@@ -1,8 +1,10 @@
-"""Number the unknowns in whole nodes, so that matrices can be stored in blocks of the components of two nodes.
+"""Number the unknowns in whole nodes, so that matrices can be stored in blocks of the components of
+two nodes.
 
-A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric matrix serves for
-all of it (SBAIJ): it takes a third of the time. Prescribed components are no unknowns, and a node that keeps
-others would break the blocks: it gets them back here as unknowns that are always held at zero."""
+A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric
+matrix serves for all of it (SBAIJ): it takes a third of the time. Prescribed components are no
+unknowns, and a node that keeps others would break the blocks: it gets them back here as unknowns
+that are always held at zero."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +20,8 @@ from ..volume.bounded_system import assembled
 
 @dataclass(frozen=True)
 class Layout:
-    """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``, ``width`` a node.
+    """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``,
+    ``width`` a node.
 
     ``complete``: on no rank is there a component of a node that is no unknown."""
 
@@ -28,7 +31,8 @@ class Layout:
     complete: bool
 
     def padded(self, x: Array) -> Array:
-        """Return the values of all components of the nodes, zero where there is no unknown; a copy."""
+        """Return the values of all components of the nodes, zero where there is no unknown; a
+        copy."""
         if self.complete:
             return np.array(x)
         values = np.zeros(self.size)
@@ -46,7 +50,8 @@ class Layout:
 
 
 def layout_of(A: EffectiveMatrix) -> Layout:
-    """Return the layout of the unknowns of A; one unknown a block where nothing is known of nodes. Collective."""
+    """Return the layout of the unknowns of A; one unknown a block where nothing is known of nodes.
+    Collective."""
     n = A.matrix.rows
     if A.space is None or A.space.dimension == 1:
         return Layout(1, np.arange(n), n, complete=True)
@@ -71,7 +76,8 @@ class Nodewise:
         return assembled(self.A)
 
     def blocks(self) -> Any:
-        """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry. Collective."""
+        """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry.
+        Collective."""
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         stored = getattr(self.A.matrix, "stored", None)
         if d == 1:
@@ -95,7 +101,8 @@ class Nodewise:
         return made
 
     def entries(self, result: Any = None) -> Any:
-        """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an earlier one to refill.
+        """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an
+        earlier one to refill.
 
         Rows of missing components hold the largest diagonal entry of A."""
         mat = self.source.PtAP(self._selected, result=result)
@@ -109,7 +116,8 @@ class Nodewise:
 
     @cached_property
     def _selected(self) -> Any:
-        """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the blocks."""
+        """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the
+        blocks."""
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         n = len(layout.places)
         first = self.source.comm.tompi4py().scan(layout.size) - layout.size

@@ -1,4 +1,5 @@
-"""Measure an iterate as the certificate of the step will (``core.verify``), with reductions of a few numbers."""
+"""Measure an iterate as the certificate of the step will (``core.verify``), with reductions of a
+few numbers."""
 
 from dataclasses import dataclass
 
@@ -9,7 +10,8 @@ from ...core.step import StepProblem
 from ...core.verify import ROUNDED
 from .contact import Contact
 
-GOAL = 0.5  # of the tolerance: estimates may be wrong, and the carried residual is not the one formed afresh
+# of the tolerance: estimates may be wrong, and the carried residual is not the one formed afresh
+GOAL = 0.5
 HALVED = 0.5  # of the residual, at least, between two answers that are compared
 LEAST = 3e-4  # of the forces: reactions below are not asked for to so many digits
 ROUND_OFF = 1e-15  # of |A||x| and of the forces: what a residual cannot fall below
@@ -17,7 +19,8 @@ ROUND_OFF = 1e-15  # of |A||x| and of the forces: what a residual cannot fall be
 
 @dataclass(frozen=True)
 class Measures:
-    """Hold what residuals are relative to: forces, reactions, displacements; and their round-off. Maxima over ranks."""
+    """Hold what residuals are relative to: forces, reactions, displacements; and their round-off.
+    Maxima over ranks."""
 
     force: float
     reaction: float
@@ -51,8 +54,9 @@ class Measured:
 
 
 class Worth:
-    """Estimate how small a residual has to be for x and reactions that are known to ``tolerance`` of the largest so
-    far: from what they changed by since it was larger. What the last step showed of the conditioning is kept."""
+    """Estimate how small a residual has to be for x and reactions that are known to ``tolerance``
+    of the largest so far: from what they changed by since it was larger. What the last step showed
+    of the conditioning is kept."""
 
     def __init__(self, comm: Comm, parts: int, tolerance: float) -> None:
         self._comm, self._goal = comm, GOAL * tolerance
@@ -64,8 +68,9 @@ class Worth:
         self._largest = np.maximum(self._largest, self._sizes)
 
     def goal(self, norm: float, of: Measures, *answer: Array, begin: bool) -> float:
-        """Return the residual to stop at: what x and reactions need, but for round-off, or a share of the tolerance.
-        ``norm``: the present one; ``begin``: there is no larger one to compare with. Collective."""
+        """Return the residual to stop at: what x and reactions need, but for round-off, or a share
+        of the tolerance. ``norm``: the present one; ``begin``: there is no larger one to compare
+        with. Collective."""
         last, seen = self._seen
         if begin or norm <= HALVED * last:
             changes = [] if begin else [one - old for one, old in zip(answer, seen, strict=True)]
@@ -82,6 +87,7 @@ class Worth:
 
 
 def largest_free(comm: Comm, residual: Array, weights: Array) -> float:
-    """Return the largest residual of the unknowns that are not held, infinite where it is not a number. Collective."""
+    """Return the largest residual of the unknowns that are not held, infinite where it is not a
+    number. Collective."""
     value = max_abs(np.where(weights > 0.0, residual, 0.0))
     return float(comm.max(np.array([np.inf if np.isnan(value) else value]))[0])

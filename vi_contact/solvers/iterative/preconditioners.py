@@ -1,16 +1,17 @@
 """Precondition the free unknowns: w M⁻¹ w with a mask w, and M⁻¹ one of Jacobi, ICC(0), and GAMG.
 
-ICC and Jacobi are made of the whole A, once. On several ranks each has the incomplete factor of its own rows and one
-layer of its neighbours' (additive Schwarz). Their sum counts a row as often as there are factors that hold it; to
-divide by the square root of that number on either side takes this back, and M stays symmetric. Counted twice, the
-layer would be no gain.
+ICC and Jacobi are made of the whole A, once. On several ranks each has the incomplete factor of its
+own rows and one layer of its neighbours' (additive Schwarz). Their sum counts a row as often as
+there are factors that hold it; to divide by the square root of that number on either side takes
+this back, and M stays symmetric. Counted twice, the layer would be no gain.
 
-An incomplete factor of a positive definite matrix need not be positive definite: flat tetrahedra, or a stiff body on a
-soft one, are enough. Factors are then made of A with a larger diagonal (Manteuffel, 1980, Math. Comput. 34, 473-497),
-since PETSc's own shifts know nothing of blocks.
+An incomplete factor of a positive definite matrix need not be positive definite: flat tetrahedra,
+or a stiff body on a soft one, are enough. Factors are then made of A with a larger diagonal
+(Manteuffel, 1980, Math. Comput. 34, 473-497), since PETSc's own shifts know nothing of blocks.
 
-GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids would believe the
-contact open; the interpolation is kept, Galerkin products are renewed when over a tenth of the set has moved since."""
+GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids
+would believe the contact open; the interpolation is kept, Galerkin products are renewed when over a
+tenth of the set has moved since."""
 
 from typing import Any
 
@@ -32,7 +33,8 @@ SMALL, LARGE = 0.5, 30.0  # Courant numbers; CHOSEN: docs/guide/solvers.md has w
 DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
 RENEWALS = 4  # in a step, at most
 FEW_LEVELS = 2  # of a multigrid: with fewer there is nothing for options of levels
-RAISED = 0.5  # of the diagonal, for factors that were not positive definite; CHOSEN: docs/guide/solvers.md
+# of the diagonal, for factors that were not positive definite; CHOSEN: docs/guide/solvers.md
+RAISED = 0.5
 DEFAULTS: dict[str, Options] = {
     JACOBI: {"pc_type": "jacobi"},
     ICC: {"pc_type": "bjacobi", "sub_pc_type": "icc"},
@@ -48,8 +50,9 @@ def courant(A: EffectiveMatrix) -> float:
 
         C² = sum (A_ii - m M_ii) / sum m M_ii
 
-    compares stiffness and inertia of the diagonal over all unknowns. On uniform meshes it is 0.7 (hexahedra) to 1.0
-    times (tetrahedra) the Courant number c_p dt / h of the trapezoidal rule, infinite in statics, and needs no cells.
+    compares stiffness and inertia of the diagonal over all unknowns. On uniform meshes it is 0.7
+    (hexahedra) to 1.0 times (tetrahedra) the Courant number c_p dt / h of the trapezoidal rule,
+    infinite in statics, and needs no cells.
     """
     if A.inertia is None:
         return float("nan")
@@ -61,8 +64,9 @@ def courant(A: EffectiveMatrix) -> float:
 
 
 def chosen(number: float, modes: bool) -> str:
-    """Return the preconditioner for a Courant number: Jacobi up to 0.5, ICC up to 30 or where it is not known, GAMG
-    beyond. ``modes``: whether rigid motions are known, without which GAMG is no use."""
+    """Return the preconditioner for a Courant number: Jacobi up to 0.5, ICC up to 30 or where it is
+    not known, GAMG beyond. ``modes``: whether rigid motions are known, without which GAMG is no
+    use."""
     if number <= SMALL:
         return JACOBI
     return GAMG if number > LARGE and modes else ICC
@@ -74,7 +78,8 @@ def defaults(kind: str, ranks: int) -> Options:
 
 
 def shares(inverse: Any, template: Any) -> Array:
-    """Return 1/sqrt(k) of every row, k the number of a PETSc preconditioner's subdomains that hold it. Collective."""
+    """Return 1/sqrt(k) of every row, k the number of a PETSc preconditioner's subdomains that hold
+    it. Collective."""
     ones, count = template.duplicate(), template.duplicate()
     ones.set(1.0)
     count.set(1.0)
@@ -92,8 +97,8 @@ def shares(inverse: Any, template: Any) -> Array:
 
 
 class Masked:
-    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc preconditioner, without
-    the shares of its subdomains, which are in w."""
+    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc
+    preconditioner, without the shares of its subdomains, which are in w."""
 
     def __init__(self, inverse: Any, template: Any) -> None:
         self._inverse, self._r, self._z = inverse, template.duplicate(), template.duplicate()
@@ -122,8 +127,8 @@ class Masked:
 
 
 class Inverse:
-    """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the contact set; made of the
-    matrix with a diagonal larger by the factor 1 + ``raised``."""
+    """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the
+    contact set; made of the matrix with a diagonal larger by the factor 1 + ``raised``."""
 
     def __init__(self, matrix: Any, layers: OptionLayers, raised: float = 0.0) -> None:
         made_of = matrix
@@ -136,13 +141,16 @@ class Inverse:
         """Begin a step."""
 
     def follow(self, held: Indices) -> None:
-        """Make M anew for the rows that closed conditions and sticking points hold, if it is time to. Collective."""
+        """Make M anew for the rows that closed conditions and sticking points hold, if it is time
+        to. Collective."""
 
 
 class Multigrid(Inverse):
-    """Hold GAMG, or what else the options say, of an AIJ matrix that is renewed for the contact set.
+    """Hold GAMG, or what else the options say, of an AIJ matrix that is renewed for the contact
+    set.
 
-    The interpolation is that of the whole A with its rigid modes, in which no set has left a trace."""
+    The interpolation is that of the whole A with its rigid modes, in which no set has left a
+    trace."""
 
     def __init__(
         self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work
@@ -163,7 +171,8 @@ class Multigrid(Inverse):
         self._left = RENEWALS
 
     def follow(self, held: Indices) -> None:
-        """Make the Galerkin products anew when more than a tenth of the held rows have changed since."""
+        """Make the Galerkin products anew when more than a tenth of the held rows have changed
+        since."""
         mask = np.zeros_like(self._built)
         mask[held] = True
         moved, size = self._comm.sum(
@@ -187,7 +196,8 @@ class Multigrid(Inverse):
 
 
 def made(matrix: Any, layers: OptionLayers) -> Any:
-    """Return a PETSc preconditioner of a matrix, from the options. InputError when PETSc does not take them."""
+    """Return a PETSc preconditioner of a matrix, from the options. InputError when PETSc does not
+    take them."""
     pc = PETSc.PC().create(matrix.comm)
     pc.setOptionsPrefix(layers.prefix)
     pc.setOperators(matrix)
@@ -215,7 +225,8 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
 def rigid_modes(
     A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any
 ) -> list[Any]:
-    """Return orthonormal PETSc vectors of the rigid motions, in nodal frames and relative at two bodies."""
+    """Return orthonormal PETSc vectors of the rigid motions, in nodal frames and relative at two
+    bodies."""
     space, comm = A.space, A.algebra.comm
     d, points = int(space.dimension), np.asarray(space.coordinates)
     component = np.asarray(space.ids) % d
@@ -233,7 +244,8 @@ def rigid_modes(
 
 
 def orthonormal(vectors: list[Any]) -> list[Any]:
-    """Return the vectors made orthonormal in place (Gram and Schmidt, twice); those that vanish are left out."""
+    """Return the vectors made orthonormal in place (Gram and Schmidt, twice); those that vanish are
+    left out."""
     kept: list[Any] = []
     for vector in vectors:
         before = vector.norm()

@@ -1,15 +1,18 @@
-"""Solve a step by projected conjugate gradients on all unknowns (MPRGP), after a search that went in circles.
+"""Solve a step by projected conjugate gradients on all unknowns (MPRGP), after a search that went
+in circles.
 
-min ½ rᵀG r + qᵀr over r >= lower (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer 2009, algorithm 5.8).
-With g = q + G r, the free gradient is phi = g where r is off its bound, and the chopped gradient beta = min(g, 0) where
-it is on it. As long as beta is small beside phi, go on with conjugate gradients on the present face; a step that would
-leave the bounds is cut there and followed by a projected gradient step of fixed length (expansion); otherwise release
-rows along -beta (proportioning). The energy falls in every step, so that it cannot cycle.
+min ½ rᵀG r + qᵀr over r >= lower (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer
+2009, algorithm 5.8). With g = q + G r, the free gradient is phi = g where r is off its bound, and
+the chopped gradient beta = min(g, 0) where it is on it. As long as beta is small beside phi, go on
+with conjugate gradients on the present face; a step that would leave the bounds is cut there and
+followed by a projected gradient step of fixed length (expansion); otherwise release rows along
+-beta (proportioning). The energy falls in every step, so that it cannot cycle.
 
-Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <= bound is a lower bound and lengths and
-forces compare; on a face the preconditioner of the route is used. The springs that are closed are given while the
-bounds are searched; then they are taken from the answer, and a search along the line to it, which makes the energy as
-small as can be, keeps this Newton iteration from cycling."""
+Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <= bound is a lower
+bound and lengths and forces compare; on a face the preconditioner of the route is used. The springs
+that are closed are given while the bounds are searched; then they are taken from the answer, and a
+search along the line to it, which makes the energy as small as can be, keeps this Newton iteration
+from cycling."""
 
 import numpy as np
 
@@ -19,7 +22,9 @@ from .search import FALL, Search
 
 ROUNDS = 50  # of springs that open and close
 PROPORTION = 1.0  # of beta to phi; any positive number works, 1 is Dostál's choice
-STEP = 1.5  # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the estimate
+# of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the
+# estimate
+STEP = 1.5
 
 
 class Projected:
@@ -58,7 +63,8 @@ class Projected:
         return self._root * masked(self._root * phi)
 
     def solve(self, x: Array) -> tuple[Array, int]:
-        """Return (x, reason) of the search from x; the closed set of ``contact`` is then that of x."""
+        """Return (x, reason) of the search from x; the closed set of ``contact`` is then that of
+        x."""
         of = self.of
         x = of.contact.feasible(x)
         start = np.maximum(-self._root * x, self.lower)
@@ -93,7 +99,8 @@ class Projected:
 
 
 class Face:
-    """Hold the iterate: r, its gradient split into phi and beta, and the conjugate direction on the present face."""
+    """Hold the iterate: r, its gradient split into phi and beta, and the conjugate direction on the
+    present face."""
 
     def __init__(self, problem: Projected, start: Array, gradient: Array, step: float) -> None:
         self._problem, self._step = problem, step
@@ -171,7 +178,8 @@ def largest_eigenvalue(of: Search, diagonal: Array, rounds: int = 15) -> float:
 def projected_gradients(
     of: Search, diagonal: Array, norm: float, x: Array
 ) -> tuple[Array, Array, int]:
-    """Return (x, residual formed afresh, reason) of the step from x: SOLVED, or why there is no answer. Collective."""
+    """Return (x, residual formed afresh, reason) of the step from x: SOLVED, or why there is no
+    answer. Collective."""
     contact, residual = of.contact, of.load
     for _ in range(ROUNDS):
         try:
@@ -192,7 +200,8 @@ def projected_gradients(
 
 
 def _length(of: Search, x: Array, d: Array) -> float:
-    """The t in (0, 1] at which ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)² is smallest along d: a zero of its slope."""
+    """The t in (0, 1] at which ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)² is smallest along d: a
+    zero of its slope."""
     contact = of.contact
     contact.close_springs(None)
     of.take_set()

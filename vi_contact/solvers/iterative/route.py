@@ -1,10 +1,12 @@
-"""Solve the step on all unknowns by conjugate gradients: nothing is factorised, condensed or gathered.
+"""Solve the step on all unknowns by conjugate gradients: nothing is factorised, condensed or
+gathered.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
-The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not end, goes to
-projected gradients, which decrease the energy in every step and so cannot cycle (``projected_gradients``). Steps with
-friction take semismooth Newton and GMRES instead (``friction``)."""
+The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not
+end, goes to projected gradients, which decrease the energy in every step and so cannot cycle
+(``projected_gradients``). Steps with friction take semismooth Newton and GMRES instead
+(``friction``)."""
 
 import logging
 from collections.abc import Mapping
@@ -51,18 +53,21 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Iterative:
-    """Solve each step on all unknowns by conjugate gradients, on any number of ranks, and hold the settings for it.
+    """Solve each step on all unknowns by conjugate gradients, on any number of ranks, and hold the
+    settings for it.
 
-    Attributes:
-        preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg" (algebraic multigrid
-            with rigid body modes), or "auto", which takes the first up to a Courant number of 0.5 in A, the second up
-            to 30, and the third beyond. PETSc's options may name another.
-        petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold": 0.02}; those of ICC
-            begin with sub_pc_. Options of the command line override them. One that nothing reads is refused.
+    Attributes: preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank),
+        "gamg" (algebraic multigrid
+            with rigid body modes), or "auto", which takes the first up to a Courant number of 0.5
+            in A, the second up to 30, and the third beyond. PETSc's options may name another.
+        petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold":
+            0.02}; those of ICC begin with sub_pc_. Options of the command line override them. One
+            that nothing reads is refused.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
-        tolerance: it stops when the residual, measured as the certificate, and the estimated error are below this.
-        changes: number of changes of the contact set in a step without friction; after more, or when a set comes
-            twice, projected gradients continue.
+        tolerance: it stops when the residual, measured as the certificate, and the estimated error
+            are below this.
+        changes: number of changes of the contact set in a step without friction; after more, or
+            when a set comes twice, projected gradients continue.
         patience: number of linear iterations within which the residual has to fall tenfold."""
 
     preconditioner: str = AUTO
@@ -83,23 +88,27 @@ class Iterative:
         whole("Iterative", "changes", self.changes)
         if not self.tolerance < 1.0:
             raise InputError(
-                f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, such as "
+                f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, "
+                "such as "
                 "3e-10"
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of values."""
+        """Raise InputError for friction without a tangential direction, or of a wrong number of
+        values."""
         check_laws("Iterative()", problem)
 
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedIterative":
-        """Choose and make the preconditioner; collective. InputError for options that cannot work."""
+        """Choose and make the preconditioner; collective. InputError for options that cannot
+        work."""
         return PreparedIterative(self, A, surface, scale)
 
 
 class PreparedIterative:
-    """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``: PETSc's object."""
+    """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``:
+    PETSc's object."""
 
     def __init__(
         self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float
@@ -157,7 +166,8 @@ class PreparedIterative:
         return self._cg.ksp
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure, on all ranks, with the history of residuals when there is no answer."""
+        """Return the step; StepFailure, on all ranks, with the history of residuals when there is
+        no answer."""
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:
@@ -181,7 +191,8 @@ class PreparedIterative:
             return self._solve(step) if step.slip0 is None else self._friction.solve(step)
         except PETSc.Error as error:
             if error.__cause__ is not None:
-                raise error.__cause__ from None  # raised in one of our callbacks; PETSc before 3.22 passes it on
+                # raised in one of our callbacks; PETSc before 3.22 passes it on
+                raise error.__cause__ from None
             raise raised(self._name, error) from error
 
     @cached_property

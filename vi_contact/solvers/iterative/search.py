@@ -1,13 +1,14 @@
 """Find the contact set of a step by conjugate gradients that stop as soon as a sign is wrong.
 
-A primal-dual active set method (M. Hintermüller, K. Ito, K. Kunisch, The primal-dual active set strategy as a
-semismooth Newton method, SIAM J. Optim. 13, 2003, 865-888) with inexact solves. With S the closed set and F = A x - b,
+A primal-dual active set method (M. Hintermüller, K. Ito, K. Kunisch, The primal-dual active set
+strategy as a semismooth Newton method, SIAM J. Optim. 13, 2003, 865-888) with inexact solves. With
+S the closed set and F = A x - b,
 
     x = bound on S,    F = 0 off S,    S <- (S less where -F < 0) and where x > bound.
 
-Whenever the residual off S has fallen tenfold the signs are looked at; one that is wrong by more than the residual will
-not come right, and the set changes there and then. In the end F is formed afresh, and the signs have to hold to the
-last digit that the certificate sees."""
+Whenever the residual off S has fallen tenfold the signs are looked at; one that is wrong by more
+than the residual will not come right, and the set changes there and then. In the end F is formed
+afresh, and the signs have to hold to the last digit that the certificate sees."""
 
 from collections.abc import Callable
 
@@ -51,7 +52,8 @@ class Search:
         self.take_set()
 
     def take_set(self) -> bool:
-        """Take the closed set of ``contact``: mask, springs, load, preconditioner. False for one met before."""
+        """Take the closed set of ``contact``: mask, springs, load, preconditioner. False for one
+        met before."""
         contact = self.contact
         self.masked.weights = contact.weights()
         self.operator.set_springs(*contact.sprung)
@@ -63,7 +65,8 @@ class Search:
         return not known
 
     def watch(self, iteration: int, residual: Array, at: Callable[[], Array]) -> int:
-        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on. ``at()``: x."""
+        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on. ``at()``:
+        x."""
         norm = largest_free(self.comm, residual, self.masked.weights)
         if not np.isfinite(norm):
             return NOT_A_NUMBER
@@ -89,7 +92,8 @@ class Search:
         self.history.append(norm / self.scales.force if self.scales.force > 0.0 else norm)
 
     def wrong(self, x: Array, residual: Array, error: float) -> Mask:
-        """Return the conditions of this rank whose signs are wrong by more than the error, the largest residual."""
+        """Return the conditions of this rank whose signs are wrong by more than the error, the
+        largest residual."""
         r = self.contact.reactions(x, residual)
         least = 0.5 * self.tolerance * self.scales.reaction
         return self.contact.wrong(
@@ -107,8 +111,9 @@ class Search:
         return norm <= self.tolerance * self.scales.force
 
     def change(self, wrong: Mask, x: Array, residual: Array) -> tuple[Array, Array, bool]:
-        """Change the set, and return (x, residual, whether the set is a new one): a product where a rigid support
-        closes. One that opens leaves the residual as it is, and springs change it in their rows alone."""
+        """Change the set, and return (x, residual, whether the set is a new one): a product where a
+        rigid support closes. One that opens leaves the residual as it is, and springs change it in
+        their rows alone."""
         contact = self.contact
         moves = largest(self.comm, np.any(wrong & ~contact.closed & ~contact.soft))
         before = contact.spring_forces(x)
@@ -124,8 +129,9 @@ class Search:
 def search(
     of: Search, cg: ConjugateGradients, x: Array, changes: int
 ) -> tuple[Array, Array, int, int]:
-    """Return (x, residual, changes of the set, reason) of the search from x. The reason is SOLVED, or PETSc's for
-    stopping, or WRONG_SIGNS when a set came twice or the set changed more often than ``changes``. Collective."""
+    """Return (x, residual, changes of the set, reason) of the search from x. The reason is SOLVED,
+    or PETSc's for stopping, or WRONG_SIGNS when a set came twice or the set changed more often than
+    ``changes``. Collective."""
     contact, count, refinements = of.contact, 0, 0
     contact.place(x)
     residual = of.load - (of.operator @ x)

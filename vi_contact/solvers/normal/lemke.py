@@ -2,16 +2,18 @@
 
     w = q + G r + z d,    0 <= r  perpendicular to  w >= 0,    z >= 0                                               (2)
 
-With z as large as the violation of r = 0, that r solves (2). Every pivot takes the complement of what left the basis
-into it, z moves, and when z leaves the basis r solves problem (1) of ``lcp``. Ties among rows go to the lexicographic
-minimum of (q, inverse of the basis), so that no basis returns; d has numbers from 1 to 2, since ones tie rows of equal
-q, which took m²/2 pivots. Sources: Lemke, Management Sci. 11, 1965; Cottle, Pang and Stone, The Linear Complementarity
-Problem, 1992, section 4.4.
+With z as large as the violation of r = 0, that r solves (2). Every pivot takes the complement of
+what left the basis into it, z moves, and when z leaves the basis r solves problem (1) of ``lcp``.
+Ties among rows go to the lexicographic minimum of (q, inverse of the basis), so that no basis
+returns; d has numbers from 1 to 2, since ones tie rows of equal q, which took m²/2 pivots. Sources:
+Lemke, Management Sci. 11, 1965; Cottle, Pang and Stone, The Linear Complementarity Problem, 1992,
+section 4.4.
 
-It ends in the one solution of a P-matrix (``p_matrix``); of a copositive-plus G, which one with positive definite
-symmetric part is, in a solution or, where there is none, on a ray: a basis that nothing has to leave. For other G a ray
-proves nothing, and of several solutions it finds one. About m pivots are usual, 2^m possible (Murty, Math. Program.
-Study 7, 1978); each costs 4 m² products on m rows. Bilateral rows are eliminated before."""
+It ends in the one solution of a P-matrix (``p_matrix``); of a copositive-plus G, which one with
+positive definite symmetric part is, in a solution or, where there is none, on a ray: a basis that
+nothing has to leave. For other G a ray proves nothing, and of several solutions it finds one. About
+m pivots are usual, 2^m possible (Murty, Math. Program. Study 7, 1978); each costs 4 m² products on
+m rows. Bilateral rows are eliminated before."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -30,10 +32,12 @@ TIED = 1e-13  # ratios that rounding alone may tell apart
 
 @dataclass(frozen=True)
 class Lemke:
-    """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations``: pivots allowed.
+    """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations``: pivots
+    allowed.
 
-    In the result ``iterations`` counts pivots (0: the guessed set was right), ``history`` is z after each, over the
-    violation of r = 0. Where (1) has several solutions the guess may choose among them."""
+    In the result ``iterations`` counts pivots (0: the guessed set was right), ``history`` is z
+    after each, over the violation of r = 0. Where (1) has several solutions the guess may choose
+    among them."""
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
     tolerance: float = 1e-9
@@ -43,20 +47,23 @@ class Lemke:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
-        """Check any square G (m, m) and eliminate its bilateral rows. InputError when those depend on each other."""
+        """Check any square G (m, m) and eliminate its bilateral rows. InputError when those depend
+        on each other."""
         scaled = scaled_dense(G, bilateral, unsymmetric=True)
         return PreparedLCP(self, scaled, _Pivots(self, scaled).search)
 
 
 class _Pivots:
-    """The pivots of one G: its unilateral rows with bilateral ones eliminated, and what carries the q of those."""
+    """The pivots of one G: its unilateral rows with bilateral ones eliminated, and what carries the
+    q of those."""
 
     def __init__(self, method: Lemke, scaled: ScaledLCP) -> None:
         self.method, self._scaled = method, scaled
         G, b = scaled.matrix, scaled.bilateral
         if b.any() and np.linalg.cond(G[np.ix_(b, b)]) > 0.1 / EPS:
             raise InputError(
-                "bilateral rows of the Delassus operator depend on each other: remove constraints that "
+                "bilateral rows of the Delassus operator depend on each other: remove constraints "
+                "that "
                 "act on the same motion twice"
             )
         self._carry = np.linalg.solve(G[np.ix_(b, b)].T, G[:, b].T).T
@@ -78,7 +85,8 @@ class _Pivots:
         return r, residual / unit, len(history), history
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
-        """r >= 0 with w = 0 on the set and bilateral rows, and its residual: infinite where that has no one answer."""
+        """r >= 0 with w = 0 on the set and bilateral rows, and its residual: infinite where that
+        has no one answer."""
         G, bilateral, r = self._scaled.matrix, self._scaled.bilateral, np.zeros(gap.size)
         closed = np.flatnonzero((active & (gap < np.inf)) | bilateral)
         try:
@@ -122,12 +130,14 @@ class _Pivots:
 
 
 def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
-    """The row that is first at zero when a variable enters: z, or of tied rows the lexicographic minimum."""
+    """The row that is first at zero when a variable enters: z, or of tied rows the lexicographic
+    minimum."""
     m, column = len(tableau), tableau[:, entering]
     rows = np.flatnonzero(column > TINY * max_abs(column))
     if not rows.size:
         raise StepFailure(
-            f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is not "
+            f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is "
+            "not "
             "copositive-plus; take a smaller time step, a finer mesh, or a symmetric G"
         )
     for place in (-1, *range(m)):

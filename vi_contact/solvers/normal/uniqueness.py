@@ -18,7 +18,8 @@ NONE = "is no P-matrix, a principal minor is not positive: contact may have no s
 
 @dataclass(frozen=True)
 class PMatrix:
-    """Hold whether a matrix is a P-matrix (``holds``; None where that is not known), and the reason (``sentence``)."""
+    """Hold whether a matrix is a P-matrix (``holds``; None where that is not known), and the reason
+    (``sentence``)."""
 
     holds: bool | None
     sentence: str
@@ -27,9 +28,10 @@ class PMatrix:
 def p_matrix(G: Array) -> PMatrix:
     """Return whether G (m, m) is a P-matrix. InputError unless it is square and finite.
 
-    One with positive definite symmetric part is. Where that is not, up to 18 rows are tested by the recursion of
-    Tsatsomeros and Li (BIT 40, 2000): G is one if G_11 > 0, and G without row and column 1 and the Schur complement of
-    G_11 are. Bounds of the rounding errors go along: a minor within them of zero decides nothing."""
+    One with positive definite symmetric part is. Where that is not, up to 18 rows are tested by the
+    recursion of Tsatsomeros and Li (BIT 40, 2000): G is one if G_11 > 0, and G without row and
+    column 1 and the Schur complement of G_11 are. Bounds of the rounding errors go along: a minor
+    within them of zero decides nothing."""
     G = array("p_matrix", "G", G, (None, None))
     check_operator(G, np.zeros(len(G), dtype=bool))
     if not (G.diagonal() > 0.0).all():
@@ -66,7 +68,8 @@ def p_matrix(G: Array) -> PMatrix:
 
 @np.errstate(all="ignore")  # entries that overflow decide nothing
 def _complements(parts: Array, errors: Array) -> tuple[Array, Array]:
-    """Schur complements of the first entries of many matrices, and what their entries may be wrong by."""
+    """Schur complements of the first entries of many matrices, and what their entries may be wrong
+    by."""
     pivots, column, row = parts[:, :1, :1], parts[:, 1:, :1], parts[:, :1, 1:]
     within, below, beside = errors[:, :1, :1], errors[:, 1:, :1], errors[:, :1, 1:]
     taken, doubt = column * row / pivots, below * (np.abs(row) + beside) + np.abs(column) * beside

@@ -1,4 +1,5 @@
-"""Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no condensation."""
+"""Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no
+condensation."""
 
 from ...core.lazy import lazy
 

@@ -1,5 +1,6 @@
 # ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
+# __all__.
 from .route import Volume as Volume
 from .snes import ReducedNewton as ReducedNewton
 from .snes import SemismoothNewton as SemismoothNewton

@@ -2,13 +2,15 @@
 
     lower <= z <= upper,   A z - b >= 0 where z = lower,  <= 0 where z = upper,  = 0 elsewhere
 
-On a rigid support z = x and the bounded unknowns are the normal displacements. A point on a spring k = scale/compliance
-keeps law (5) of the boundary method on an enlarged body (the remark after its eq. 6): the far end w = x_n - compliance
-r_n / scale of the spring is a further unknown, and the bound is on w,
+On a rigid support z = x and the bounded unknowns are the normal displacements. A point on a spring
+k = scale/compliance keeps law (5) of the boundary method on an enlarged body (the remark after its
+eq. 6): the far end w = x_n - compliance r_n / scale of the spring is a further unknown, and the
+bound is on w,
 
     z = (x, w),    [[A + Bᵀ k B, -Bᵀ k], [-k B, k]] z = (b, 0) - reactions,    w <= bound.
 
-The spring unknowns of a rank follow its body unknowns. Contact arrays (m,) are of the conditions that this rank owns.
+The spring unknowns of a rank follow its body unknowns. Contact arrays (m,) are of the conditions
+that this rank owns.
 """
 
 from typing import Any
@@ -24,13 +26,12 @@ from ..petsc import PETSc
 
 
 class BoundedSystem:
-    """Hold A, the contact surface and its springs as one system of ``size`` unknowns here, ``bounded`` of them bounded.
+    """Hold A, the contact surface and its springs as one system of ``size`` unknowns here,
+    ``bounded`` of them bounded.
 
-    Attributes:
-        soft: (m,) True where the support is a spring.
-        spring, feet: stiffness k of these springs, in the unit of A, and the positions in x of their body ends.
-        bounded: (m,) position of the bounded unknown in z.
-        symmetric: whether A is."""
+    Attributes: soft: (m,) True where the support is a spring. spring, feet: stiffness k of these
+        springs, in the unit of A, and the positions in x of their body ends. bounded: (m,) position
+        of the bounded unknown in z. symmetric: whether A is."""
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self.A, self.surface, self.scale = A, surface, scale
@@ -68,10 +69,12 @@ class BoundedSystem:
         return np.concatenate([b, np.zeros(self.size - self.rows)])
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
-        """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
+        """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free,
+        bilateral or not."""
         if self.surface.some(np.isnan(step.bound)):
             raise InputError(
-                "the bound of the contact conditions contains NaN: check the gap and the time scheme"
+                "the bound of the contact conditions contains NaN: check the gap and the time "
+                "scheme"
             )
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         if step.lower is not None:
@@ -89,7 +92,8 @@ class BoundedSystem:
         return z
 
     def reactions(self, f: Array) -> Array:
-        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Valid where the bound is active."""
+        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Valid where the
+        bound is active."""
         return np.asarray(-f[self.bounded])
 
     def norm(self) -> float:
@@ -102,7 +106,8 @@ class BoundedSystem:
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assembled(self) -> Any:
-        """Return A with its springs as an AIJ matrix: the given one when it is a PETSc matrix without springs."""
+        """Return A with its springs as an AIJ matrix: the given one when it is a PETSc matrix
+        without springs."""
         mat = assembled(self.A)
         if not self.surface.some(self.soft):
             return mat
@@ -126,14 +131,16 @@ def assembled(A: EffectiveMatrix) -> Any:
 
 
 def aij(rows: sp.csr_matrix, comm: Any) -> Any:
-    """Return the square AIJ matrix with these rows of this rank, columns numbered over all ranks. Collective."""
+    """Return the square AIJ matrix with these rows of this rank, columns numbered over all ranks.
+    Collective."""
     size, kind = (rows.shape[0], None), PETSc.IntType
     arrays = rows.indptr.astype(kind), rows.indices.astype(kind), rows.data
     return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=comm)
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
-    """Return this rank's first global number, global column numbers and total, where ranks' parts grow at their end."""
+    """Return this rank's first global number, global column numbers and total, where ranks' parts
+    grow at their end."""
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)

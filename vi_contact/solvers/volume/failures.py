@@ -1,6 +1,7 @@
 """Put PETSc's reasons for stopping into words, and make StepFailures of them.
 
-PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here."""
+PETSc 3.25 has other names for some reasons and other words for some errors; both are settled
+here."""
 
 import re
 import tomllib
@@ -32,7 +33,8 @@ GENERAL_ADVICE = (
 
 
 def name_of(reasons: type, reason: int) -> str:
-    """Return the longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_..., DIVERGED_..."""
+    """Return the longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_...,
+    DIVERGED_..."""
     names = [
         name
         for name, value in vars(reasons).items()
@@ -46,7 +48,8 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
     name = name_of(reasons, reason)
     words = WORDS.get(name, "no convergence")
     return StepFailure(
-        f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, {name} "
+        f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, "
+        f"{name} "
         f"({words}): {ADVICE.get(name, GENERAL_ADVICE)}"
     )
 

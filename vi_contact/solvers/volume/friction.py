@@ -1,12 +1,14 @@
-"""Solve friction on the volume route: Coulomb's law as a sequence of Tresca problems on all unknowns, by SNES.
+"""Solve friction on the volume route: Coulomb's law as a sequence of Tresca problems on all
+unknowns, by SNES.
 
     s <- cohesion + slope max(r_n(s), 0)
 
 Every problem of given thresholds s is solved to round-off, as the mixed complementarity problem of
-volume_friction_system.py; Tresca's law is one such problem. It shares nothing with the condensed route but A, b and the
-extrapolation of thresholds; references: ``friction.fixed_point``. The first problem of Coulomb's law is without
-friction, every other starts from the solution before, its sliding points on their new thresholds, and then mostly costs
-one factorisation. A law that depends on the slip rate makes this a sequence of such sequences: ``friction.slip_rate``.
+volume_friction_system.py; Tresca's law is one such problem. It shares nothing with the condensed
+route but A, b and the extrapolation of thresholds; references: ``friction.fixed_point``. The first
+problem of Coulomb's law is without friction, every other starts from the solution before, its
+sliding points on their new thresholds, and then mostly costs one factorisation. A law that depends
+on the slip rate makes this a sequence of such sequences: ``friction.slip_rate``.
 """
 
 from dataclasses import dataclass
@@ -33,7 +35,8 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 
 @dataclass(frozen=True)
 class Found:
-    """Hold the solution of one problem or of a sequence: r_n (m,), slip (L,), 0 where points stick, SNES iterations."""
+    """Hold the solution of one problem or of a sequence: r_n (m,), slip (L,), 0 where points stick,
+    SNES iterations."""
 
     state: FrictionUnknowns
     r_n: Array
@@ -51,7 +54,8 @@ class VolumeFriction:
         self._body, self._friction = scaled.system, scaled.friction
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
+        """Return the step; StepFailure with PETSc's reason, or when the thresholds do not
+        settle."""
         surface = self._body.surface
         rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
         cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
@@ -68,8 +72,9 @@ class VolumeFriction:
     def _sequence(
         self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None
     ) -> Found:
-        """Coulomb's problem with a coefficient (m,) that is given, from the solution of another one. The thresholds are
-        those of all conditions: every rank extrapolates and judges them alike."""
+        """Coulomb's problem with a coefficient (m,) that is given, from the solution of another
+        one. The thresholds are those of all conditions: every rank extrapolates and judges them
+        alike."""
         following, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
         surface = self._body.surface
@@ -95,13 +100,14 @@ class VolumeFriction:
             limit = np.maximum(following(limit, new), 0.0)
             start = self._scaled.moved(found.state, found.slip, limit[mine])
         raise StepFailure(
-            f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} "
+            f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of "
+            f"{history[-1]:.1e} "
             "of the friction thresholds: take a smaller step of time or load, or use Condensed()"
         )
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
-        """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip
-        gives the directions that Newton's method needs."""
+        """The guess, sliding as predicted, and no iterations; with disks the solution without
+        friction, whose slip gives the directions that Newton's method needs."""
         friction, scaled, own = self._friction, self._scaled, limit[self._body.surface.slots]
         state = FrictionUnknowns(
             self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs))
@@ -120,7 +126,8 @@ class VolumeFriction:
         return Found(state, r_n, active, scaled.slip(state.z, scaled.sliding(y)), iterations)
 
     def _result(self, step: StepProblem, found: Found) -> StepResult:
-        """x, with sticking points put exactly where they were, and r_t within the last digit of its disk."""
+        """x, with sticking points put exactly where they were, and r_t within the last digit of its
+        disk."""
         surface, friction = self._body.surface, self._friction
         law = step.friction_at(friction.by_point(found.slip))
         limit = limit_of(law, found.r_n, surface.weights, step.scale)

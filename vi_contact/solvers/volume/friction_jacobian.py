@@ -1,4 +1,5 @@
-"""Build the Jacobian of a step with friction: H = A x_ref/r_ref, B_t, and in 3D what lambda and gamma make of it."""
+"""Build the Jacobian of a step with friction: H = A x_ref/r_ref, B_t, and in 3D what lambda and
+gamma make of it."""
 
 import weakref
 from typing import Any
@@ -15,7 +16,8 @@ Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 
 
 class FrictionJacobian:
-    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix, with the names of that function."""
+    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix, with the names of
+    that function."""
 
     def __init__(self, scaled: ScaledFrictionStep) -> None:
         self._system: FrictionSystem = scaled.friction
@@ -36,7 +38,8 @@ class FrictionJacobian:
         self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
     def _entries(self) -> tuple[int, dict[str, Entries]]:
-        """How many columns there are on all ranks, and the parts of the matrix; zeros for what changes."""
+        """How many columns there are on all ranks, and the parts of the matrix; zeros for what
+        changes."""
         system = self._system
         body, line, pairs = system.body, system.line, system.pairs
         indptr, columns, A = _rows_of(body)

@@ -1,25 +1,29 @@
-"""Write a step with Tresca's thresholds s given as a mixed complementarity problem in simple bounds.
+"""Write a step with Tresca's thresholds s given as a mixed complementarity problem in simple
+bounds.
 
-The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that has one free tangent
-(2D) carries
+The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that
+has one free tangent (2D) carries
 
     F_lambda = slip0 - B_t x,     -s <= lambda <= s:     0 where lambda is inside, <= 0 where lambda = s, >= 0 at -s
 
-which is |r_t| <= s, r_t along the slip. A point with two (3D) carries the disk itself, no polygon: with the speed
-factor gamma >= 0 of the slip, slip = gamma r_t,
+which is |r_t| <= s, r_t along the slip. A point with two (3D) carries the disk itself, no polygon:
+with the speed factor gamma >= 0 of the slip, slip = gamma r_t,
 
     F_lambda = slip0 - B_t x + gamma lambda = 0,     F_gamma = (s² - |lambda|²)/s >= 0  ⊥  gamma >= 0.
 
-The equations of the body gain B_tᵀ lambda. Where s = 0 the bounds hold lambda and gamma at zero. In 2D everything is
-linear and monotone; 3D has one solution too, the multiplier of a convex problem. The Jacobian is not symmetric.
+The equations of the body gain B_tᵀ lambda. Where s = 0 the bounds hold lambda and gamma at zero. In
+2D everything is linear and monotone; 3D has one solution too, the multiplier of a convex problem.
+The Jacobian is not symmetric.
 
-VINEWTONRSLS reads its next active set off the signs of F after a projection. F_lambda knows nothing of the projected
-lambda, F_gamma nothing of the projected gamma: both are zero but for rounding there, and the iteration would cycle, or
-end by luck. So SNES sees, with the diagonal c of A and E the residual of the body, which vanish at the solution,
+VINEWTONRSLS reads its next active set off the signs of F after a projection. F_lambda knows nothing
+of the projected lambda, F_gamma nothing of the projected gamma: both are zero but for rounding
+there, and the iteration would cycle, or end by luck. So SNES sees, with the diagonal c of A and E
+the residual of the body, which vanish at the solution,
 
     F_lambda + E_t / c      and      F_gamma + c lambda·F_lambda / s,
 
-whose signs after a projection say how far the unknown had gone beyond: the rule of the primal-dual active set method.
+whose signs after a projection say how far the unknown had gone beyond: the rule of the primal-dual
+active set method.
 """
 
 from dataclasses import dataclass
@@ -34,12 +38,13 @@ from .scaled_step import ScaledStep, fraction
 
 
 class FrictionSystem:
-    """Number the unknowns of a rank: z of ``body``, then lambda of the free tangents, point by point, then gamma.
+    """Number the unknowns of a rank: z of ``body``, then lambda of the free tangents, point by
+    point, then gamma.
 
-    Attributes:
-        point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A of each lambda.
-        disk: (m,) True for points with two free tangents; ``any_disk``: whether some rank has one.
-        pairs: (D, 2) places of their lambdas; line: (L,) True for the other lambdas."""
+    Attributes: point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A
+        of each lambda. disk: (m,) True for points with two free tangents; ``any_disk``: whether
+        some rank has one. pairs: (D, 2) places of their lambdas; line: (L,) True for the other
+        lambdas."""
 
     def __init__(self, body: BoundedSystem) -> None:
         self.body, self.surface = body, body.surface
@@ -80,7 +85,8 @@ class FrictionUnknowns:
 
 
 class ScaledFrictionStep(ScaledStep):
-    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds, for the step and limits set last."""
+    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds, for the step and
+    limits set last."""
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
         super().__init__(friction.body, tolerance)
@@ -158,7 +164,8 @@ class ScaledFrictionStep(ScaledStep):
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the errors as without friction; the second counts what is wrong in slips and disks too."""
+        """Return the errors as without friction; the second counts what is wrong in slips and disks
+        too."""
         friction, s = self.friction, self.disk_limits
         _, reaction, gamma = friction.split(y)
         body, still, room = self._parts(y)
@@ -196,7 +203,8 @@ class ScaledFrictionStep(ScaledStep):
         return np.where(sliding[friction.point], moved, 0.0)
 
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
-        """Return the state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
+        """Return the state with reactions in new disks (m,): sliding points on their edge, along
+        their slip (L,)."""
         friction, s = self.friction, limit
         way, inside = friction.by_point(slip), project(friction.by_point(state.reaction), s)
         speed = np.linalg.norm(way, axis=1)

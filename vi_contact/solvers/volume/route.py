@@ -1,10 +1,12 @@
-"""Solve the step on all unknowns, by PETSc's solvers for variational inequalities and bounds: the volume route.
+"""Solve the step on all unknowns, by PETSc's solvers for variational inequalities and bounds: the
+volume route.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
-In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO know of contact. With
-friction the tangential reactions become bounded unknowns too (``friction``); then there is nothing to minimise,
-and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO."""
+In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO
+know of contact. With friction the tangential reactions become bounded unknowns too (``friction``);
+then there is nothing to minimise, and only SNES can do it. Reference: PETSc manual, chapters SNES
+(variational inequalities) and TAO."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -31,8 +33,8 @@ __all__ = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 
 
 class Method(Protocol):
-    """Say how the bounded problem is solved: settings that make a driver. One that ``carries_friction`` makes two, as
-    ReducedNewton does."""
+    """Say how the bounded problem is solved: settings that make a driver. One that
+    ``carries_friction`` makes two, as ReducedNewton does."""
 
     @property
     def carries_friction(self) -> bool: ...
@@ -45,12 +47,14 @@ class Method(Protocol):
 class Volume:
     """Solve each step on all unknowns of the body by PETSc, and hold the settings for it.
 
-    Attributes:
-        method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
-        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them. One
-            that nothing has read by the end of the first step with an iteration is refused, with the nearest known.
+    Attributes: method: ReducedNewton (the reference), SemismoothNewton or TaoTron. petsc_options:
+        PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them.
+        One
+            that nothing has read by the end of the first step with an iteration is refused, with
+            the nearest known.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
-        tolerance: the largest relative error that is accepted when a solver stops improving above round-off."""
+        tolerance: the largest relative error that is accepted when a solver stops improving above
+            round-off."""
 
     method: Method = field(default_factory=ReducedNewton)
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)
@@ -75,11 +79,13 @@ class Volume:
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction that the method cannot carry, without a tangent, or of wrong length."""
+        """Raise InputError for friction that the method cannot carry, without a tangent, or of
+        wrong length."""
         if problem.frictional and not self.method.carries_friction:
             raise InputError(
                 f"Volume({self.method}) only enforces bounds on displacements and would ignore "
-                f"{problem.friction}: use Volume(ReducedNewton()), or Condensed(), the condensed route"
+                f"{problem.friction}: use Volume(ReducedNewton()), or Condensed(), the condensed "
+                "route"
             )
         check_laws(
             f"Volume({self.method})", problem, unsymmetric=not isinstance(self.method, TaoTron)
@@ -88,14 +94,16 @@ class Volume:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedVolume":
-        """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
+        """Return the solver for one effective matrix; collective. InputError for options that
+        cannot work."""
         return PreparedVolume(self, A, surface, scale)
 
 
 class PreparedVolume:
     """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
-    Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is collective."""
+    Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is
+    collective."""
 
     def __init__(
         self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float
@@ -122,7 +130,8 @@ class PreparedVolume:
         )
 
     def _friction_method(self) -> VolumeFriction:
-        """The problem with friction, made at the first step that has some, in the place of the other one."""
+        """The problem with friction, made at the first step that has some, in the place of the
+        other one."""
         if self._friction is None:
             self.close()
             method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
@@ -159,7 +168,8 @@ class PreparedVolume:
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:
-                raise error.__cause__ from None  # raised in one of our callbacks; PETSc before 3.22 passes it on
+                # raised in one of our callbacks; PETSc before 3.22 passes it on
+                raise error.__cause__ from None
             raise raised(self._name, error) from error
         except StepFailure:
             self.close()
@@ -168,11 +178,13 @@ class PreparedVolume:
         return found
 
     def excuse_options(self) -> None:
-        """Take options that nothing reads: they are for another method, in whose place this one is tried."""
+        """Take options that nothing reads: they are for another method, in whose place this one is
+        tried."""
         self._all_read = True
 
     def _refuse_unread(self, iterations: int) -> None:
-        """Raise InputError for options that nothing has read, once the parts of the solver have been at work."""
+        """Raise InputError for options that nothing has read, once the parts of the solver have
+        been at work."""
         if iterations and not self._all_read:
             self._all_read = True
             self._layers.refuse_unread(self._name, self._comm)

@@ -1,6 +1,8 @@
-"""Solve by PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a second opinion.
+"""Solve by PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a
+second opinion.
 
-TAO's tolerances and trust regions are absolute, harmless in a scaled step; ``ScaledStep.verdict`` judges convergence.
+TAO's tolerances and trust regions are absolute, harmless in a scaled step; ``ScaledStep.verdict``
+judges convergence.
 """
 
 from dataclasses import dataclass
@@ -16,8 +18,9 @@ from .snes import AssembledJacobian, weakly, write_bounds
 
 
 def check_tao(tao: Any, layers: OptionLayers) -> None:
-    """Refuse other types and preconditioners that give wrong answers, also when they come from options
-    (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as converged)."""
+    """Refuse other types and preconditioners that give wrong answers, also when they come from
+    options (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as
+    converged)."""
     if tao.getType() != "tron":
         refuse(
             f"TAO type {tao.getType()}",
@@ -76,7 +79,8 @@ class TaoDriver:
             item.destroy()
 
     def _test(self, tao: Any) -> int | None:
-        """PETSc's reason to stop: its own, which only the user's tolerances bring, then our verdict; None to go on."""
+        """PETSc's reason to stop: its own, which only the user's tolerances bring, then our
+        verdict; None to go on."""
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
@@ -91,15 +95,18 @@ class TaoDriver:
 
 @dataclass(frozen=True)
 class TaoTron:
-    """Solve by TAO TRON: trust region Newton with projected searches, conjugate gradients and incomplete Cholesky.
+    """Solve by TAO TRON: trust region Newton with projected searches, conjugate gradients and
+    incomplete Cholesky.
 
-    Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they shrink its trust region.
+    Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they
+    shrink its trust region.
     """
 
     carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
-        """Return the options that come before the user's; PETSc has no incomplete Cholesky for several ranks."""
+        """Return the options that come before the user's; PETSc has no incomplete Cholesky for
+        several ranks."""
         return {**TABLES["tron"], "pc_type": "icc" if ranks == 1 else "bjacobi"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:

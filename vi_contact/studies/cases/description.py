@@ -1,4 +1,5 @@
-"""Describe the model that a case file makes, before any step: what ``run --check`` tells and model.json holds."""
+"""Describe the model that a case file makes, before any step: what ``run --check`` tells and
+model.json holds."""
 
 import json
 import tomllib
@@ -35,7 +36,8 @@ COARSER = (
 )
 ENERGY = 0.95  # of a record, the integral of |A(f)|², below the frequency that is told
 ROUNDED = 1e-9  # of a time step
-FEW = 10_000  # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
+# unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
+FEW = 10_000
 DIGITS = 10  # of a number: those beyond depend on the number of ranks
 RATIO_DIGITS = 4  # of the damping ratio of a mode, which is found less sharply than its period
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
@@ -46,17 +48,18 @@ def describe(
 ) -> dict[str, Any]:
     """Return what the model of a ``Case`` is, plain values in SI units; computes no step.
 
-    Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass, material);
-    supports (kind, groups, components); contact (name, points, size [m²], friction, nodes: a sentence, places, others:
-    kind -> places, sides: name, h and G of both); periods, damping_ratios
-    of their modes and rigid_motions with the contact closed where it touches at the start, and sticking where there is
-    friction; periods_open, the first one with it open, where it touches; damping: in words, "none" without; waves
-    (body, c_s, h: the longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
-    dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
+    Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass,
+    material); supports (kind, groups, components); contact (name, points, size [m²], friction,
+    nodes: a sentence, places, others: kind -> places, sides: name, h and G of both); periods,
+    damping_ratios of their modes and rigid_motions with the contact closed where it touches at the
+    start, and sticking where there is friction; periods_open, the first one with it open, where it
+    touches; damping: in words, "none" without; waves (body, c_s, h: the longest edge over the
+    degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale, dt, duration, pga,
+    f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
     defects and warnings: sentences.
 
-    parts: those of the case, when they are known; most: unknowns beyond which periods are left out. The same on any
-    number of ranks. InputError as of a run. Collective."""
+    parts: those of the case, when they are known; most: unknowns beyond which periods are left out.
+    The same on any number of ranks. InputError as of a run. Collective."""
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
     space = space_of("describe", problem.system)
@@ -140,7 +143,8 @@ def _word(value: Any) -> Any:
 def _body(
     space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, material: Any
 ) -> dict[str, Any]:
-    """What is made of one material, by the name of its cell group, with its slowest waves and longest edge."""
+    """What is made of one material, by the name of its cell group, with its slowest waves and
+    longest edge."""
     names = [
         name
         for name, one in tags.items()
@@ -167,7 +171,8 @@ def _body(
 
 
 def _supports(space: Any) -> Iterator[dict[str, Any]]:
-    """Yield what holds the bodies, moves them, absorbs or lets in waves, or ties sides to each other."""
+    """Yield what holds the bodies, moves them, absorbs or lets in waves, or ties sides to each
+    other."""
     held = [
         (
             "moved" if one.moves else "clamped" if one.components is None else "held",
@@ -186,7 +191,8 @@ def _supports(space: Any) -> Iterator[dict[str, Any]]:
 def _contact(
     case: Any, problem: ContactProblem, tags: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the parts of the contact, one for each table: by its name, or by those of its groups."""
+    """Yield the parts of the contact, one for each table: by its name, or by those of its
+    groups."""
     surface, tables = problem.surface, case.nodes.get("contact", ())
     nodes = tables if isinstance(tables, tuple) else (tables,)
     grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]
@@ -217,8 +223,9 @@ def _contact(
 def _sides(
     space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array
 ) -> list[dict[str, Any]]:
-    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair, of their facets that are no further
-    from the box of the contact points than an edge; none where a table has no two groups of facets."""
+    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair, of their facets
+    that are no further from the box of the contact points than an edge; none where a table has no
+    two groups of facets."""
     sides = [tags[name] for name in names if isinstance(tags.get(name), Facets)]
     if len(sides) != 2 or len(names) != 2 or not len(points):
         return []
@@ -237,7 +244,8 @@ def _sides(
 
 
 def _records(case: Any, system: Any) -> list[dict[str, Any]]:
-    """Return the records of the excitations, and of motions that come up through the base alone, each once."""
+    """Return the records of the excitations, and of motions that come up through the base alone,
+    each once."""
     calls = (
         one
         for one in nodes_in(case.nodes["system"])
@@ -254,7 +262,8 @@ def _records(case: Any, system: Any) -> list[dict[str, Any]]:
 
 
 def _record(motion: GroundMotion) -> dict[str, Any]:
-    """A record and the frequency [Hz] below which ENERGY of its energy is; a synthetic one is named by its seed."""
+    """A record and the frequency [Hz] below which ENERGY of its energy is; a synthetic one is named
+    by its seed."""
     record = motion.record
     power = np.cumsum(np.abs(np.fft.rfft(record.acceleration)) ** 2)
     highest = np.fft.rfftfreq(record.acceleration.size, record.dt)[
@@ -271,7 +280,8 @@ def _record(motion: GroundMotion) -> dict[str, Any]:
 
 
 def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
-    """Return natural periods [s] of a problem of up to ``most`` unknowns, and the damping that it has. Collective."""
+    """Return natural periods [s] of a problem of up to ``most`` unknowns, and the damping that it
+    has. Collective."""
     few = problem.system.space.unknowns <= most
     found: dict[str, Any] = {}
     if few:

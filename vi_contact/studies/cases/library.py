@@ -1,4 +1,5 @@
-"""Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
+"""Find the case files that ship with the package, and keep in a run folder the copy of the case
+that made it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -32,8 +33,9 @@ def starters() -> list[str]:
 
 
 def copy_starter(name: str, folder: Path) -> list[Path]:
-    """Copy the files of a case to begin with into a folder, made if need be, and return them; InputError for a name
-    that nobody knows, and for files that are there: they may have been changed."""
+    """Copy the files of a case to begin with into a folder, made if need be, and return them;
+    InputError for a name that nobody knows, and for files that are there: they may have been
+    changed."""
     if name not in starters():
         raise InputError(f"there is no starter case {shown(name)}: {nearest(name, starters())}")
     copies = {
@@ -53,12 +55,14 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
 
 
 def located(case: str) -> Path:
-    """Return the file of a case: what ends in ".toml" is a file, all else the name of one that ships."""
+    """Return the file of a case: what ends in ".toml" is a file, all else the name of one that
+    ships."""
     if case.endswith(".toml"):
         return Path(case)
     if case not in builtin_cases():
         raise InputError(
-            f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
+            f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file "
+            "ends in "
             ".toml"
         )
     return FOLDER / f"{case}.toml"
@@ -69,14 +73,15 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
     found = tables.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
         raise InputError(
-            f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
+            f"{path}: format is {shown(found)}, and this version of vi_contact reads format "
+            f"{FORMAT}: "
             "use the version that it was written for, or correct the number"
         )
 
 
 def base_folder(path: Path) -> Path:
-    """Return the folder to which relative paths of a case belong: its own, where one is for those that ship, of a copy
-    in a run folder that of the case it was made from."""
+    """Return the folder to which relative paths of a case belong: its own, where one is for those
+    that ship, of a copy in a run folder that of the case it was made from."""
     own = Path() if path.parent == FOLDER else path.parent
     told = _marked(path.read_bytes(), _FROM) if path.name == COPY else []
     return Path(told[0]) if told else own
@@ -89,7 +94,8 @@ def _marked(data: bytes, mark: str) -> list[str]:
 
 
 def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> None:
-    """Write a copy of the case file into the run folder, with the settings as comments. Collective."""
+    """Write a copy of the case file into the run folder, with the settings as comments.
+    Collective."""
     made = "".join(f"{_SET}{' '.join(setting.split(chr(10)))}\n" for setting in settings)
     made += f"{_FROM}{base_folder(path).resolve()}\n"
 
@@ -104,14 +110,16 @@ def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> 
 
 
 def refuse_case_of_others(path: Path, folder: Path) -> None:
-    """Raise InputError for a case file in a run folder that no run has written, and that this run would replace."""
+    """Raise InputError for a case file in a run folder that no run has written, and that this run
+    would replace."""
     if (
         is_own(folder / COPY)
         and not _is_the_copy(path, folder)
         and not _marked(read_bytes(folder / COPY), _FROM)
     ):
         raise InputError(
-            f"'{folder / COPY}' is not the copy of a case that a run has made, and this run would replace "
+            f"'{folder / COPY}' is not the copy of a case that a run has made, and this run would "
+            "replace "
             "it: choose another output folder, or move the file"
         )
 
@@ -122,7 +130,8 @@ def _is_the_copy(path: Path, folder: Path) -> bool:
 
 
 def read_copy(folder: Path) -> dict[str, Any]:
-    """Return the tables of the case that made a run folder, settings included; empty where no case file did."""
+    """Return the tables of the case that made a run folder, settings included; empty where no case
+    file did."""
     path = folder / COPY
     if not is_own(path):
         return {}

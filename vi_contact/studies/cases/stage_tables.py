@@ -1,4 +1,5 @@
-"""Read [[stage]] tables: what each stage replaces in the tables of the case, single keys of [system] and [run]."""
+"""Read [[stage]] tables: what each stage replaces in the tables of the case, single keys of
+[system] and [run]."""
 
 import re
 from collections.abc import Mapping
@@ -39,9 +40,11 @@ _NAME = re.compile(r"\w{1,40}", re.ASCII)
 
 @dataclass(frozen=True)
 class Stage:
-    """Hold what a stage is: its tables, with those of the case, and the ``Case`` that is made of them.
+    """Hold what a stage is: its tables, with those of the case, and the ``Case`` that is made of
+    them.
 
-    label: how sentences name it; release: reactions of supports that it does without go on as forces."""
+    label: how sentences name it; release: reactions of supports that it does without go on as
+    forces."""
 
     label: str
     name: str
@@ -72,7 +75,8 @@ def split(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
         for key in ("contact", "friction"):
             if not one.static and one.tables.get(key) != before.tables.get(key):
                 raise InputError(
-                    f"{one.label} has another [{key}] than the stage before it, and would jump at t = 0: "
+                    f"{one.label} has another [{key}] than the stage before it, and would jump at "
+                    "t = 0: "
                     "give both the same, or put a static stage with this one between them"
                 )
     return stages
@@ -110,7 +114,8 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
         ]
         if vain:
             raise InputError(
-                f"{where} is static and cannot use {vain[0]}: leave it out, or move it to a dynamic one"
+                f"{where} is static and cannot use {vain[0]}: leave it out, or move it to a "
+                "dynamic one"
             )
         whole["run"] = {
             key: one for key, one in whole.get("run", {}).items() if key in ("tolerance", "out")
@@ -120,11 +125,13 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
 
 
 def refuse_own(tables: Mapping[str, Any], key: str, asked: str) -> None:
-    """Raise InputError where something asks for another table of the case, and the last stage has one of its own."""
+    """Raise InputError where something asks for another table of the case, and the last stage has
+    one of its own."""
     stages = tables.get("stage")
     table = key.partition(".")[0].partition("=")[0]
     if isinstance(stages, list) and stages and isinstance(stages[-1], dict) and table in stages[-1]:
         raise InputError(
-            f"{asked} changes [{table}], and the last [[stage]] has its own: leave it out there, or give "
+            f"{asked} changes [{table}], and the last [[stage]] has its own: leave it out there, "
+            "or give "
             f"--set stage.{len(stages)}.{table}…"
         )

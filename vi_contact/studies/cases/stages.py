@@ -1,10 +1,12 @@
 """Run the stages of a case one after the other, each from where the one before has left the body.
 
-A static stage finds the equilibrium under its loads with contact, a dynamic one marches. What passes on: displacements
-and with them stresses, velocities after a dynamic stage, contact forces and the points where friction has brought the
-body, and the reactions of released supports as forces. Every stage begins at t = 0 with its own excitations. Each has a
-run folder, DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row. FOLLOWS in it has the
-checksums of what the stages before it left, so that a restart finds out which stages still follow from one another."""
+A static stage finds the equilibrium under its loads with contact, a dynamic one marches. What
+passes on: displacements and with them stresses, velocities after a dynamic stage, contact forces
+and the points where friction has brought the body, and the reactions of released supports as
+forces. Every stage begins at t = 0 with its own excitations. Each has a run folder,
+DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row. FOLLOWS in it has
+the checksums of what the stages before it left, so that a restart finds out which stages still
+follow from one another."""
 
 import os
 from dataclasses import dataclass, replace
@@ -42,8 +44,9 @@ from .vocabulary import Parts
 
 @dataclass(frozen=True)
 class Reached:
-    """Hold what so many stages leave: mesh and groups, problem and state of the last one, which is at rest or not, the
-    force of all supports released so far [N], and the problems of the stages before it."""
+    """Hold what so many stages leave: mesh and groups, problem and state of the last one, which is
+    at rest or not, the force of all supports released so far [N], and the problems of the stages
+    before it."""
 
     number: int
     meshed: tuple[Any, Any]
@@ -55,8 +58,9 @@ class Reached:
 
 
 def leading(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
-    """Return what runs of a case share that differ in their excitations: (what the static stages leave that come before
-    all others but the last; parts of the next stage; its first state, None to be found). Collective."""
+    """Return what runs of a case share that differ in their excitations: (what the static stages
+    leave that come before all others but the last; parts of the next stage; its first state, None
+    to be found). Collective."""
     if not case.stages:
         return None, case.parts(comm), None
     reached = Reached(0, case.meshed(comm))
@@ -76,7 +80,8 @@ def run_stages(
     reached: Reached | None,
     **options: Any,
 ) -> Solution:
-    """Run those stages of a case that are not reached yet; the solution of the last one. Collective."""
+    """Run those stages of a case that are not reached yet; the solution of the last one.
+    Collective."""
     ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
     inner = [
         Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)
@@ -103,15 +108,16 @@ def run_stages(
 
 
 def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
-    """Clear the folders of a new run, and remove the runs in those of stages that are none any more; to ``keep``,
-    refuse these. Folders and files that no run has made are left alone."""
+    """Clear the folders of a new run, and remove the runs in those of stages that are none any
+    more; to ``keep``, refuse these. Folders and files that no run has made are left alone."""
     place = inner_folder(out, STAGES)
     names = sorted(os.listdir(place)) if place.is_dir() else []
     found = [Path(STAGES) / name for name in names if name[0].isdecimal() and "_" in name]
     old = [one for one in found if one not in stages and is_marked(inner_folder(out, *one.parts))]
     if keep and old:
         raise InputError(
-            f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and order, or "
+            f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and "
+            "order, or "
             "start a new run, which removes it"
         )
     for folder in () if keep else old:
@@ -121,7 +127,8 @@ def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
 
 
 def _follows(folder: Path | None, before: str) -> bool:
-    """Return whether there is a checkpoint to continue from, of a stage that began where those before it now end."""
+    """Return whether there is a checkpoint to continue from, of a stage that began where those
+    before it now end."""
     if folder is None or not is_own(folder / CHECKPOINT):
         return False
     return not before or is_own(folder / FOLLOWS) and read_text(folder / FOLLOWS) == before
@@ -157,8 +164,8 @@ def _made(
 
 
 def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, State | None]:
-    """(reached, with the force of all released supports; parts that begin where the stages before have left the body;
-    its first state, None to be found)."""
+    """(reached, with the force of all released supports; parts that begin where the stages before
+    have left the body; its first state, None to be found)."""
     before, state = reached.problem, reached.state
     parts: Parts = replace(stage.case, ready=reached.meshed).parts(comm)
     parts = replace(parts, weighted=True, moved=True) if stage.static else parts
@@ -173,14 +180,16 @@ def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts,
             begun, first = release(before, state, problem, earlier=reached.earlier)
         else:
             raise InputError(
-                "it has other supports than the dynamic stage before it: put a static stage with the "
+                "it has other supports than the dynamic stage before it: put a static stage with "
+                "the "
                 "supports of that one between them, or change supports before the motion"
             )
         force = begun.system.load.constant - problem.system.load.constant
         name, newtons = removed_support(before, begun, np.asarray(force))
         if name and not stage.release:
             raise InputError(
-                f"it removes the support '{name}', which carries {newtons:.4g} N: give release = true, "
+                f"it removes the support '{name}', which carries {newtons:.4g} N: give release = "
+                "true, "
                 "which holds its reaction as a force, or keep the support"
             )
     except InputError as error:

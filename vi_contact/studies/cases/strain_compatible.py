@@ -1,10 +1,12 @@
-"""Run a case until its soil is strain-compatible: [strain_compatible] has the arguments of ``soil.strain_compatible``.
+"""Run a case until its soil is strain-compatible: [strain_compatible] has the arguments of
+``soil.strain_compatible``.
 
     [strain_compatible]
     curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
 
-Every run is a whole one, in DIR, all stages with the same soil; those before the last one, or all where none ends it,
-are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each."""
+Every run is a whole one, in DIR, all stages with the same soil; those before the last one, or all
+where none ends it, are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest
+relative change of G or xi after each."""
 
 import os
 from dataclasses import replace
@@ -42,12 +44,14 @@ def iterate(
     )
     if restart:
         raise InputError(
-            f"{spot} begins with the soil at small strains and cannot be continued: run it from the start"
+            f"{spot} begins with the soil at small strains and cannot be continued: run it from "
+            "the start"
         )
     damping = given.arguments.get("damping")
     if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
         raise InputError(
-            f'{spot} gives every cell its damping ratio: give [system.damping] type = "DampingRatio"'
+            f"{spot} gives every cell its damping ratio: give [system.damping] type = "
+            '"DampingRatio"'
         )
     if case.stages and case.stages[-1].static:
         raise InputError(
@@ -94,14 +98,16 @@ def iterate(
 
 
 def with_known_damping(system: Call) -> Call:
-    """Return the call of [system] without its damping where no material has a ratio: curves give them, run by run."""
+    """Return the call of [system] without its damping where no material has a ratio: curves give
+    them, run by run."""
     ratios = [one for one in nodes_in(system) if isinstance(one, Call) and one.arguments.get("xi")]
     known = {name: node for name, node in system.arguments.items() if name != "damping" or ratios}
     return replace(system, arguments=known)
 
 
 def _set_aside(folder: Path, number: int) -> None:
-    """Move the run in this folder into one inside of it; before the first run, remove runs of an earlier time there.
+    """Move the run in this folder into one inside of it; before the first run, remove runs of an
+    earlier time there.
 
     Files of others stay where they are."""
     if number == 0:

@@ -2,9 +2,9 @@
 cells, a table that every stage replaces.
 
 A choice in vain is a misunderstanding: the author believes in a model that is not the one computed.
-Each finding is a sentence with the table, what makes the choice vain, and the remedy. What ``--set``
-and short options make vain is let be, as ``--set contact=`` does with the impact law of a file: this
-was asked for, and the file is in order."""
+Each finding is a sentence with the table, what makes the choice vain, and the remedy. What
+``--set`` and short options make vain is let be, as ``--set contact=`` does with the impact law of a
+file: this was asked for, and the file is in order."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,7 +59,8 @@ class Part:
 def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield all choices without effect.
 
-    tables: of the file, with its stages; parts: the stages in their order, or the one whole case."""
+    tables: of the file, with its stages; parts: the stages in their order, or the one whole
+    case."""
     yield from _materials(path, tables, parts)
     for part in parts:
         yield from _ratios(part)
@@ -77,7 +78,8 @@ def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> It
 def left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
     """Yield a sentence for each table that waits for a motion in a case of static stages.
 
-    These are no mistake, as one looks at the weight alone before the motion is added: they are told."""
+    These are no mistake, as one looks at the weight alone before the motion is added: they are
+    told."""
     stages = tables.get("stage", ())
     if stages and all(one.get("type") == "static" for one in stages):
         for key in (one for one in OF_MOTION if one in tables):
@@ -98,7 +100,8 @@ def refuse_unread(
 
 
 def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
-    """Yield materials that no stage's [system] names, for cells or for what is behind a boundary."""
+    """Yield materials that no stage's [system] names, for cells or for what is behind a
+    boundary."""
     named = tables.get("material")
     for name in named if isinstance(named, Mapping) else ():
         users = [
@@ -110,7 +113,8 @@ def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> 
             yield (
                 f"material.{name}",
                 (
-                    f"{path}: [material.{name}] is of nothing, as [system] does not name it: give its "
+                    f"{path}: [material.{name}] is of nothing, as [system] does not name it: give "
+                    "its "
                     "cell group in [system] material, or leave it out"
                 ),
             )
@@ -128,7 +132,8 @@ def _ratios(part: Part) -> Iterator[Finding]:
         yield (
             "system.damping",
             (
-                f"{part.label}: [system.damping] {RATIO_LAW} damps by the ratios of the materials, and "
+                f"{part.label}: [system.damping] {RATIO_LAW} damps by the ratios of the materials, "
+                "and "
                 f"none has one: give [material.{names[0]}] xi = 0.05, or another type of damping"
             ),
         )
@@ -137,14 +142,16 @@ def _ratios(part: Part) -> Iterator[Finding]:
             f"material.{damped[0]}",
             (
                 f"{part.label}: [material.{damped[0]}] has xi, which no damping reads here: give "
-                f'[system] damping = {{type = "{RATIO_LAW}", frequency = …}} with a frequency in Hz, or '
+                f'[system] damping = {{type = "{RATIO_LAW}", frequency = …}} with a frequency in '
+                "Hz, or "
                 "leave xi out"
             ),
         )
 
 
 def _without_contact(part: Part) -> Iterator[Finding]:
-    """Yield laws of contact where there is none, or none that they act on, or another before them."""
+    """Yield laws of contact where there is none, or none that they act on, or another before
+    them."""
     surfaces = part.calls("contact")
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
@@ -155,7 +162,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
             yield (
                 table,
                 (
-                    f"{part.label}: [{table}] has no effect, as nothing {happens} without [[contact]]: "
+                    f"{part.label}: [{table}] has no effect, as nothing {happens} without "
+                    "[[contact]]: "
                     "give the contact, or leave it out"
                 ),
             )
@@ -163,7 +171,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
         yield (
             "impact",
             (
-                f"{part.label}: [impact] has no effect, as every [[contact]] has springs, which do not "
+                f"{part.label}: [impact] has no effect, as every [[contact]] has springs, which do "
+                "not "
                 "collide: leave it out"
             ),
         )
@@ -172,7 +181,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
         yield (
             "run.dt",
             (
-                f"{part.label}: [run] dt is HalvedAtImpact, which halves nothing without [[contact]]: "
+                f"{part.label}: [run] dt is HalvedAtImpact, which halves nothing without "
+                "[[contact]]: "
                 "give the contact, or the step alone"
             ),
         )
@@ -180,7 +190,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
         yield (
             "scheme.mass",
             (
-                f"{part.label}: [scheme] mass is not read, as [mass] comes before it: leave one of the "
+                f"{part.label}: [scheme] mass is not read, as [mass] comes before it: leave one of "
+                "the "
                 "two out"
             ),
         )
@@ -198,19 +209,22 @@ def _of_solvers(part: Part) -> Iterator[Finding]:
             yield (
                 "escalation",
                 (
-                    f"{part.label}: [[escalation]] names {other.callee.name} with the same keys as the "
+                    f"{part.label}: [[escalation]] names {other.callee.name} with the same keys as "
+                    "the "
                     "solver before it, which has failed by then: leave it out, or change a key"
                 ),
             )
 
 
 def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -> Iterator[Finding]:
-    """Yield keys of the condensed solver without effect; ``rubs``: the law of friction, or empty."""
+    """Yield keys of the condensed solver without effect; ``rubs``: the law of friction, or
+    empty."""
     if rubs and "method" in keys:
         yield (
             table,
             (
-                f"{label}: [{table}] method is for contact without friction, and [friction] is given: "
+                f"{label}: [{table}] method is for contact without friction, and [friction] is "
+                "given: "
                 "give friction_method in its place, or leave it out"
             ),
         )
@@ -218,7 +232,8 @@ def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -
         yield (
             table,
             (
-                f"{label}: [{table}] {key} is for contact with friction, and there is no [friction]: "
+                f"{label}: [{table}] {key} is for contact with friction, and there is no "
+                "[friction]: "
                 "give the friction, or leave it out"
             ),
         )
@@ -226,7 +241,8 @@ def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -
         yield (
             table,
             (
-                f"{label}: [{table}] rates is for friction that depends on the slip rate, and {rubs} "
+                f"{label}: [{table}] rates is for friction that depends on the slip rate, and "
+                f"{rubs} "
                 "does not: leave it out"
             ),
         )
@@ -243,7 +259,8 @@ def _twice(part: Part) -> Iterator[Finding]:
                 yield (
                     key,
                     (
-                        f"{part.label}: [[{key}]] has two tables that are alike, word for word: leave "
+                        f"{part.label}: [[{key}]] has two tables that are alike, word for word: "
+                        "leave "
                         "one of them out, or give one of twice the size"
                     ),
                 )
@@ -274,7 +291,8 @@ def _start(parts: Sequence[Part]) -> Iterator[Finding]:
         yield (
             "system.initial_velocity",
             (
-                f"{first.label}: [system] initial_velocity is lost, as {at_rest} lets the body begin at "
+                f"{first.label}: [system] initial_velocity is lost, as {at_rest} lets the body "
+                "begin at "
                 "rest, in equilibrium: leave one of the two out"
             ),
         )
@@ -283,7 +301,8 @@ def _start(parts: Sequence[Part]) -> Iterator[Finding]:
             yield (
                 f"system.{key}",
                 (
-                    f"{part.label}: system has {key}, and a stage begins where the stage before has "
+                    f"{part.label}: system has {key}, and a stage begins where the stage before "
+                    "has "
                     "left the body: give it in the first stage, or leave it out"
                 ),
             )
@@ -296,7 +315,8 @@ def _ground(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
         yield (
             "system.base_inertia",
             (
-                f"{path}: [system] base_inertia is about the inertia load of a ground motion, and there "
+                f"{path}: [system] base_inertia is about the inertia load of a ground motion, and "
+                "there "
                 "is no [[excitation]]: leave it out"
             ),
         )
@@ -312,7 +332,8 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
             yield (
                 key,
                 (
-                    f"{path}: [{key}] is read by no stage, as every [[stage]] that could read it has "
+                    f"{path}: [{key}] is read by no stage, as every [[stage]] that could read it "
+                    "has "
                     "its own: leave it out there or here"
                 ),
             )
@@ -322,7 +343,8 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
             yield (
                 f"system.{key}",
                 (
-                    f"{path}: [system] {key} is read by no stage, as every [[stage]] has its own: leave "
+                    f"{path}: [system] {key} is read by no stage, as every [[stage]] has its own: "
+                    "leave "
                     "it out there or here"
                 ),
             )
@@ -338,7 +360,8 @@ def _released(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
             yield (
                 "stage",
                 (
-                    f"{path}: [[stage]] '{stage.get('name')}' has release = true, and the supports of "
+                    f"{path}: [[stage]] '{stage.get('name')}' has release = true, and the supports "
+                    "of "
                     "the stage before it: leave it out, or change the supports"
                 ),
             )

@@ -1,8 +1,8 @@
 """Say the words of case files: which classes and functions a table may call where.
 
-Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
-for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one
-of a function here that takes none."""
+Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the
+kind that is asked for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What
+takes functions has no word, or one of a function here that takes none."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -123,8 +123,8 @@ def surface(
     hinges: bool = False,
     name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in corners; hinges: of
-    bodies that share nodes; name: of it as ``part`` of recorders."""
+    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in
+    corners; hinges: of bodies that share nodes; name: of it as ``part`` of recorders."""
     found = fem.contact_surface(
         system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle, hinges=hinges
     )
@@ -167,7 +167,8 @@ def weight(
     direction: tuple[float, ...] | None = None,
     cells: Cells | None = None,
 ) -> SemiDiscreteSystem:
-    """Return the system ``with_weight``; cells: a group of whole bodies, which alone have weight."""
+    """Return the system ``with_weight``; cells: a group of whole bodies, which alone have
+    weight."""
     bodies = None if cells is None else fem.bodies_of(system, cells)
     return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
 
@@ -226,7 +227,8 @@ def upgoing(
     dt: float | None = None,
     outcrop: bool = True,
 ) -> Any:
-    """Return ``soil.upgoing`` of a motion, or of the run's excitations, which then come up through the base alone."""
+    """Return ``soil.upgoing`` of a motion, or of the run's excitations, which then come up through
+    the base alone."""
     return soil.upgoing(
         excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop
     )
@@ -261,8 +263,8 @@ def free_field(
 class Parts:
     """Hold what a problem is made of.
 
-    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; moved: the excitations
-    come up through its base, and are no inertia load."""
+    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium;
+    moved: the excitations come up through its base, and are no inertia load."""
 
     system: SemiDiscreteSystem
     surface: ContactSurface
@@ -307,7 +309,8 @@ def _choices() -> Mapping[Any, Mapping[str, Callee]]:
 
 
 class _Listed(Mapping[str, Callee]):
-    """Find the words for a kind, each when it is asked for: most are of modules that a case does not need."""
+    """Find the words for a kind, each when it is asked for: most are of modules that a case does
+    not need."""
 
     def __init__(self, kind: Any) -> None:
         self._kind, self._rooms = kind, [room for room, kinds in _KINDS.items() if kind in kinds]
@@ -345,7 +348,8 @@ class _Listed(Mapping[str, Callee]):
 
 
 def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
-    """Yield the classes of these names that are of this kind, and named constructors; none that needs functions."""
+    """Yield the classes of these names that are of this kind, and named constructors; none that
+    needs functions."""
     for cls in (getattr(room, name) for name in names):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
@@ -364,7 +368,8 @@ def _constructors(cls: type) -> Iterator[Any]:
 
 
 def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
-    """Return the words of a case file in this folder, where its relative paths begin; ``allowed``: others' packages."""
+    """Return the words of a case file in this folder, where its relative paths begin; ``allowed``:
+    others' packages."""
     default = {
         LinearElastic: "LinearElastic",
         Record: "read_record",

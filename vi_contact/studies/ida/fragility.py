@@ -1,15 +1,16 @@
-"""Fit fragility curves: the probability that a demand passes its limit, over the intensity of the motion.
+"""Fit fragility curves: the probability that a demand passes its limit, over the intensity of the
+motion.
 
-The capacity of a record is the intensity at which its demand first passes the limit (Vamvatsikos and Cornell,
-Earthquake Engng Struct. Dyn. 31, 2002). Its runs tell between which two levels a < b it lies: a = 0 where already the
-lowest passes, b infinite where none does. Capacities are taken as lognormal with median theta and dispersion beta, and
-records as independent:
+The capacity of a record is the intensity at which its demand first passes the limit (Vamvatsikos
+and Cornell, Earthquake Engng Struct. Dyn. 31, 2002). Its runs tell between which two levels a < b
+it lies: a = 0 where already the lowest passes, b infinite where none does. Capacities are taken as
+lognormal with median theta and dispersion beta, and records as independent:
 
     P(passed | x) = Phi(ln(x/theta)/beta),   L(theta, beta) = prod_i [Phi(ln(b_i/theta)/beta) - Phi(ln(a_i/theta)/beta)]
 
-theta and beta make L largest; ln L is concave in 1/beta and ln(theta)/beta (Burridge, J. R. Stat. Soc. B 43, 1981), so
-there is one such place. Intervals come from the second derivatives of ln L there: 95 % for many records, too narrow for
-fewer than ten."""
+theta and beta make L largest; ln L is concave in 1/beta and ln(theta)/beta (Burridge, J. R. Stat.
+Soc. B 43, 1981), so there is one such place. Intervals come from the second derivatives of ln L
+there: 95 % for many records, too narrow for fewer than ten."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,11 +28,13 @@ from .measures import Demand, demand
 
 NORMAL = 1.959963984540054  # 95 % of the normal distribution lie within so many standard deviations
 SAME = 1e-9  # of two intensities: they are those of records that were scaled to one
-LEAST = 0.01  # of 1/beta, over that of the levels: below it the records do not tell how far capacities lie apart
+# of 1/beta, over that of the levels: below it the records do not tell how far capacities lie apart
+LEAST = 0.01
 
 
 def limit(text: str) -> tuple[Demand, float]:
-    """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column. InputError for others.
+    """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column.
+    InputError for others.
 
     It is passed by a demand at the value or above, for the way "min" at it or below."""
     name, _, value = text.partition("=")
@@ -41,14 +44,16 @@ def limit(text: str) -> tuple[Demand, float]:
         found = math.nan
     if not math.isfinite(found):
         raise InputError(
-            f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such as "
+            f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such "
+            "as "
             "contact_max_slip:max=0.05"
         )
     return demand(name), found
 
 
 def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
-    """Return (records, 2) values of the column ``level`` between which each record first passes a limit.
+    """Return (records, 2) values of the column ``level`` between which each record first passes a
+    limit.
 
     Of a record count the runs below its first failed one; one without any is left out."""
     (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
@@ -68,8 +73,8 @@ def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
 
 @dataclass(frozen=True)
 class Fragility:
-    """Hold a fitted curve: median theta (unit of the intensity), dispersion beta [-], covariance (2, 2) of their
-    logarithms, and the brackets (records, 2) that it was fitted to."""
+    """Hold a fitted curve: median theta (unit of the intensity), dispersion beta [-], covariance
+    (2, 2) of their logarithms, and the brackets (records, 2) that it was fitted to."""
 
     theta: float
     beta: float
@@ -92,16 +97,19 @@ class Fragility:
 
 @checked
 def fragility_curve(brackets: Array) -> Fragility:
-    """Return the fragility of brackets (records, 2). InputError where they do not tell median and dispersion."""
+    """Return the fragility of brackets (records, 2). InputError where they do not tell median and
+    dispersion."""
     brackets = np.asarray(brackets, dtype=float)
     if brackets.ndim != 2 or brackets.shape[1] != 2:
         raise InputError(
-            f"fragility_curve: brackets has shape {brackets.shape}; give two intensities for each record"
+            f"fragility_curve: brackets has shape {brackets.shape}; give two intensities for each "
+            "record"
         )
     low, high = np.max(brackets[:, 0], initial=0.0), np.min(brackets[:, 1], initial=math.inf)
     if low <= high * (1.0 + SAME):
         raise InputError(
-            f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe all at "
+            f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe "
+            "all at "
             f"one intensity from {low:g} to {high:g}: give other or closer levels, or more records"
         )
     with np.errstate(divide="ignore"):
@@ -117,7 +125,8 @@ def fragility_curve(brackets: Array) -> Fragility:
     ).x
     if p[0] <= LEAST:
         raise InputError(
-            f"the capacities of {len(brackets)} records have a spread that cannot be fitted: give more "
+            f"the capacities of {len(brackets)} records have a spread that cannot be fitted: give "
+            "more "
             "levels, or more records"
         )
     for _ in range(3):  # of Newton, from digits that are enough to all of them
@@ -131,7 +140,8 @@ def fragility_curve(brackets: Array) -> Fragility:
 
 
 def _likelihood(p: Array, x: Array) -> tuple[float, Array, Array]:
-    """Return ln L at p = (1/beta, ln(theta)/beta), and its first and second derivatives; x: brackets of ln capacity."""
+    """Return ln L at p = (1/beta, ln(theta)/beta), and its first and second derivatives; x:
+    brackets of ln capacity."""
     known = np.isfinite(x)
     sides = np.stack([np.where(known, x, 0.0), -np.ones_like(x)], axis=-1)
     z = np.where(known, sides @ p, x)

@@ -1,9 +1,10 @@
-"""Incremental dynamic analysis: one structure under many motions, each at many intensities, in one tidy table.
+"""Incremental dynamic analysis: one structure under many motions, each at many intensities, in one
+tidy table.
 
-Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside ``ida.csv``,
-``columns.json`` and ``ida.png``: ``fragility.csv`` and ``fragility.png``, where there are limits; ``ida.json``, the
-case and the records, so that no other study is mixed in, and ``runs/NAME_xSCALE``, the folder of every run, with its
-row."""
+Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside
+``ida.csv``, ``columns.json`` and ``ida.png``: ``fragility.csv`` and ``fragility.png``, where there
+are limits; ``ida.json``, the case and the records, so that no other study is mixed in, and
+``runs/NAME_xSCALE``, the folder of every run, with its row."""
 
 import hashlib
 import math
@@ -49,12 +50,14 @@ _COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(enco
 class IDA:
     """Say what an incremental dynamic analysis runs, and what it tells of the runs.
 
-    case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one file per GroundMotion
-    of the case, for each record; its name is that of its first file. scales: factors on the motion as the case prepares
-    it; or levels: values of the intensity, in its unit. intensity: "pga", "pgv", "pgd", "sa:T", "sa:T1" (T1 as
-    ``vi-contact run --check`` tells it), "arias", "cav", "housner", of the first motion. demands: "COLUMN" or
-    "COLUMN:max", ":min", ":absmax", ":last" of history.csv. limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
-    Raises InputError for other words, no motions, two of one name, not exactly one of scales and levels."""
+    case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one
+    file per GroundMotion of the case, for each record; its name is that of its first file. scales:
+    factors on the motion as the case prepares it; or levels: values of the intensity, in its unit.
+    intensity: "pga", "pgv", "pgd", "sa:T", "sa:T1" (T1 as ``vi-contact run --check`` tells it),
+    "arias", "cav", "housner", of the first motion. demands: "COLUMN" or "COLUMN:max", ":min",
+    ":absmax", ":last" of history.csv. limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
+    Raises InputError for other words, no motions, two of one name, not exactly one of scales and
+    levels."""
 
     case: Case
     motions: Sequence[str | Path | Sequence[str | Path]]
@@ -132,27 +135,30 @@ def run_ida(
     say: Callable[[str], None] = print,
     wall_time: str | None = None,
 ) -> list[Row]:
-    """Make the runs that have not finished yet, and the table and figure of all that are in ``out``. Return its rows.
+    """Make the runs that have not finished yet, and the table and figure of all that are in
+    ``out``. Return its rows.
 
-    Eight runs share a process and, where the body serves all excitations, its assembly and every pass over its
-    matrices (``simulate_many``). What a run cannot do is told in its row, and the others go on. Called again it keeps
-    finished runs, continues interrupted ones from their checkpoints, and tries failed ones again. The table is
-    made anew after every run, in one piece, the figure at the end.
+    Eight runs share a process and, where the body serves all excitations, its assembly and every
+    pass over its matrices (``simulate_many``). What a run cannot do is told in its row, and the
+    others go on. Called again it keeps finished runs, continues interrupted ones from their
+    checkpoints, and tries failed ones again. The table is made anew after every run, in one piece,
+    the figure at the end.
 
-    Args:
-        jobs: processes at the same time.
-        part: (i, n): only every n-th run from the i-th on, for job arrays that share the folder.
-        launch: words in front of the command of a run, ("mpirun", "-n", "4"); each has a process of its own then.
-        say: takes a line about each run, and every half a minute one about the time left.
-        wall_time: as of ``simulate``: every run gets what is left of it, and ends with a checkpoint before it is over.
-    Raises:
-        InputError: a folder of another study, or in which the same part runs, a part or number of jobs that makes no
+    Args: jobs: processes at the same time. part: (i, n): only every n-th run from the i-th on, for
+        job arrays that share the folder. launch: words in front of the command of a run, ("mpirun",
+        "-n", "4"); each has a process of its own then. say: takes a line about each run, and every
+        half a minute one about the time left. wall_time: as of ``simulate``: every run gets what is
+        left of it, and ends with a checkpoint before it is over.
+    Raises: InputError: a folder of another study, or in which the same part runs, a part or number
+        of jobs that makes no
             sense, inside mpirun.
-        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to go on."""
+        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to
+            go on."""
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
         raise InputError(
-            f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for i/n"
+            f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for "
+            "i/n"
         )
     out, end = Path(out), WallTime(wall_time)
     _claim(study, out)
@@ -174,7 +180,8 @@ def run_ida(
                     told = now
                     seconds = int((now - begin) / found * (len(left) - found))
                     say(
-                        f"{100.0 * found / len(left):.0f} % of the steps are done, {timedelta(seconds=seconds)} left"
+                        f"{100.0 * found / len(left):.0f} % of the steps are done, "
+                        f"{timedelta(seconds=seconds)} left"
                     )
                 continue
             number, told = number + 1, now
@@ -195,7 +202,8 @@ def run_ida(
 
 
 def _check_demands(study: IDA) -> None:
-    """InputError before the first run for a demand on a column that no run will write; it assembles the case once."""
+    """InputError before the first run for a demand on a column that no run will write; it assembles
+    the case once."""
     try:
         written = study.case.columns(alone())
     except InputError:
@@ -203,7 +211,8 @@ def _check_demands(study: IDA) -> None:
     for one in study.wanted:
         if one.column not in written:
             raise InputError(
-                f"demand '{one.column}': the runs record no such column: {nearest(one.column, written)}"
+                f"demand '{one.column}': the runs record no such column: "
+                f"{nearest(one.column, written)}"
             )
 
 
@@ -218,13 +227,15 @@ def _claim(study: IDA, out: Path) -> None:
     if old is None:
         if is_own(out / STUDY):
             raise InputError(
-                f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, or move "
+                f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, "
+                "or move "
                 "this one away"
             )
         for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
             if os.path.lexists(out / name):
                 raise InputError(
-                    f"'{out / name}' is not of a study of vi_contact, which would replace it (there is no "
+                    f"'{out / name}' is not of a study of vi_contact, which would replace it "
+                    "(there is no "
                     f"whole {STUDY} in '{out}'): choose another folder, or move the file"
                 )
     else:
@@ -237,7 +248,8 @@ def _claim(study: IDA, out: Path) -> None:
         if old["case"] != case or changed:
             what = f"the record '{changed[0]}'" if changed else "the case"
             raise InputError(
-                f"'{out}' holds runs from before {what} was changed: choose another folder, or delete it"
+                f"'{out}' holds runs from before {what} was changed: choose another folder, or "
+                "delete it"
             )
         records = kept | records
     try:
@@ -272,8 +284,9 @@ def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
 def _tabulated(
     case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]
 ) -> tuple[list[Row], Units]:
-    """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended,
-    None for what a run has not measured. InputError when a finished run has no such column."""
+    """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that
+    have ended, None for what a run has not measured. InputError when a finished run has no such
+    column."""
     folders = [out / name for name in sorted(os.listdir(out))] if out.is_dir() else []
     own = [one for one in folders if one.is_dir() and not one.is_symlink()]
     found = [(one, row) for one in own if (row := read_row(one / ROW)) is not None]
@@ -307,7 +320,8 @@ def _tabulated(
 
 @cache
 def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], Units]:
-    """Columns of a finished run, read once: the wanted ones; all names where one of them is missing."""
+    """Columns of a finished run, read once: the wanted ones; all names where one of them is
+    missing."""
     run = read_run(folder)
     numbers = {name: values for name, values in run.history.items() if np.ndim(values) == 1}
     kept = {name: numbers[name] for name in wanted if name in numbers}
@@ -315,7 +329,8 @@ def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], U
 
 
 def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str], None]) -> None:
-    """Fits, writes and draws the curves of the limits, and says each; where none can be fitted, why."""
+    """Fits, writes and draws the curves of the limits, and says each; where none can be fitted,
+    why."""
     found, table, measure = {}, [], study.measure
     for text in study.limits:
         try:
@@ -328,9 +343,8 @@ def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str]
             [text, fit.theta, *fit.intervals[0], fit.beta, *fit.intervals[1], len(fit.brackets)]
         )
         say(
-            "fragility of {}: median {:.4g} ({:.4g} to {:.4g}) {unit}, dispersion {:.3g} ({:.3g} to {:.3g}), {} records".format(
-                *table[-1], unit=measure.unit
-            )
+            "fragility of {}: median {:.4g} ({:.4g} to {:.4g}) {unit}, dispersion {:.3g} ({:.3g} "
+            "to {:.3g}), {} records".format(*table[-1], unit=measure.unit)
         )
     names = [
         "limit",

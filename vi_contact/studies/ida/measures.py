@@ -1,4 +1,5 @@
-"""What an incremental dynamic analysis plots: intensity measures of motions, demands on the structure."""
+"""What an incremental dynamic analysis plots: intensity measures of motions, demands on the
+structure."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -30,11 +31,13 @@ class Intensity:
     of: Callable[[Record], float]
 
     def scale(self, record: Record, level: float) -> float:
-        """Return the factor that brings the record to this level; InputError unless both are positive."""
+        """Return the factor that brings the record to this level; InputError unless both are
+        positive."""
         value = self.of(record)
         if not (level > 0.0 and value > 0.0):
             raise InputError(
-                f"level {level:g} of {self.name}: the record has {value:g}; give levels above zero, and "
+                f"level {level:g} of {self.name}: the record has {value:g}; give levels above "
+                "zero, and "
                 "records with a motion"
             )
         return float((level / value) ** (1.0 / self.degree))
@@ -62,8 +65,8 @@ def _seconds(text: str) -> float:
 
 
 def intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
-    """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %),
-    "sa:T1" at the period that ``first_period`` finds [s]."""
+    """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T
+    (pseudo-acceleration at T s, 5 %), "sa:T1" at the period that ``first_period`` finds [s]."""
     word, _, period = text.partition(":")
     if word == "sa":
         seconds = (
@@ -79,14 +82,16 @@ def intensity(text: str, first_period: Callable[[], float] | None = None) -> Int
         )  # asked often
     if period or word not in _MEASURES:
         raise InputError(
-            f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in seconds"
+            f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in "
+            "seconds"
         )
     return _MEASURES[word]
 
 
 @dataclass(frozen=True)
 class Demand:
-    """Define a demand parameter: a column of history.csv and what of it counts; values that are not a number do not."""
+    """Define a demand parameter: a column of history.csv and what of it counts; values that are not
+    a number do not."""
 
     column: str
     way: str = "absmax"
@@ -112,7 +117,8 @@ class Demand:
 
 
 def demand(text: str) -> Demand:
-    """Return the demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last"."""
+    """Return the demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax",
+    ":last"."""
     column, _, way = text.partition(":")
     if not column or (way or "absmax") not in _WAYS:
         raise InputError(
@@ -124,11 +130,13 @@ def demand(text: str) -> Demand:
 def fractiles(
     curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]
 ) -> tuple[Array, Array]:
-    """Return (levels (n,), demands (n, shares)): fractiles over the records of the demand at equal intensity.
+    """Return (levels (n,), demands (n, shares)): fractiles over the records of the demand at equal
+    intensity.
 
-    curves: record -> (intensities, demands), straight lines between them; the levels are those of all records in the
-    range that every record covers (Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31, 2002, section 5). Empty
-    for fewer than two records and where ranges do not overlap."""
+    curves: record -> (intensities, demands), straight lines between them; the levels are those of
+    all records in the range that every record covers (Vamvatsikos and Cornell, Earthquake Engng
+    Struct. Dyn. 31, 2002, section 5). Empty for fewer than two records and where ranges do not
+    overlap."""
     full = [(im[np.argsort(im)], edp[np.argsort(im)]) for im, edp in curves.values() if len(im)]
     if len(full) < 2:
         return np.zeros(0), np.zeros((0, len(shares)))

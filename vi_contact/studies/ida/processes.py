@@ -1,4 +1,5 @@
-"""The processes of an incremental dynamic analysis: a few runs in each, so many at a time, until told to stop."""
+"""The processes of an incremental dynamic analysis: a few runs in each, so many at a time, until
+told to stop."""
 
 import json
 import os
@@ -21,7 +22,8 @@ from ...run.wall_time import WallTime
 from .runs import ROW, OneRun, Row, read_row
 
 TOGETHER = 8  # runs in a process: so many share every pass over a matrix
-ATTEMPTS = 5  # of runs that end without a word: Gmsh 4.8, asked before it is initialised, does that now and then
+# of runs that end without a word: Gmsh 4.8, asked before it is initialised, does that now and then
+ATTEMPTS = 5
 PATIENCE = 20.0  # seconds for a run to save its state
 ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
 AGAIN = "ended the study: give the same command again to go on"
@@ -33,7 +35,8 @@ _MPI = (
 
 
 def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
-    """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without wall time left."""
+    """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without
+    wall time left."""
     case, folders = runs[0].case, [one.folder for one in runs]
     asked = {
         "case": str(case.path),
@@ -87,7 +90,8 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
 
 
 class Processes:
-    """Keep the processes that go on, until they are all told to stop. ``shares``: runs that each has made."""
+    """Keep the processes that go on, until they are all told to stop. ``shares``: runs that each
+    has made."""
 
     def __init__(self, launch: Sequence[str], end: WallTime) -> None:
         self._launch, self._end = launch, end
@@ -96,7 +100,8 @@ class Processes:
         self.shares: dict[subprocess.Popen[str], float] = {}
 
     def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
-        """Yield the row of each run as it ends, None when more is done; run what a dead process has left one by one."""
+        """Yield the row of each run as it ends, None when more is done; run what a dead process has
+        left one by one."""
         for _ in range(ATTEMPTS):
             left, said = list(runs), []
             process = self._started(runs)
@@ -147,8 +152,9 @@ class Processes:
 def executed(
     runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime
 ) -> Iterator[Row | float]:
-    """Run them, in so many processes at a time, and yield the row of each when it ends, and between rows how many have
-    been made, with parts of runs. Left early, it stops those that go on; OutOfTime when one has ended with its status.
+    """Run them, in so many processes at a time, and yield the row of each when it ends, and between
+    rows how many have been made, with parts of runs. Left early, it stops those that go on;
+    OutOfTime when one has ended with its status.
     """
     processes, told = Processes(launch, end), SimpleQueue[Row | BaseException | None]()
 
@@ -197,7 +203,8 @@ def _read(line: str) -> dict[str, Any]:
 
 
 def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
-    """Ends them with all they have started: as by Ctrl-C, on which a run saves its state; else by SIGTERM."""
+    """Ends them with all they have started: as by Ctrl-C, on which a run saves its state; else by
+    SIGTERM."""
     for signum in (signal.SIGINT, signal.SIGTERM):
         for process in processes:
             with suppress(ProcessLookupError):
@@ -209,9 +216,11 @@ def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
 
 
 def refuse_mpirun() -> None:
-    """Raise InputError in a process that mpirun has started: those it starts would take themselves for it."""
+    """Raise InputError in a process that mpirun has started: those it starts would take themselves
+    for it."""
     if any(name in os.environ for name in _MPI):
         raise InputError(
-            "ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
+            "ida starts processes and must not be one of MPI's: start it without mpirun, and give "
+            "the "
             "runs their ranks with --launch 'mpirun -n N'"
         )

@@ -27,13 +27,15 @@ SAID = "failure.txt"
 
 @dataclass(frozen=True)
 class Shaking:
-    """Name the record files of one run, one for each ground motion of the case: "h" of (h.at2, v.at2)."""
+    """Name the record files of one run, one for each ground motion of the case: "h" of (h.at2,
+    v.at2)."""
 
     name: str
     files: tuple[Path, ...]
 
     def settings(self, case: Case, factor: float = 1.0) -> tuple[str, ...]:
-        """Return KEY=VALUE that put these records into the case, times its own scales and the factor."""
+        """Return KEY=VALUE that put these records into the case, times its own scales and the
+        factor."""
         found = []
         for (place, table), path in zip(ground_motions(case), self.files, strict=True):
             record = table.get("record")
@@ -49,7 +51,8 @@ class Shaking:
         return tuple(found)
 
     def record(self, case: Case) -> Record:
-        """Return the first motion as the case prepares it, factor 1; InputError when a file is wrong."""
+        """Return the first motion as the case prepares it, factor 1; InputError when a file is
+        wrong."""
         return _record(case.path, (*case.settings, *self.settings(case)), case.allowed)
 
 
@@ -61,7 +64,8 @@ def _record(path: Path, settings: tuple[str, ...], allowed: tuple[str, ...]) -> 
 
 
 def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
-    """Return (key, table) of the ground motions of a case; InputError unless it is shaken by records alone."""
+    """Return (key, table) of the ground motions of a case; InputError unless it is shaken by
+    records alone."""
     refuse_own(case.tables, "excitation", f"{case.path}: ida")
     tables = case.tables.get("excitation", [])
     found: list[tuple[str, Mapping[str, Any]]] = [("excitation", tables)]
@@ -70,7 +74,8 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     for place, table in found:
         if table.get("type") != "GroundMotion":
             raise InputError(
-                f"{case.path}: [{place}] has no record that others can replace: make it a GroundMotion "
+                f"{case.path}: [{place}] has no record that others can replace: make it a "
+                "GroundMotion "
                 "with a record file"
             )
     if not found:
@@ -82,8 +87,9 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
 
 @checked
 def record_set(word: str) -> list[list[str]]:
-    """Return the files of each record of "H", "H,V", a folder (its AT2 files, if it has any, else all) or "@LIST".
-    A LIST is a file with "H" or "H,V" in each line, relative to its folder. InputError for others."""
+    """Return the files of each record of "H", "H,V", a folder (its AT2 files, if it has any, else
+    all) or "@LIST". A LIST is a file with "H" or "H,V" in each line, relative to its folder.
+    InputError for others."""
     folder, names, path = Path(), [word], Path(word.removeprefix("@"))
     try:
         if word.startswith("@"):
@@ -101,13 +107,15 @@ def record_set(word: str) -> list[list[str]]:
     found = [[name.strip() for name in one.split(",")] for one in names]
     if not found or not all(map(all, found)):
         raise InputError(
-            f"--motions {word}: give FILE or FILE,FILE, a folder, or @LIST with one record in a line"
+            f"--motions {word}: give FILE or FILE,FILE, a folder, or @LIST with one record in a "
+            "line"
         )
     return [[str(folder / name) for name in files] for files in found]
 
 
 def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -> list[Shaking]:
-    """Return the records by name; a motion is a file, or one file for each ground motion of the case."""
+    """Return the records by name; a motion is a file, or one file for each ground motion of the
+    case."""
     count = len(ground_motions(case))
     found: dict[str, Shaking] = {}
     for motion in motions:
@@ -117,12 +125,14 @@ def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -
         if len(files) != count:
             names = ", ".join(one.name for one in files)
             raise InputError(
-                f"{names}: the case has {count} ground motion{'s' * (count > 1)}: give as many files"
+                f"{names}: the case has {count} ground motion{'s' * (count > 1)}: give as many "
+                "files"
             )
         name = files[0].stem
         if name in found:
             raise InputError(
-                f"two motions are called '{name}': rename a file, as their runs need different names"
+                f"two motions are called '{name}': rename a file, as their runs need different "
+                "names"
             )
         found[name] = Shaking(name, files)
     if not found:
@@ -150,7 +160,8 @@ class OneRun:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Return all KEY=VALUE that make the run of the case file; it writes fields only if the study sets them."""
+        """Return all KEY=VALUE that make the run of the case file; it writes fields only if the
+        study sets them."""
         asked = "fields" not in self.case.tables or any(
             one.startswith("fields") for one in self.case.settings
         )
@@ -161,7 +172,8 @@ class OneRun:
         )
 
     def keep(self, said: str, code: int) -> Row:
-        """Write the row of a run that ended with this status, having said this; failed ones leave that in a file."""
+        """Write the row of a run that ended with this status, having said this; failed ones leave
+        that in a file."""
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
         row = {
@@ -190,7 +202,8 @@ def read_json(path: Path) -> dict[str, Any] | None:
 
 
 def read_row(path: Path) -> dict[str, Any] | None:
-    """Return the row of a run; None when there is none, or the file is not as ``OneRun.keep`` leaves it."""
+    """Return the row of a run; None when there is none, or the file is not as ``OneRun.keep``
+    leaves it."""
     row = read_json(path) or {}
     files, scale = row.get("files"), row.get("scale")
     whole = all(isinstance(row.get(name), str) for name in ("record", "status", "reason"))
