@@ -211,7 +211,10 @@ def draw(contact: vc.ContactSurface, runs: Mapping[str, History], out: Path, qui
 def summary(material: vc.LinearElastic) -> str:
     """Return the numbers of a material on two lines."""
     size, unit = (1e9, "GPa") if material.E >= 1e9 else (1e6, "MPa")
-    return f"$E$ = {material.E / size:g} {unit}, $\\nu$ = {material.nu:g}\n$\\rho$ = {material.rho:g} kg/m³"
+    return (
+        f"$E$ = {material.E / size:g} {unit}, $\\nu$ = {material.nu:g}\n$\\rho$ = "
+        f"{material.rho:g} kg/m³"
+    )
 
 
 def command_line(words: Sequence[str]) -> int:

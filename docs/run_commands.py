@@ -88,7 +88,9 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     r"\.venv/report/bin/python .*|\.venv/site/bin/jupytext "
     r".*": "needs what install/report.sh or install/site.sh makes",
     r"(srun|sbatch) "
-    r".*|.*\$SLURM_\w+.*": "needs Slurm; without it: tests/run/test_wall_time.py::test_the_batch_script_of_the_guide",
+    r".*|.*\$SLURM_\w+.*": (
+        "needs Slurm; without it: tests/run/test_wall_time.py::test_the_batch_script_of_the_guide"
+    ),
     r"mpirun -n 64 .*|XDG_CACHE_HOME=\$HOME/forms .*": "needs a cluster",
     r"(docker|apptainer) .*": "needs a container program",
     r"vi-contact report \S+ --out \S+\.html": "needs what install/report.sh brings; "
@@ -102,7 +104,10 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     r"bash demos/run\.sh (-n 2 )?raft --size "
     r".*": "minutes and up to 30 GB; docs/gallery/make.py runs the small one",
     r"vi-contact ida wall\.toml --motions records "
-    r".*": "hours; the page's small one: tests/studies/test_ida.py::test_the_example_gives_a_tidy_table",
+    r".*": (
+        "hours; the page's small one: "
+        "tests/studies/test_ida.py::test_the_example_gives_a_tidy_table"
+    ),
 }
 NAMES = (  # commands of ours that are named on a page and not given there
     r"vi-contact (run|new|report|film|ida|post|plot|post checks|run --check|run CASE "

@@ -82,7 +82,10 @@ def room_page(name: str) -> str:
     path = f"vi_contact.{name}"
     entries = (entry(one, where, above.get(one, "").split(".")[0] == name) for one in public(where))
     head = f"# {path}\n\n:::{{py:module}} {path}\n:::\n"
-    told = "This page is for users who write Python. It has every public name of this room, with its whole docstring.\n"
+    told = (
+        "This page is for users who write Python. It has every public name of this room, with "
+        "its whole docstring.\n"
+    )
     return "\n".join([head, told, described(documentation(where.tree)), "", *entries])
 
 

@@ -12,7 +12,10 @@ TITLE = "CalculiX"
 INSTALL = {"apt": ["calculix-ccx"]}
 WAYS = {
     "signorini": {
-        "best": "NODE TO SURFACE, PRESSURE-OVERCLOSURE=LINEAR of 1e17 Pa/m, residual and correction to 1e-8",
+        "best": (
+            "NODE TO SURFACE, PRESSURE-OVERCLOSURE=LINEAR of 1e17 Pa/m, residual and "
+            "correction to 1e-8"
+        ),
         "default": "SURFACE TO SURFACE, PRESSURE-OVERCLOSURE=HARD without a number, default controls",
     },
     "thrown": {
@@ -43,7 +46,9 @@ STOPS = {
     },
 }
 BY_HAND = {
-    "signorini": "nodal contact forces: the residual of the printed displacements, which have seven digits"
+    "signorini": (
+        "nodal contact forces: the residual of the printed displacements, which have seven digits"
+    )
 }
 
 

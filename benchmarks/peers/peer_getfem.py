@@ -12,7 +12,9 @@ TITLE = "GetFEM"
 INSTALL = {"apt": ["python3-getfem"]}
 WAYS = {
     "signorini": {
-        "best": "nodal contact brick, symmetric augmented Lagrangian, r = E, max_res 1e-8 of the load",
+        "best": (
+            "nodal contact brick, symmetric augmented Lagrangian, r = E, max_res 1e-8 of the load"
+        ),
         "default": "nodal contact brick and solve without options, r = E",
         "default, scaled": "the same in units of force in which E = 1",
     },

@@ -23,12 +23,23 @@ INSTALL = {
 }
 WAYS = {
     "signorini": {
-        "best": "ALM mortar contact, frictionless, all tolerances 1e-8, LinearSolversApplication.sparse_lu",
-        "default": "ALM mortar contact, frictionless, contact_residual_criterion as in its examples, else by default",
+        "best": (
+            "ALM mortar contact, frictionless, all tolerances 1e-8, "
+            "LinearSolversApplication.sparse_lu"
+        ),
+        "default": (
+            "ALM mortar contact, frictionless, contact_residual_criterion as in its examples, "
+            "else by default"
+        ),
     },
     "thrown": {
-        "best": "ALM mortar contact, Bossak's scheme with alpha = -0.3, all tolerances 1e-8, sparse_lu",
-        "default": "ALM mortar, Bossak's scheme, contact_residual_criterion as in its examples, rest by default",
+        "best": (
+            "ALM mortar contact, Bossak's scheme with alpha = -0.3, all tolerances 1e-8, sparse_lu"
+        ),
+        "default": (
+            "ALM mortar, Bossak's scheme, contact_residual_criterion as in its examples, rest "
+            "by default"
+        ),
     },
     "bar": {
         "best": "a strip one cell wide; ALM mortar contact, Bossak's scheme with alpha = -0.3, all tolerances 1e-8, "

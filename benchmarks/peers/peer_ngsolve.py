@@ -25,12 +25,18 @@ WAYS = {
     "thrown": {
         "best": "own midpoint rule with the discrete gradient of the penalty's energy, which conserves their "
         "sum; 10 E/h, NewtonSolver",
-        "default": "ngsolve.timestepping.Newmark (average acceleration) with penalty 1000 E/h and a direct solver",
+        "default": (
+            "ngsolve.timestepping.Newmark (average acceleration) with penalty 1000 E/h and a "
+            "direct solver"
+        ),
     },
     "bar": {
         "best": "own midpoint rule with the discrete gradient of the penalty's energy, which conserves their "
         "sum; E/h, NewtonSolver",
-        "default": "ngsolve.timestepping.Newmark (average acceleration) with penalty 1000 E/h and a direct solver",
+        "default": (
+            "ngsolve.timestepping.Newmark (average acceleration) with penalty 1000 E/h and a "
+            "direct solver"
+        ),
     },
 }
 STOPS = {

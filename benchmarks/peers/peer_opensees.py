@@ -21,10 +21,16 @@ WAYS = {
     "thrown": {
         "best": "zeroLength elements with the material ElasticPPGap (the gap is its own), 10 E a node, "
         "integrator TRBDF2",
-        "default": "the same elements, 1000 E a node, integrator Newmark(0.5, 0.25), which its examples use",
+        "default": (
+            "the same elements, 1000 E a node, integrator Newmark(0.5, 0.25), which its "
+            "examples use"
+        ),
     },
     "bar": {
-        "best": "Truss elements, zeroLength with ElasticPPGap of an element's stiffness, integrator TRBDF2",
+        "best": (
+            "Truss elements, zeroLength with ElasticPPGap of an element's stiffness, "
+            "integrator TRBDF2"
+        ),
         "default": "the same elements, 1000 times an element's stiffness, integrator Newmark(0.5, 0.25), which its "
         "examples use",
     },

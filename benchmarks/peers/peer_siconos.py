@@ -14,14 +14,23 @@ TITLE = "Siconos"
 INSTALL = {"apt": ["python3-siconos"]}
 WAYS = {
     "signorini": {
-        "best": "linear complementarity problem of the contact nodes by Lemke's method, which is also the default",
+        "best": (
+            "linear complementarity problem of the contact nodes by Lemke's method, which is "
+            "also the default"
+        ),
     },
     "thrown": {
-        "best": "TimeSteppingDirectProjection, Moreau-Jean with theta = 1/2 and e = 0: positions are projected too",
+        "best": (
+            "TimeSteppingDirectProjection, Moreau-Jean with theta = 1/2 and e = 0: positions "
+            "are projected too"
+        ),
         "default": "TimeStepping, Moreau-Jean with theta = 1/2 and e = 0, LCP with its default solver",
     },
     "bar": {
-        "best": "TimeSteppingDirectProjection, Moreau-Jean with theta = 1/2 and e = 0: positions are projected too",
+        "best": (
+            "TimeSteppingDirectProjection, Moreau-Jean with theta = 1/2 and e = 0: positions "
+            "are projected too"
+        ),
         "default": "TimeStepping, Moreau-Jean with theta = 1/2 and e = 0, LCP with its default solver",
     },
 }
@@ -31,7 +40,10 @@ STOPS = {
     "bar": {"best": "pivoting ends; projection built in", "default": "pivoting ends"},
 }
 BY_HAND = {
-    "signorini": "mesh, matrices and the elimination of all nodes but those of the contact (it has no finite elements)",
+    "signorini": (
+        "mesh, matrices and the elimination of all nodes but those of the contact (it has no "
+        "finite elements)"
+    ),
     "thrown": "mesh and matrices (it has no finite elements)",
     "bar": "mesh and matrices (it has no finite elements)",
 }

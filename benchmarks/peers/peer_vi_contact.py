@@ -15,16 +15,25 @@ TITLE = "vi_contact"
 INSTALL = {"system": []}
 WAYS = {
     "signorini": {
-        "best": "static_equilibrium with the solver Condensed(): the unknowns of the contact alone, by active sets",
+        "best": (
+            "static_equilibrium with the solver Condensed(): the unknowns of the contact "
+            "alone, by active sets"
+        ),
         "default": "static_equilibrium, no option",
     },
     "thrown": {
-        "best": "simulate, no option (the default): trapezoidal rule, mass redistributed, as the guide advises here",
+        "best": (
+            "simulate, no option (the default): trapezoidal rule, mass redistributed, as the "
+            "guide advises here"
+        ),
         "never "
         "gains": "ContactStabilisedNewmark, which the guide names for energy that must never grow",
     },
     "bar": {
-        "best": "simulate, no option (the default): trapezoidal rule, mass redistributed, as the guide advises here",
+        "best": (
+            "simulate, no option (the default): trapezoidal rule, mass redistributed, as the "
+            "guide advises here"
+        ),
         "never "
         "gains": "ContactStabilisedNewmark, which the guide names for energy that must never grow",
     },

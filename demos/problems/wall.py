@@ -36,7 +36,10 @@ CASES = {
     "free": (),  # no contact: the linear run
 }
 BASE_INERTIA = {  # which mass the ground accelerates, and what log and summary say about it
-    "whole": "inertia load of the ground motion: the whole mass, that which elements share with the base included",
+    "whole": (
+        "inertia load of the ground motion: the whole mass, that which elements share with the "
+        "base included"
+    ),
     "catalogue": "inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave "
     "out the mass that elements share with the base",
 }

@@ -81,7 +81,10 @@ def test_convert_is_read_back(packet, capsys, out, options, units, form):
 
 
 def test_convert_with_every_step(packet, capsys):
-    options = "--trim 1 12 --pad 2 3 --remove-mean --taper --low 0.1 --high 20 --order 2 --causal --resample 0.005 "
+    options = (
+        "--trim 1 12 --pad 2 3 --remove-mean --taper --low 0.1 --high 20 --order 2 --causal "
+        "--resample 0.005 "
+    )
     said(
         capsys, "convert", "packet.at2", "out.txt", *options.split(), "--baseline", "--pga", "0.3g"
     )

@@ -67,7 +67,10 @@ def test_without_a_compiler_a_form_is_one_sentence_on_all_ranks(monkeypatch, sha
     form = number * ufl.inner(u, v) * ufl.dx
     monkeypatch.setitem(compat._defaults, "cache_dir", (str(shared_tmp), "of the test"))
     monkeypatch.setenv("CC", "/nowhere/cc")
-    said_of_it = r"cannot compile a finite element form \(.*/nowhere/cc.*name the compiler by the environment variable"
+    said_of_it = (
+        r"cannot compile a finite element form \(.*/nowhere/cc.*name the compiler by the "
+        r"environment variable"
+    )
     with pytest.raises(InputError, match=said_of_it) as said:
         compat.compile_form(form)
     assert len(str(said.value).splitlines()) == 1

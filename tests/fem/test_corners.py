@@ -637,7 +637,10 @@ def test_refusals():
         with pytest.raises(InputError, match="feature_angle is .*give"):
             fem.contact_surface(system, wall, feature_angle=angle)
     surface = fem.contact_surface(system, wall)
-    sentence = r"1 contact nodes, the first at \(0, 0\), have several contact directions, and friction on two faces"
+    sentence = (
+        r"1 contact nodes, the first at \(0, 0\), have several contact directions, and "
+        r"friction on two faces"
+    )
     for friction in (vc.Coulomb(0.3), vc.Tresca(1e3)):
         with pytest.raises(InputError, match=sentence):
             ContactProblem(system, surface, friction=friction)

@@ -238,7 +238,10 @@ def test_what_is_refused():
     def clamped(space: Any, marker: Any = at(0, 0.0)) -> Any:
         return dfem.dirichletbc(dfem.Function(space), on(space, marker))
 
-    remedy = "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or on V.sub(i)"
+    remedy = (
+        "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, "
+        "or on V.sub(i)"
+    )
     assert said(clamped(W)) == f"assemble: a dirichletbc of bcs is on another mesh; {remedy}"
     assert (
         said(clamped(scalar))

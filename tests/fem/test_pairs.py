@@ -359,7 +359,10 @@ def test_sides_that_do_not_pair():
     ):
         contact_pair(system, one, two)
     system, tags = two_blocks(COMM, blocks(2, offset=(0.375,)))
-    sentence = r"1 of 5 nodes of 'lower_top' have no node of 'upper_bottom' opposite, the first at \(0, 1\): mesh both"
+    sentence = (
+        r"1 of 5 nodes of 'lower_top' have no node of 'upper_bottom' opposite, the first at "
+        r"\(0, 1\): mesh both"
+    )
     with pytest.raises(InputError, match=sentence):
         contact_pair(system, tags["lower_top"], tags["upper_bottom"])
     with pytest.raises(
@@ -415,7 +418,10 @@ def test_inner_boundaries():
 
 def test_clamped_nodes_and_directions():
     system, tags = two_blocks(COMM, blocks(2), clamped=lambda tags: tags["upper_left"])
-    sentence = r"contact node \(0, 1\) of 'upper_bottom' is clamped but faces a free node of 'lower_top': make"
+    sentence = (
+        r"contact node \(0, 1\) of 'upper_bottom' is clamped but faces a free node of "
+        r"'lower_top': make"
+    )
     with pytest.raises(InputError, match=sentence):
         contact_pair(system, tags["upper_bottom"], tags["lower_top"])
     assert contact_pair(system, tags["lower_top"], tags["upper_bottom"]).total == 5

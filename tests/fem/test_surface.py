@@ -294,7 +294,10 @@ def test_contact_direction_partly_prescribed():
     across = assemble(mesh, CONCRETE, prescribed=Prescribed(tags["left"], components=(0,)))
     assert contact_surface(across, tags["bottom"]).total == 6
     along = assemble(mesh, CONCRETE, prescribed=Prescribed(tags["left"], components=(1,)))
-    sentence = r"contact node \(0, 0\) is also prescribed along its contact direction: free that component or leave"
+    sentence = (
+        r"contact node \(0, 0\) is also prescribed along its contact direction: free that "
+        r"component or leave"
+    )
     with pytest.raises(InputError, match=sentence):
         contact_surface(along, tags["bottom"])
     with pytest.raises(InputError, match=sentence):

@@ -43,7 +43,10 @@ def peer(line, per_row=5, form="{:15.7E}", end="\n", values=VALUES):
     )
 
 
-PROSE = "El Centro 1940, north-south component\n{}\nThe units are (g)\nthree\nmore\nlines of text\n*** Begin data ***\n"
+PROSE = (
+    "El Centro 1940, north-south component\n{}\nThe units are (g)\nthree\nmore\nlines of "
+    "text\n*** Begin data ***\n"
+)
 
 AT2 = {
     "el centro": peer("NPTS=    11, DT= .02000 SEC", 8, "{:10.5f}", end=""),

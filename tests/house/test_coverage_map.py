@@ -75,7 +75,10 @@ COVERS = {
     "models/test_channel.py": "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_faces.py": "plots.bodies",
-    "plots/test_report.py": "cli.pictures cli.post plots.charts plots.pages plots.sections run.files.reading studies.report",
+    "plots/test_report.py": (
+        "cli.pictures cli.post plots.charts plots.pages plots.sections run.files.reading "
+        "studies.report"
+    ),
     "core/test_own_files.py": "core.hdf5",
     "house/test_wrong_types.py": "core.arguments",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
@@ -109,7 +112,10 @@ COVERS = {
     "studies/test_description.py": "fem.output.outline plots.sketch",
     "studies/test_case_stages.py": "studies.cases.stage_tables studies.cases.stages",
     "studies/test_strain_compatible_case.py": "studies.cases.strain_compatible",
-    "studies/test_ida.py": "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",
+    "studies/test_ida.py": (
+        "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes "
+        "studies.ida.runs"
+    ),
     "vi/test_inequality.py": "vi.judged",
     "vi/test_load_steps.py": "vi.linear_steps vi.newton",
     "vi/test_minimum.py": "vi.model",

@@ -229,7 +229,10 @@ def test_import_needs_numpy_and_scipy_only(hidden: tuple[str, ...]) -> None:
     """With packages hidden, ``import vi_contact`` and the names that need no finite elements are
     there."""
     names = "vc.Condensed, vc.Trapezoidal, vc.march"
-    code = f"import sys; sys.modules.update(dict.fromkeys({hidden!r})); import vi_contact as vc; {names}"
+    code = (
+        f"import sys; sys.modules.update(dict.fromkeys({hidden!r})); import vi_contact as vc; "
+        f"{names}"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600
     )
@@ -277,7 +280,10 @@ def test_names_are_public(document: Path) -> None:
     assert [name for name in files if not any((top / name).exists() for top in tops)] == []
 
 
-CIPHERS = r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver notes|\bseismic\.md"
+CIPHERS = (
+    r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver "
+    r"notes|\bseismic\.md"
+)
 REGISTERS = {"verification.md", "sources.md", "petsc.md"}  # these explain the names
 
 

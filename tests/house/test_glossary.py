@@ -93,7 +93,10 @@ def test_lines_of_the_printed_summary_are_named() -> None:
 
 
 def test_every_entry_has_two_translations_a_sentence_and_a_link() -> None:
-    form = r".+\n\nGerman \*[^*]+\*, French \*[^*]+\*\.[^\n]*\n\n[A-Z][^\n]*\. \[Read more\]\([^)]+\)\.\n"
+    form = (
+        r".+\n\nGerman \*[^*]+\*, French \*[^*]+\*\.[^\n]*\n\n[A-Z][^\n]*\. \[Read "
+        r"more\]\([^)]+\)\.\n"
+    )
     assert len(ENTRIES) > 150
     assert [term for term, entry in ENTRIES.items() if not re.match(form, entry)] == []
 

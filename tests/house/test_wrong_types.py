@@ -164,7 +164,10 @@ def defect(found: Callable[..., Any], first: list[Any], given: dict[str, Any]) -
         )
     except Exception as error:  # what the interface must never raise here
         place = traceback.extract_tb(error.__traceback__)[-1]
-        return f"{type(error).__name__}: {str(error)[:100]} ({Path(place.filename).name}, line {place.lineno})"
+        return (
+            f"{type(error).__name__}: {str(error)[:100]} ({Path(place.filename).name}, line "
+            f"{place.lineno})"
+        )
     return ""
 
 

@@ -22,7 +22,10 @@ from vi_contact.studies.report import report
 pytestmark = pytest.mark.serial
 report_packages()
 EVIL = "<script>document.documentElement.dataset.evil = 1</script>"
-BREAK = '</script><img src=x onerror="document.documentElement.dataset.evil = 2">\'"&amp;{{ 7 * 7 }} Ünï'
+BREAK = (
+    '</script><img src=x onerror="document.documentElement.dataset.evil = 2">\'"&amp;{{ 7 * 7 '
+    "}} Ünï"
+)
 
 
 def charts(page: str) -> list[dict[str, Any]]:

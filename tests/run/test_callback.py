@@ -135,7 +135,10 @@ def test_what_it_raises_ends_the_run_on_all_ranks(comm: Any, shared_tmp: Path) -
     ranks."""
     problem = shaken_wall(comm)
     seen = Seen(7, lambda: fail() if comm.rank == comm.size - 1 else None)
-    words = r"the callback after step 7, t = 0\.0125 s: it ended in ValueError: too large \(test_callback\.py, line \d"
+    words = (
+        r"the callback after step 7, t = 0\.0125 s: it ended in ValueError: too large "
+        r"\(test_callback\.py, line \d"
+    )
     with pytest.raises(vc.InputError, match=words):
         vc.simulate(problem, **RUN, steps=30, out=shared_tmp, callback=seen)
     comm.Barrier()  # rank 0 writes the summary last

@@ -276,7 +276,10 @@ def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path
     box = rubbing_box(comm, None)
     settings: dict[str, Any] = {"scheme": Trapezoidal(), "dt": 1e-3, "out": shared_tmp}
     simulate(box, steps=3, **settings)
-    words = r"a run with mass = Redistributed\(lumping=0.4\) but this one has ConsistentMass\(\): restart the same"
+    words = (
+        r"a run with mass = Redistributed\(lumping=0.4\) but this one has ConsistentMass\(\): "
+        r"restart the same"
+    )
     with pytest.raises(InputError, match=words):
         simulate(replace(box, mass=ConsistentMass()), steps=6, restart=True, **settings)
     assert (

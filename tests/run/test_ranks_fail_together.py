@@ -204,7 +204,10 @@ def test_a_recorder(comm: Any, shared_tmp: Path, k: int) -> None:
     problem = shaken_wall(comm)
     run = {"scheme": vc.ZienkiewiczWoodTaylor(), **NO_PROGRESS, "out": shared_tmp}
     record = [Failing(comm, k), vc.Energy(), vc.Contact()]
-    words = f"the recorder Failing {'in step 7, t = 0.0125 s,' if k else 'at the start'} ended in KeyError: 'own'"
+    words = (
+        f"the recorder Failing {'in step 7, t = 0.0125 s,' if k else 'at the start'} ended in "
+        "KeyError: 'own'"
+    )
     with pytest.raises(
         KeyError if last(comm) else vc.InputError, match="'own'" if last(comm) else words
     ):

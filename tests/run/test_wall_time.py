@@ -228,7 +228,10 @@ def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
         script = script.replace(old, new)
     (tmp_path / "job.sh").write_text(script)
     tools = {
-        "srun": 'while [ "$1" != vi-contact ]; do shift; done; shift; sleep 1; exec "$PYTHON" -m vi_contact "$@"',
+        "srun": (
+            'while [ "$1" != vi-contact ]; do shift; done; shift; sleep 1; exec "$PYTHON" -m '
+            'vi_contact "$@"'
+        ),
         "sbatch": 'echo again >> "$SLURM_SUBMIT_DIR/jobs"; exec bash "$1"',
     }
     for name, does in tools.items():

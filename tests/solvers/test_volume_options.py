@@ -320,7 +320,10 @@ def test_iteration_limit_is_a_failure_in_words(pushed: Case, method: Any) -> Non
     afterwards."""
     volume = Volume(method=method, petsc_options={"snes_max_it": 1, "tao_max_it": 1})
     prepared = prepare(pushed, volume)
-    text = r"stopped after 1 iterations with relative residual \d.*DIVERGED_MAX_?ITS? \(the iteration limit was reached"
+    text = (
+        r"stopped after 1 iterations with relative residual \d.*DIVERGED_MAX_?ITS? \(the "
+        r"iteration limit was reached"
+    )
     with pytest.raises(StepFailure, match=rf"{type(method).__name__}\) {text}\): check that"):
         prepared.solve(pushed.step)
     away = replace(pushed.step, b=np.zeros_like(pushed.step.b))

@@ -57,7 +57,10 @@ gravity = 10.0
 nu = 0.25
 part = "stem"
 """
-RANKINE = '\n[[check]]\ntype = "Rankine"\nheight = 1.0\nrho = 2000\npart = "stem"\nphi = 0.5\nslope = 0.6\n'
+RANKINE = (
+    '\n[[check]]\ntype = "Rankine"\nheight = 1.0\nrho = 2000\npart = "stem"\nphi = 0.5\nslope '
+    "= 0.6\n"
+)
 
 
 def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

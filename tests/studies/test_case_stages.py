@@ -191,7 +191,10 @@ def test_a_support_that_carries_load_is_not_forgotten(shared_tmp: Path) -> None:
         case(shared_tmp, HOUSE.replace("release = true", "release = false")).run(
             COMM, progress=False
         )
-    said = f"[[stage]] 2 'shock': it removes the support 'lower_bottom', which carries {weight:.4g} N: give release"
+    said = (
+        "[[stage]] 2 'shock': it removes the support 'lower_bottom', which carries "
+        f"{weight:.4g} N: give release"
+    )
     assert said in f"{told.value}"
 
 

@@ -204,7 +204,10 @@ VAIN: dict[str, tuple[str, str, str]] = {
         CASE + '[solver]\ntype = "CrossChecked"\nprimary = {type = "Condensed"}\nothers = []\n',
         ": [solver] CrossChecked: others names no solver, so that nothing is compared",
         CASE
-        + '[solver]\ntype = "CrossChecked"\nprimary = {type = "Condensed"}\nothers = [{type = "Volume"}]\n',
+        + (
+            '[solver]\ntype = "CrossChecked"\nprimary = {type = "Condensed"}\nothers = [{type '
+            '= "Volume"}]\n'
+        ),
     ),
     "weight of a recorder": (
         CASE + REACTIONS,
@@ -219,7 +222,10 @@ VAIN: dict[str, tuple[str, str, str]] = {
     ),
     "mass of scheme and problem": (
         CASE
-        + '[mass]\ntype = "ConsistentMass"\n[scheme]\ntype = "Trapezoidal"\nmass = {type = "Redistributed"}\n',
+        + (
+            '[mass]\ntype = "ConsistentMass"\n[scheme]\ntype = "Trapezoidal"\nmass = {type = '
+            '"Redistributed"}\n'
+        ),
         ": [scheme] mass is not read, as [mass] comes before it: leave one of the two out",
         CASE + '[mass]\ntype = "ConsistentMass"\n[scheme]\ntype = "Trapezoidal"\n',
     ),

@@ -114,7 +114,10 @@ def esm_head(count: int) -> str:
 
 
 def at2_head(count: int) -> str:
-    return f"PEER NGA\nMADE, 5/19/40\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= {count:6d}, DT= .0200 SEC\n"
+    return (
+        f"PEER NGA\nMADE, 5/19/40\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= {count:6d}, "
+        "DT= .0200 SEC\n"
+    )
 
 
 def begin_head(count: int) -> str:

@@ -116,9 +116,15 @@ def _sentence(error: Exception) -> str | None:
     if isinstance(error, OSError):
         return sentence(error)
     if isinstance(error, ModuleNotFoundError) and error.name in LIBRARIES:
-        return f"{error.name} is needed and this Python does not find it: install it (docs/start/install.md)"
+        return (
+            f"{error.name} is needed and this Python does not find it: install it "
+            "(docs/start/install.md)"
+        )
     if isinstance(error, OverflowError | FloatingPointError):
-        return f"a number is too large for the machine ({error}): check the sizes and units of all inputs"
+        return (
+            f"a number is too large for the machine ({error}): check the sizes and units of "
+            "all inputs"
+        )
     return None
 
 

@@ -108,7 +108,10 @@ def _loop(options: argparse.Namespace) -> str:
     )
     x, y = ((name, run.columns[name][0]) for name in (options.deformation, options.force))
     picture = plot_loop(loop, table.with_suffix(".png"), x=x, y=y)
-    return f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: {table}\npicture: {picture}"
+    return (
+        f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: "
+        f"{table}\npicture: {picture}"
+    )
 
 
 def _checks(options: argparse.Namespace) -> str:

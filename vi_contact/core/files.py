@@ -90,14 +90,20 @@ def sentence(error: OSError) -> str:
             "and restart from the last checkpoint"
         )
     if error.errno in _REFUSED:
-        return f"{path} cannot be opened ({error.strerror}): change its permissions, or choose another folder"
+        return (
+            f"{path} cannot be opened ({error.strerror}): change its permissions, or choose "
+            "another folder"
+        )
     if error.errno in _MANY:
         return (
             f"{path} cannot be opened ({error.strerror}): raise the limit of open files (ulimit -n)"
         )
     if isinstance(error, BrokenPipeError):
         return f"what reads {path} has ended before all was written: let it read to the end"
-    return f"{path} cannot be read or written ({error.strerror or error}): check it, or choose another output folder"
+    return (
+        f"{path} cannot be read or written ({error.strerror or error}): check it, or choose "
+        "another output folder"
+    )
 
 
 def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:

@@ -130,7 +130,10 @@ class ContactSurface:
         """Return how many conditions this rank has, and of which kind: not the arrays."""
         springs, held = np.count_nonzero(self.compliance), np.count_nonzero(self.bilateral)
         moves = "" if self.motion is None and self.slide is None else ", on a moving obstacle"
-        return f"{type(self).__name__}({self.count} conditions here: {springs} on springs, {held} bilateral{moves})"
+        return (
+            f"{type(self).__name__}({self.count} conditions here: {springs} on springs, {held} "
+            f"bilateral{moves})"
+        )
 
     @property
     def count(self) -> int:

@@ -230,7 +230,10 @@ class SemiDiscreteSystem:
 
     def __repr__(self) -> str:
         """Return what it is, in words: not the arrays."""
-        kind = f"{'un' if self.C is None else ''}damped, {'floating' if self.floating else 'supported'}"
+        kind = (
+            f"{'un' if self.C is None else ''}damped, "
+            f"{'floating' if self.floating else 'supported'}"
+        )
         return (
             f"SemiDiscreteSystem({self.space.unknowns} unknowns in {self.space.dimension}D, {kind})"
         )

@@ -116,7 +116,10 @@ class CompliantBase(Dashpots):
 
     @property
     def expects(self) -> str:
-        return "expects the upgoing motion, half the velocity of an outcrop (not the within motion of its depth)"
+        return (
+            "expects the upgoing motion, half the velocity of an outcrop (not the within "
+            "motion of its depth)"
+        )
 
 
 class DashpotMatrix:

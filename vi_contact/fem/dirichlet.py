@@ -15,7 +15,10 @@ from . import compat
 from .communicators import MpiComm
 from .numbering import facet_rows
 
-REMEDY = "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or on V.sub(i)"
+REMEDY = (
+    "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or "
+    "on V.sub(i)"
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,7 +91,10 @@ class LinearForm:
             vector = compat.assemble_vector(vector_of)
             forces = thickness * vector.array_r
             vector.destroy()
-            defect = f"{NAME} gives NaN or infinite forces at t = {t:g} s: check its Functions, Constants and numbers"
+            defect = (
+                f"{NAME} gives NaN or infinite forces at t = {t:g} s: check its Functions, "
+                "Constants and numbers"
+            )
             refuse(["" if np.all(np.isfinite(forces)) else defect], space.comm)
             return np.asarray(
                 forces if update is not None else self._once.setdefault(space, forces)

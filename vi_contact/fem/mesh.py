@@ -50,7 +50,10 @@ class Group:
         )
         count, numbers, defect = local_count(mesh, self.codimension), np.asarray(self.indices), ""
         if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
-            defect = f"{owner}: indices is {shown(self.indices)}; give local numbers, such as tags.find(value) returns"
+            defect = (
+                f"{owner}: indices is {shown(self.indices)}; give local numbers, such as "
+                "tags.find(value) returns"
+            )
         elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
             defect = (
                 f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but "

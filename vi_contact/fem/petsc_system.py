@@ -85,7 +85,10 @@ def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
     elif MPI.Comm.Compare(A.comm.tompi4py(), K.comm.tompi4py()) not in (MPI.IDENT, MPI.CONGRUENT):
         said = "and K are on different communicators; make them on one"
     elif A.getLocalSize() != (n, n):
-        said = f"has {A.getLocalSize()} rows and columns on this rank and K {n} rows; give square ones of one layout"
+        said = (
+            f"has {A.getLocalSize()} rows and columns on this rank and K {n} rows; give square "
+            "ones of one layout"
+        )
     elif np.dtype(PETSc.ScalarType).kind == "c":
         said = "is complex, as all matrices of this PETSc; use one with real numbers"
     if said:

@@ -110,7 +110,10 @@ class GeoFile:
                 if said.strip().startswith(
                     ("terminate called", "what()")
                 ):  # for a text that Gmsh throws
-                    said = "it stopped at a formula or size: check Field[…].F, and that Mesh.MeshSize… is positive"
+                    said = (
+                        "it stopped at a formula or size: check Field[…].F, and that "
+                        "Mesh.MeshSize… is positive"
+                    )
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace(PREFIX, '')}")
             for note in done.stdout.splitlines():
                 log.warning("%s: %s", self.path, note)

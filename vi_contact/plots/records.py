@@ -200,7 +200,10 @@ def _husid(axis: Any, record: Record) -> None:
         start, end = np.interp((5.0, 95.0), curve, record.times)
         axis.axvspan(start, end, color="tab:blue", alpha=0.12)
     axis.plot(record.times, curve, color="black", lw=0.9)
-    text = f"Arias {arias(record):.3g} m/s, D5-95 {d5_95(record):.3g} s, PGA {pga(record) / STANDARD_GRAVITY:.3g} g"
+    text = (
+        f"Arias {arias(record):.3g} m/s, D5-95 {d5_95(record):.3g} s, PGA "
+        f"{pga(record) / STANDARD_GRAVITY:.3g} g"
+    )
     axis.text(0.98, 0.08, text, transform=axis.transAxes, ha="right", fontsize=8)
     axis.set(ylabel="Arias intensity [%]", ylim=(-3.0, 103.0))
 

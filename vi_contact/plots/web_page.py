@@ -88,7 +88,9 @@ def write_web_page(
             }
             for script in scripts
         ],
-        thinned=f"Curves have at most {most} points, in which extremes are kept; history.csv has all."
+        thinned=(
+            f"Curves have at most {most} points, in which extremes are kept; history.csv has all."
+        )
         if thin
         else "",
     )

@@ -91,7 +91,10 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
     """Yield a sentence on every loose body, and whether it is refused: where its nodes lie at
     another's. Collective."""
     for body in find_loose_bodies(problem):
-        what = f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no contact touches it"
+        what = (
+            f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no "
+            "contact touches it"
+        )
         if body.coinciding:
             yield (
                 f"{what}: {body.coinciding} of its nodes lie at the places of nodes of another "

@@ -36,4 +36,7 @@ def in_words(memory: Mapping[str, Any]) -> str:
     """Return the same in a line, in megabytes."""
     peaks = memory["peak_bytes"]
     known = "".join(f"; {name} {1e-6 * size:.3g}" for name, size in memory["bytes"].items())
-    return f"memory [MB]: at most {1e-6 * max(peaks):.4g} on a rank, {1e-6 * sum(peaks):.4g} on all{known}"
+    return (
+        f"memory [MB]: at most {1e-6 * max(peaks):.4g} on a rank, {1e-6 * sum(peaks):.4g} on "
+        f"all{known}"
+    )

@@ -206,7 +206,10 @@ class Session:
             return
         self._checkpoint(writer)
         self._measure()
-        rest = f"ended the run after step {self.place.state.k}, t = {self.place.state.t:.6g} s: {writer.rest}"
+        rest = (
+            f"ended the run after step {self.place.state.k}, t = {self.place.state.t:.6g} s: "
+            f"{writer.rest}"
+        )
         if number:
             raise Interrupted(f"{Signals(number).name} {rest}", number)
         raise OutOfTime(f"{self.wall_time.words} {rest}")
@@ -243,7 +246,10 @@ class Session:
             self._comm
         ):  # one of the user's may fail on one rank, or record what does not fit there
             for recorder in self.recorders:
-                name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
+                name = (
+                    f"the recorder {type(recorder).__name__} in step {state.k}, t = "
+                    f"{state.t:.6g} s,"
+                )
                 call: Callable[[], Row] = partial(recorder.row, report)
                 row.update(users(name, call, nothing, as_it_is=True))
             self.table.check(row)

@@ -100,7 +100,10 @@ class Solution:
         image = BytesIO()
         self.plot().savefig(image, format="png", dpi=70)
         picture = b64encode(image.getvalue()).decode()
-        return f'<table>{rows}</table><img alt="histories of the run" src="data:image/png;base64,{picture}">'
+        return (
+            f'<table>{rows}</table><img alt="histories of the run" '
+            f'src="data:image/png;base64,{picture}">'
+        )
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:

@@ -71,7 +71,10 @@ class HalvedAtImpact:
     def __post_init__(self) -> None:
         if not isinstance(self.dt, Schedule):
             object.__setattr__(self, "dt", _positive(self.dt))
-        remedy = f"HalvedAtImpact halvings is {shown(self.halvings)}: give a whole number from 0 to {HALVINGS}"
+        remedy = (
+            f"HalvedAtImpact halvings is {shown(self.halvings)}: give a whole number from 0 to "
+            f"{HALVINGS}"
+        )
         object.__setattr__(self, "halvings", _read(whole, self.halvings, remedy, most=HALVINGS))
 
 
@@ -168,7 +171,10 @@ def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
     if (steps is None) == (t_end is None):
         raise InputError("give either steps or t_end, and not both")
     if t_end is not None:
-        remedy = f"the run goes from {t0:g} s to t_end = {shown(t_end)} s: give a finite t_end after the start"
+        remedy = (
+            f"the run goes from {t0:g} s to t_end = {shown(t_end)} s: give a finite t_end "
+            "after the start"
+        )
         if _read(number, t_end, remedy) < t0:
             raise InputError(remedy)
         return inf

@@ -15,7 +15,10 @@ from ..core.errors import InputError
 
 # times the longest step and the checkpoint and histories at the end, as long as the longest so far
 SAFETY = 2.0
-_FORMS = "minutes, minutes:seconds, hours:minutes:seconds, days-hours, days-hours:minutes or days-hours:minutes:seconds"
+_FORMS = (
+    "minutes, minutes:seconds, hours:minutes:seconds, days-hours, days-hours:minutes or "
+    "days-hours:minutes:seconds"
+)
 _UNITS = {
     "": ((60,), (60, 1), (3600, 60, 1)),
     "-": ((3600,), (3600, 60), (3600, 60, 1)),

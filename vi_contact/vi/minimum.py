@@ -69,7 +69,10 @@ def carry_conditions(found: Found, layers: OptionLayers) -> None:
                 )
                 return
         length *= 0.5
-    found.failure = "Dirichlet conditions or bounds lead where the energy is not a number: take a smaller load step"
+    found.failure = (
+        "Dirichlet conditions or bounds lead where the energy is not a number: take a smaller "
+        "load step"
+    )
 
 
 @np.errstate(over="ignore", invalid="ignore")  # energies that have no minimum

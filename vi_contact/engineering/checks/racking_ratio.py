@@ -59,7 +59,10 @@ class RackingRatio(Check):
             f"F is {ratio:.4g}, beyond {LARGEST:g}, where the curves end" if ratio > LARGEST else ""
         )
         if self.depth < SHALLOWEST * self.height:
-            why = f"the box lies {self.depth / self.height:.3g} of its heights deep, less than {SHALLOWEST:g}"
+            why = (
+                f"the box lies {self.depth / self.height:.3g} of its heights deep, less than "
+                f"{SHALLOWEST:g}"
+            )
         why = why if free else "the free field does not shear"
         return (
             racking_ratio(ratio, self.nu),

@@ -216,7 +216,10 @@ def _opposite(
 def _refuse_several(one: Side, two: Side, row: int) -> None:
     """Raise InputError for a node of side 1 that faces several nodes of side 2, each with a part of
     what it faces."""
-    where = f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of '{two.name}' at one place"
+    where = (
+        f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of "
+        f"'{two.name}' at one place"
+    )
     d = one.nodes.points.shape[1]
     if d == 1:
         raise InputError(f"{where}, and can touch one only: list the end of one bar on side 2")

@@ -276,7 +276,10 @@ class FrameWriter:
                 "Vector" if len(shape) == 2 else "Scalar",
                 _item(shape, f"{frame}/{name}", number, size),
             )
-            return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{center}">{item}</Attribute>\n'
+            return (
+                f'<Attribute Name="{name}" AttributeType="{kind}" '
+                f'Center="{center}">{item}</Attribute>\n'
+            )
 
         attributes = [attribute(name, "Node", nodes, 3) for name in self._names]
         attributes.append(attribute("contact_pressure", "Node", nodes))

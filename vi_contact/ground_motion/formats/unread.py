@@ -34,7 +34,10 @@ _KNOWN = (
         "write columns, for example with ObsPy",
     ),
 )
-_SAC = "this is an alphanumeric SAC file, which is not read; convert it to columns, for example with ObsPy"
+_SAC = (
+    "this is an alphanumeric SAC file, which is not read; convert it to columns, for example "
+    "with ObsPy"
+)
 
 
 def refuse_unread(text: TextFile) -> None:

@@ -26,7 +26,10 @@ ERRORS = {  # of PETSc, by number
     71: "the matrix has a zero pivot: check that the body is held or that mass enters A",
     81: "the matrix has a zero pivot: check that the body is held or that mass enters A",
 }
-UNKNOWN = "PETSc says no more of the cause: check that the body is held and petsc_options fit, or try another method"
+UNKNOWN = (
+    "PETSc says no more of the cause: check that the body is held and petsc_options fit, or "
+    "try another method"
+)
 GENERAL_ADVICE = (
     "check that the body is held, try a smaller step, another method, or a larger iteration limit"
 )

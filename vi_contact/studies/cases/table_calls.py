@@ -84,7 +84,10 @@ class Group:
         if self.kind.__name__ == "Cells" or dim > 2:
             return way
         body = "Physical Volume" if dim == 2 else "Physical Surface"
-        return f"{way}, or, if it bounds the body, the mesh has no {dim + 1}D cells: add a {body} in Gmsh"
+        return (
+            f"{way}, or, if it bounds the body, the mesh has no {dim + 1}D cells: add a {body} "
+            "in Gmsh"
+        )
 
 
 GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
