@@ -76,7 +76,7 @@ def between(what: str, value: Any, low: float, high: float, remedy: str) -> None
 
 def check_word(name: str, given: object, known: Sequence[str]) -> None:
     """Raise InputError for a word that is not among those known."""
-    if given not in known:
+    if not isinstance(given, str) or given not in known:  # an array compares element by element
         raise InputError(f"unknown {name} {shown(str(given))}: choose one of {', '.join(known)}")
 
 

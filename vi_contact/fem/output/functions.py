@@ -131,7 +131,7 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     """The space of the problem; InputError when there is none, or no such quantity."""
     check_problem_given(owner, problem)
     flag(owner, "continuous", continuous)
-    if name not in NAMES:
+    if not isinstance(name, str) or name not in NAMES:
         raise InputError(
             f"{owner}: {shown(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}"
         )

@@ -156,12 +156,13 @@ def executed(
     rows how many have been made, with parts of runs. Left early, it stops those that go on;
     OutOfTime when one has ended with its status.
     """
-    processes, told = Processes(launch, end), SimpleQueue[Row | BaseException | None]()
+    processes, told = Processes(launch, end), SimpleQueue[Row | BaseException | float]()
 
     def make(batch: Sequence[OneRun]) -> None:
         try:
             for row in processes.rows(batch):
-                told.put(row)
+                # The sum of now, as others go on before it is read.
+                told.put(float(sum(list(processes.shares.values()))) if row is None else row)
         except (
             BaseException
         ) as error:  # of any kind: it is raised again by the thread that waits for this one
@@ -182,12 +183,11 @@ def executed(
                 found = told.get()
                 if isinstance(found, BaseException):
                     raise found
-                ended += found is not None
-                yield (
-                    float(len(wrong) + sum(list(processes.shares.values())))
-                    if found is None
-                    else found
-                )
+                if isinstance(found, float):
+                    yield len(wrong) + found
+                else:
+                    ended += 1
+                    yield found
         finally:
             processes.stop()
             for future in futures:
