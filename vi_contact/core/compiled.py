@@ -118,8 +118,15 @@ def cholmod_of_petsc() -> Path:
         raise OSError("no PETSc is in this process")
     if not packages.petsc_has("cholmod"):
         raise OSError("this PETSc was built without CHOLMOD")
-    lines = MAPS.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
-    files = {line.split(maxsplit=5)[5] for line in lines if len(line.split(maxsplit=5)) == 6}
+    return _loaded_cholmod(MAPS)
+
+
+@lru_cache(maxsize=1)
+def _loaded_cholmod(maps: Path) -> Path:
+    """Return the file of the one CHOLMOD in this process; OSError, which is asked anew, unless there
+    is one. A library stays once it is there, and to read this list takes longer than small steps."""
+    lines = maps.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
+    files = {line.split(maxsplit=5)[5] for line in lines if "libcholmod" in line}
     found = sorted(file for file in files if Path(file).name.startswith("libcholmod"))
     if len(found) != 1:
         raise OSError(f"there are {len(found)} files of CHOLMOD in this process {found}")
