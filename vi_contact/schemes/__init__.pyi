@@ -9,3 +9,5 @@ from .newmark import Newmark as Newmark
 from .ss22 import SS22 as SS22
 from .trapezoidal import Trapezoidal as Trapezoidal
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor as ZienkiewiczWoodTaylor
+
+__all__: list[str]

@@ -7,3 +7,5 @@ from .earth_pressure_static import Rankine as Rankine
 from .racking_ratio import RackingRatio as RackingRatio
 from .shaken_block import Housner as Housner
 from .shaken_block import NewmarkBlock as NewmarkBlock
+
+__all__: list[str]
