@@ -56,10 +56,9 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     # other programs of the project run these
     r"bash demos/run\.sh "
     r"\w+": "docs/gallery/make.py runs every demo and compares what it prints with its page; DEMOS",
-    r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/lint\.sh|bash "
+    r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/(?:lint|coverage)\.sh|bash "
     r"\.ci/run": ".ci/run runs them",
     r"bash docs/build\.sh|bash install/\w+\.sh": ".ci/run builds the site and installs its tools",
-    r"python3 "
     r"python3 "
     r"docs/make_schema\.py": "tests/studies/test_schema.py::test_the_schema_is_that_of_the_signatures",
     r"python3 "
