@@ -21,6 +21,7 @@ fi
 if ! .venv/site/bin/python -m sphinx "${options[@]}" --doctree-dir "$site.doctrees" . "$site"; then
   vi_fail "the site is not built: see the warnings above"
 fi
+echo '<!doctype html><title>vi_contact</title><meta http-equiv="refresh" content="0; url=docs/index.html">' >"$site/index.html"
 if [ -z "$quick" ] && ! "$vi_python" docs/notebooks/run.py --site "$site"; then
   vi_fail "the pictures of the notebooks are not shown: see above"
 fi

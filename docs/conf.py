@@ -3,31 +3,31 @@ file work."""
 
 import os
 import re
-import sys
 from hashlib import sha256
 from pathlib import Path
 
 from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 
-sys.path.insert(0, str(Path(__file__).parent))
-from api_source import PACKAGE, ROOT
-from make_api import ROOMS
-from site_names import write_site_pages
+import vi_contact as vc
 
-from vi_contact import __version__
-
-project, author, version = "vi_contact", "The vi_contact developers", __version__
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "vi_contact"
+project, author, version = "vi_contact", "The vi_contact developers", vc.__version__
 copyright = f"{author}. This page describes version {version}."  # at the foot of every page
 extensions = [
     "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "sphinx_copybutton",
-    "sphinx_reredirects",
 ]
-source_suffix = {".md": "myst-nb", ".myst": "myst-nb"}
+source_suffix = {".rst": "restructuredtext", ".md": "myst-nb"}
+templates_path = [str(ROOT / "docs" / "templates")]
 root_doc = "docs/index"
 include_patterns = [
     "docs/**",
@@ -43,6 +43,14 @@ exclude_patterns = [
 ]
 add_module_names = False
 highlight_language = "none"
+
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autosummary_imported_members = True
+autosummary_ignore_module_all = False
+napoleon_use_ivar = True
+napoleon_attr_annotations = False  # signatures have them
+python_maximum_signature_line_length = 88
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath", "colon_fence"]
@@ -69,15 +77,13 @@ html_static_path = ["site.css"]
 html_css_files = ["site.css"]
 html_copy_source = False
 copybutton_prompt_text, copybutton_prompt_is_regexp = r">>> |\.\.\. |\$ ", True
-_moved = (ROOT / "docs" / "redirects.txt").read_text(encoding="utf-8").splitlines()
-redirects = dict(line.split() for line in _moved if not line.startswith("#"))
 
-write_site_pages()
-_NAME = re.compile(rf"(vc|{'|'.join(re.escape(room) for room in ROOMS)})\.[\w.]+|[A-Z]\w+")
+_ROOMS = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.pyi"))
+_NAME = re.compile(rf"(vc|{'|'.join(_ROOMS)})\.[\w.]+|[A-Z]\w+")
 
 
 def link_names(app: Sphinx, document: nodes.document) -> None:
-    """Link what is written as `vc.simulate`, `Condensed()` or `fem.build_mesh(…)` to the page of
+    """Link what is written as `vc.simulate`, `Condensed()` or `fem.build_mesh(…)` to the entry of
     that name."""
     for node in list(document.findall(nodes.literal)):
         found = _NAME.match(node.astext())
@@ -94,6 +100,37 @@ def link_names(app: Sphinx, document: nodes.document) -> None:
             link += node
 
 
+def find_in_room(
+    app: Sphinx, env: BuildEnvironment, link: pending_xref, text: nodes.Element
+) -> nodes.Element | None:
+    """Lead from a short name, such as ``vi_contact.simulate``, to its entry in its room."""
+    name = link.get("reftarget", "").removeprefix("vi_contact.")
+    if link.get("refdomain") != "py" or name not in vc.__all__:
+        return None
+    room = ".".join(getattr(vc, name).__module__.split(".")[:2])
+    return env.domains["py"].resolve_xref(
+        env, link["refdoc"], app.builder, "obj", f"{room}.{name}", link, text
+    )
+
+
+def as_restructured_text(
+    app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]
+) -> None:
+    """Keep the bars of absolute values in a docstring, and link the pages that it names."""
+    text = re.sub(r"(``[^`]*``)|\|", lambda found: found[1] or r"\|", "\n".join(lines))
+    lines[:] = re.sub(r"\b(docs/\w+/\w+|README)\.md\b", r":doc:`/\1`", text).split("\n")
+
+
+def with_dots(
+    app: Sphinx, what: str, name: str, value: object, options: object, call: str, result: str
+) -> tuple[str, str]:
+    """Write dots for a default that has no text, such as one made anew for every object."""
+    return re.sub(r"= ?<.*?>(?=[,)])", "= ...", call or ""), result
+
+
 def setup(app: Sphinx) -> None:
     """Connect it."""
     app.connect("doctree-read", link_names)
+    app.connect("missing-reference", find_in_room)
+    app.connect("autodoc-process-docstring", as_restructured_text)
+    app.connect("autodoc-process-signature", with_dots)

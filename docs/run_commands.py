@@ -56,11 +56,9 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     # other programs of the project run these
     r"bash demos/run\.sh "
     r"\w+": "docs/gallery/make.py runs every demo and compares what it prints with its page; DEMOS",
-    r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/lint\.sh|bash "
+    r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/(?:lint|coverage)\.sh|bash "
     r"\.ci/run": ".ci/run runs them",
     r"bash docs/build\.sh|bash install/\w+\.sh": ".ci/run builds the site and installs its tools",
-    r"python3 "
-    r"docs/make_api\.py": "tests/house/test_documents.py::test_the_page_of_names_is_what_the_docstrings_say",
     r"python3 "
     r"docs/make_schema\.py": "tests/studies/test_schema.py::test_the_schema_is_that_of_the_signatures",
     r"python3 "
@@ -74,7 +72,7 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     r"python3 docs/run_commands\.py.*": "this program",
     r"bash tests/fuzz\.sh .*": "as many runs of fuzz tests as asked for; "
     "tests/house/test_fuzz_support.py::test_the_script_asks_for_a_seed",
-    r"python3 -m venv build/griffe|build/griffe/bin/.*|pip install "
+    r"\.venv/lint/bin/griffe .*|pip install "
     r"'dolfinx-solver-real.*": "asks a package index",
     # these need what a test has not
     r"git clone ADDRESS .*|cd "

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# bash tests/lint.sh     runs ruff and mypy in the versions of install/lint-requirements.txt, from PyPI, in .venv/lint
+# bash tests/lint.sh     runs ruff, codespell, import-linter and mypy in the versions of install/lint-requirements.txt, from PyPI, in .venv/lint
 set -uo pipefail
 tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 . "$tests/../install/setup.sh"
@@ -18,14 +18,15 @@ install_checkers() {
     $venv/bin/pip install --target $venv/lib/python3*/site-packages $numpy
 }
 if [ "$(cat $venv/installed 2>/dev/null)" != "$wanted" ] || ! $venv/bin/python -c "" 2>/dev/null; then
-  echo "vi_contact: installing ruff and mypy into $venv. This is done once." >&2
-  said=$(install_checkers 2>&1) || vi_fail "could not install ruff and mypy (offline?): $(tail -n 1 <<<"$said")"
+  echo "vi_contact: installing the checkers into $venv. This is done once." >&2
+  said=$(install_checkers 2>&1) || vi_fail "could not install the checkers (offline?): $(tail -n 1 <<<"$said")"
   echo "$wanted" >$venv/installed
 fi
 
 status=0
 $venv/bin/ruff check --quiet --output-format concise . || status=1
 $venv/bin/ruff format --quiet --check . || status=1
-"$vi_python" docs/make_api.py --check || status=1
+$venv/bin/codespell || status=1
+said=$($venv/bin/lint-imports 2>&1) || { echo "$said"; status=1; }
 $venv/bin/mypy --no-error-summary || status=1
 exit "$status"

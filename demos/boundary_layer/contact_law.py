@@ -49,10 +49,12 @@ SHORT_STEP = (
 class ContactLayer:
     """Describe the law of a contact boundary: pressure as a function of the gap and its rate.
 
-    Attributes: layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s]
-        must be given. mass: gamma >= 0 [kg/m²] of the metric's terms: for a stiff body its mass
-        over its contact area; 0: without
-            them, a potential and a damper, which never give energy.
+    Attributes:
+        layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s] must be
+            given.
+        mass: gamma >= 0 [kg/m²] of the metric's terms: for a stiff body its mass over its contact
+            area; 0: without them, a potential and a damper, which never give energy.
+
     InputError for values outside their range, a layer without V or without a transition from a to
     b.
     """

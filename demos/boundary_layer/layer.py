@@ -29,10 +29,14 @@ class Layer:
     """Describe the law by its parameters; the distance x is in metres here (k, c have other units
     for other rho).
 
-    Attributes: width: b [m], where the layer begins. k: [N/m] >= 0, spring-like: k x is what is
-        left of it in the normal equation divided by (b/x)². c: [N] >= 0, damper-like. speed: V
-        [m/s] of ĉ = c b²/V; None: the speed at which the layer is entered, as in the source. start:
-        a [m], 0 < a <= b, where the force is complete; None: a = b, no transition.
+    Attributes:
+        width: b [m], where the layer begins.
+        k: [N/m] >= 0, spring-like: k x is what is left of it in the normal equation divided by
+            (b/x)².
+        c: [N] >= 0, damper-like.
+        speed: V [m/s] of ĉ = c b²/V; None: the speed at which the layer is entered, as in the
+            source.
+        start: a [m], 0 < a <= b, where the force is complete; None: a = b, no transition.
 
     Raises InputError for a parameter outside its range, and when k and c are both zero.
     """

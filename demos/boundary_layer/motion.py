@@ -34,12 +34,15 @@ DIFFERENCE_STEP = (
 class ConstrainedSystem:
     """Describe a configuration manifold with boundary, and the forces on it.
 
-    Attributes: mass: M, (n, n) [kg], constant or a function of q. rho: q -> distance to the
-        boundary, > 0 inside. gradient: q -> A (n,), ρ̇ = A v. force: (t, q, v) -> f (n,): applied
-        forces and, for quasi-velocities, gyroscopic ones; None: no forces. rates: (q, v) -> q̇;
-        None: v are the rates of q. gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to
-        ten digits. scale: a typical size of the coordinates, which central differences are taken
-        over 6e-6 of.
+    Attributes:
+        mass: M, (n, n) [kg], constant or a function of q.
+        rho: q -> distance to the boundary, > 0 inside.
+        gradient: q -> A (n,), ρ̇ = A v.
+        force: (t, q, v) -> f (n,): applied forces and, for quasi-velocities, gyroscopic ones; None:
+            no forces.
+        rates: (q, v) -> q̇; None: v are the rates of q.
+        gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to ten digits.
+        scale: a typical size of the coordinates, which central differences are taken over 6e-6 of.
     """
 
     mass: Array | Callable[[Array], Array]

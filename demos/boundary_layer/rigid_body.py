@@ -46,10 +46,14 @@ class Ellipsoid:
 class RigidBody:
     """Describe a rigid body before a plane.
 
-    Attributes: mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body
-        frame [kg m²]. point: l_P (3,) [m], or a function of the plane's normal in the body frame
-        that returns it (``Ellipsoid``). normal: n, of the plane, towards the body. offset: d [m].
+    Attributes:
+        mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body frame
+            [kg m²].
+        point: l_P (3,) [m], or a function of the plane's normal in the body frame that returns it
+            (``Ellipsoid``).
+        normal: n, of the plane, towards the body. offset: d [m].
         gravity: acceleration of free fall in space (3,) [m/s²].
+
     InputError for a mass or an inertia that is not positive, or a normal of length zero.
     """
 

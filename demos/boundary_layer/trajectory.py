@@ -74,9 +74,9 @@ def layer_motion(
     and Prince's method of order 8; ``refine``: rows of the trajectory for each of its steps, which
     are large, by its own interpolation.
 
-    Raises: InputError: the start is not inside the admissible set (rho > 0), or in the layer while
-        V is not known; a
-            function of the system returns no finite numbers there.
+    Raises:
+        InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is
+            not known; a function of the system returns no finite numbers there.
         StepFailure: the integrator stopped, or did not come to an end; the message names the time.
     """
     owner = "layer_motion"

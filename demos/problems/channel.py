@@ -117,10 +117,13 @@ class ChannelModel:
         """Set up channel and soil under the harmonic motion, sliding freely; inelastic impulses,
         consistent mass.
 
-        Args: friction: Coulomb(mu) for instance. bilateral: soil and channel cannot part, but slide
-            as before: the linear comparison run of Fig. 9. impact, mass: schemes with massless
-            contact nodes take no impact law: give impact=None, and leave mass to
-                them. An impact law runs on consistent mass unless another is given.
+        Args:
+            friction: Coulomb(mu) for instance.
+            bilateral: soil and channel cannot part, but slide as before: the linear comparison run
+                of Fig. 9.
+            impact, mass: schemes with massless contact nodes take no impact law: give impact=None,
+                and leave mass to them. An impact law runs on consistent mass unless another is
+                given.
         """
         return ContactProblem(
             self.system,
@@ -212,11 +215,12 @@ def build(
 ) -> ChannelModel:
     """Mesh and assemble channel and soil; collective.
 
-    Args: sides: the ends of the soil layer; by default Rollers(), which hold them vertically
-        (CHOSEN). weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so
-        that the soil's own settlement
-            is not in the figures; without any weight a channel with smooth sides drifts up without
-            bound.
+    Args:
+        sides: the ends of the soil layer; by default Rollers(), which hold them vertically
+            (CHOSEN).
+        weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so that the
+            soil's own settlement is not in the figures; without any weight a channel with smooth
+            sides drifts up without bound.
         base: moves the bedrock, or lets waves in from below, in the frame of an observer at rest;
             its problems take excitation=(). By default the bedrock is at rest and what shakes it is
             an inertia load, in the frame of the bedrock.

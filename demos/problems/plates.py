@@ -72,8 +72,10 @@ def plate_system(
     Its unknowns are deflections along z at the vertices and at the middle of edges,
     ``system.space.points``.
 
-    Args: on: mesh in the plane. clamped: whether its boundary may not turn either. pressure:
-        uniform load downwards [Pa]. speed: x (n, 3) -> upward velocities (n,) at the start [m/s].
+    Args:
+        on: mesh in the plane. clamped: whether its boundary may not turn either.
+        pressure: uniform load downwards [Pa]. speed: x (n, 3) -> upward velocities (n,) at the
+            start [m/s].
     """
     V = compat.lagrange(on, 2)
     w, v = ufl.TrialFunction(V), ufl.TestFunction(V)

@@ -215,13 +215,6 @@ def test_figures_are_small_and_used() -> None:
         assert figure.name in text
 
 
-def test_the_page_of_names_is_what_the_docstrings_say() -> None:
-    """After a change of a public docstring: python3 docs/make_api.py."""
-    command = [sys.executable, str(ROOT / "docs" / "make_api.py"), "--check"]
-    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=600)
-    assert done.returncode == 0, done.stderr
-
-
 @pytest.mark.parametrize(
     "hidden", [("dolfinx",), ("h5py", "petsc4py", "dolfinx", "mpi4py", "matplotlib", "tqdm")]
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import shutil
 import subprocess
@@ -88,27 +87,6 @@ def test_the_cases_that_ship_are_installed() -> None:
     assert others == {
         path for home, named in homes.items() for one in named for path in home.glob(one)
     }
-
-
-@pytest.mark.serial
-def test_stubs_name_what_is_public() -> None:
-    """A checker of types finds in the stubs what Python does; ``*`` hands on a room, ``__all__``
-    has been kept up."""
-    stubs = sorted((ROOT / "vi_contact").rglob("__init__.pyi"))
-    assert len(stubs) > 15
-    for path in stubs:
-        package = import_module(path.parent.relative_to(ROOT).as_posix().replace("/", "."))
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        found = {}
-        for node in tree.body[:-1]:
-            assert isinstance(node, ast.ImportFrom) and node.level == 1
-            home = import_module(f"{package.__name__}.{node.module}")
-            assert all(one.asname == one.name or one.name == "*" for one in node.names)
-            names = home.__all__ if node.names[0].name == "*" else [one.name for one in node.names]
-            found.update({name: getattr(home, name) for name in names})
-        assert isinstance(tree.body[-1], ast.AnnAssign) and tree.body[-1].value is not None
-        assert ast.literal_eval(tree.body[-1].value) == package.__all__ == sorted(found)
-        assert all(getattr(package, name) is value for name, value in found.items())
 
 
 def ran(script: str, **environment: str) -> str:

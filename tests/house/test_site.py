@@ -2,7 +2,7 @@
 from another host.
 
 In headless Chromium, on screens and on telephones: equations are set, pictures are there, the
-search finds, nothing is wider than the window or cut, old addresses lead on and no script
+search finds, nothing is wider than the window or cut and no script
 complains. The pages are built without running notebooks, which ``bash docs/build.sh`` does, and as
 root without a network.
 """
@@ -41,74 +41,6 @@ if not INSTALLED.is_file() or INSTALLED.read_bytes() != WANTED.read_bytes():
         allow_module_level=True,
     )
 
-# every page of version 0.1; where a page moves to, docs/redirects.txt says
-OLD = {
-    "docs/guide/bounds",
-    "docs/guide/bring_your_own",
-    "docs/guide/channel",
-    "docs/guide/check",
-    "docs/guide/checks",
-    "docs/guide/clusters",
-    "docs/guide/extend",
-    "docs/guide/outputs",
-    "docs/guide/practice",
-    "docs/guide/pressed_blocks",
-    "docs/guide/raft",
-    "docs/guide/records",
-    "docs/guide/report",
-    "docs/guide/rocking_block",
-    "docs/guide/schemes",
-    "docs/guide/second_order",
-    "docs/guide/soil",
-    "docs/guide/solvers",
-    "docs/guide/spheres",
-    "docs/guide/stages",
-    "docs/guide/studies",
-    "docs/reference/api",
-    "docs/reference/faq",
-    "docs/reference/files",
-    "docs/reference/limitations",
-    "docs/reference/petsc",
-    "docs/reference/sources",
-    "docs/reference/verification",
-    "docs/start/first_wall",
-    "docs/start/install",
-    "docs/start/model",
-    "docs/theory/beam",
-    "docs/theory/bem",
-    "docs/theory/boundary_layer",
-    "docs/theory/routes",
-    "README",
-    "CONTRIBUTING",
-    "CHANGELOG",
-    "docs/api",
-    "docs/beam",
-    "docs/bem",
-    "docs/boundary_layer",
-    "docs/channel",
-    "docs/faq",
-    "docs/install",
-    "docs/limitations",
-    "docs/model",
-    "docs/output",
-    "docs/outputs_engineering",
-    "docs/petsc",
-    "docs/records",
-    "docs/rocking_block",
-    "docs/schemes",
-    "docs/seed003",
-    "docs/soil_boundaries",
-    "docs/solvers",
-    "docs/sources",
-    "docs/studies",
-    "docs/verification",
-    "docs/wall",
-}
-MOVED = {  # old address -> the page of the site that it leads to
-    line.split()[0]: str(Path(line.split()[0]).parent / line.split()[1])
-    for line in (ROOT / "docs" / "redirects.txt").read_text(encoding="utf-8").splitlines()
-    if not line.startswith("#")
-}
 WIDTHS = 1280, 320, 390, 700, 900, 1100  # of windows; on the first one a page is opened
 LOADED = {
     "script": "src",
@@ -178,11 +110,9 @@ def pages(site: Path) -> dict[Path, Page]:
     return {path: Page(path) for path in site.rglob("*.html") if "_static" not in path.parts}
 
 
-def test_every_document_is_a_page_and_old_addresses_live(
-    site: Path, pages: dict[Path, Page]
-) -> None:
+def test_every_document_is_a_page(site: Path, pages: dict[Path, Page]) -> None:
     documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
-    wanted = {str(path.relative_to(ROOT).with_suffix("")) for path in documents} | OLD | {"index"}
+    wanted = {str(path.relative_to(ROOT).with_suffix("")) for path in documents} | {"index"}
     assert wanted - {str(path.relative_to(site).with_suffix("")) for path in pages} == set()
 
 
@@ -190,7 +120,7 @@ def test_every_page_says_which_version_it_describes(site: Path, pages: dict[Path
     """In the title of the window, above the menu, and at the foot of the page, where telephones
     show it too."""
     for path in pages:
-        if str(path.relative_to(site).with_suffix("")) not in MOVED:
+        if path != site / "index.html":  # which leads to the first page
             text = path.read_text(encoding="utf-8")
             assert re.search(
                 rf"<title>(?:[^<]* - )?vi_contact {re.escape(__version__)}</title>", text
@@ -234,7 +164,7 @@ def test_names_are_in_index_and_search(site: Path, name: str) -> None:
 
 def test_names_in_texts_lead_to_their_pages(site: Path) -> None:
     page = (site / "docs" / "guide" / "second_order.html").read_text(encoding="utf-8")
-    assert "../reference/names/fem.html#vi_contact.fem.contact_surface" in page
+    assert "../reference/names/vi_contact.fem.html#vi_contact.fem.contact_surface" in page
 
 
 # Opens every page of a list in a frame, makes the frame as wide as the page's widths say one after
@@ -361,11 +291,10 @@ class Handler(SimpleHTTPRequestHandler):
 
 @dataclass(frozen=True)
 class Opened:
-    """What the browser found on the pages, at the old addresses and on the spoiled page; which
+    """What the browser found on the pages and on the spoiled page; which
     files the server did not have; and what the console said."""
 
     pages: list[dict[str, Any]]
-    old: list[dict[str, Any]]
     spoiled: dict[str, Any]
     absent: list[str]
     said: str
@@ -373,18 +302,16 @@ class Opened:
 
 @pytest.fixture(scope="module")
 def opened(site: Path, pages: dict[Path, Page], tmp_path_factory: pytest.TempPathFactory) -> Opened:
-    """Every page, in windows of several widths; one in many; every old address. No other host can
+    """Every page, in windows of several widths; one in many. No other host can
     be reached."""
     command = browser()
     names = sorted(str(path.relative_to(site)) for path in pages)
-    urls = [f"/{name}" for name in names if name.removesuffix(".html") not in MOVED]
+    urls = [f"/{name}" for name in names if name != "index.html"]
     list_: list[tuple[str, Sequence[int]]] = [(url, WIDTHS) for url in urls]
     list_ += [("/docs/reference/releases.html", range(420, 1900, 40))]
     list_ += [
         (f"/search.html?q={word}", (390,)) for word in ("certificate", "build_mesh", "Signorini")
     ]
-    for number, (old, new) in enumerate(MOVED.items()):  # every second one to a section
-        list_ += [(f"/{old}.html" + number % 2 * f"#{section(pages[site / new])}", (1280,))]
     list_ += [("/spoiled.html", (1280, 390))]
     (site / "probe.html").write_text(
         PROBE.replace("LIST", json.dumps([(u, list(w)) for u, w in list_])), "utf-8"
@@ -420,13 +347,7 @@ def opened(site: Path, pages: dict[Path, Page], tmp_path_factory: pytest.TempPat
     console = log.read_text(encoding="utf-8", errors="replace")
     assert server.found, console[-3000:]
     *found, spoiled = server.found
-    split = len(found) - len(MOVED)
-    return Opened(found[:split], found[split:], spoiled, server.absent, console)
-
-
-def section(page: Page) -> str:
-    """The anchor of the second heading of a page, or of the first."""
-    return (page.sections[1:] or page.sections)[0]
+    return Opened(found, spoiled, server.absent, console)
 
 
 def test_the_browser_sees_what_is_wrong(opened: Opened) -> None:
@@ -488,15 +409,6 @@ def test_dark_mode_is_dark(opened: Opened) -> None:
     """Light text on a dark ground, on every page."""
     seen = {(one["ground"], one["text"]) for one in opened.pages}
     assert all(dark(ground) and light(text) for ground, text in seen), seen
-
-
-def test_old_addresses_lead_on(opened: Opened) -> None:
-    """To the page of today, and to its section where the address names one."""
-    assert len(opened.old) == len(MOVED) and sum("#" in one["url"] for one in opened.old) > 5
-    for one in opened.old:
-        page, _, anchor = one["url"].partition("#")
-        there = f"/{MOVED[page[1:].removesuffix('.html')]}" + (f"#{anchor}" if anchor else "")
-        assert one["at"] == there and one["there"] and one["loaded"] >= 5, one
 
 
 def test_search_finds(opened: Opened) -> None:

@@ -3,6 +3,7 @@ without DOLFINx.
 
 In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``BoundaryProblem``, ``BoundaryContact``,
 ``march_contact``. Theory and an example: docs/theory/bem.md; four problems: ``demos/problems/boundary_elements.py``.
+
 >>> from vi_contact.bem import circle
 >>> round(circle(radius=1.0, count=64).area, 3)  # of the polygon, m²
 3.137"""

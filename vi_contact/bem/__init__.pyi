@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .boundary_mesh import BoundaryMesh as BoundaryMesh
 from .boundary_mesh import circle as circle
 from .boundary_mesh import polygon as polygon
@@ -24,29 +21,3 @@ from .poincare_steklov import CondensedCompliance as CondensedCompliance
 from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
-
-__all__: list[str] = [
-    "BoundaryContact",
-    "BoundaryMesh",
-    "BoundaryMotion",
-    "BoundaryProblem",
-    "CompressedBlocks",
-    "CondensedCompliance",
-    "Conditions",
-    "ContactRun",
-    "EnergeticBlocks",
-    "Galerkin",
-    "MultiplierMesh",
-    "OperatorMatrices",
-    "Orders",
-    "PoincareSteklov",
-    "SpaceTimeUzawa",
-    "TimeKernels",
-    "TwoBodies",
-    "circle",
-    "conditions_on",
-    "energetic_blocks",
-    "march_contact",
-    "polygon",
-    "traction_forces",
-]

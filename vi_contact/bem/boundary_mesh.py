@@ -125,7 +125,7 @@ class BoundaryMesh:
         return mass.reshape(4 * n, 2 * n)
 
     def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
-        """Return (n,) elements with both ends where `chosen`((m, 2) points) is true."""
+        """Return (n,) elements with both ends where ``chosen((m, 2) points)`` is true."""
         function(
             "BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)"
         )

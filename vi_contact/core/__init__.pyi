@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .certificate import Certificate as Certificate
 from .errors import InputError as InputError
 from .errors import Interrupted as Interrupted
@@ -31,36 +28,3 @@ from .system import Load as Load
 from .system import SemiDiscreteSystem as SemiDiscreteSystem
 from .verify import energy_balance as energy_balance
 from .verify import kkt_residual as kkt_residual
-
-__all__: list[str] = [
-    "AnalyticGap",
-    "Certificate",
-    "Companion",
-    "ContactProblem",
-    "ContactSurface",
-    "Excitation",
-    "FrictionLaw",
-    "Frictionless",
-    "HalfSpace",
-    "ImpactLaw",
-    "InputError",
-    "Interrupted",
-    "Load",
-    "MassLaw",
-    "Obstacle",
-    "OutOfTime",
-    "PreparedSolver",
-    "Recorder",
-    "Report",
-    "Scheme",
-    "SemiDiscreteSystem",
-    "Solver",
-    "State",
-    "StepFailure",
-    "StepProblem",
-    "StepResult",
-    "Touching",
-    "ViContactError",
-    "energy_balance",
-    "kkt_residual",
-]

@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .checks.comparison import Check as Check
 from .checks.comparison import Comparison as Comparison
 from .damping import FirstModes as FirstModes
@@ -18,23 +15,3 @@ from .peak_values import write_peaks as write_peaks
 from .racking import Racking as Racking
 from .resultants import Resultants as Resultants
 from .resultants import contact_summary as contact_summary
-
-__all__: list[str] = [
-    "Check",
-    "Comparison",
-    "FirstModes",
-    "Loop",
-    "Peak",
-    "Racking",
-    "Resultants",
-    "TransferFunction",
-    "contact_summary",
-    "first_modes",
-    "floor_spectrum",
-    "hysteresis",
-    "lowest_frequency",
-    "peaks",
-    "recorded_motion",
-    "transfer_function",
-    "write_peaks",
-]

@@ -223,17 +223,20 @@ class Resultants:
     and theta take the place of M and theta, as M_x. What has slid in the end is the last
     ``sliding`` less the first.
 
-    Args: name: names the columns; that of the group ``part`` when left out. centre: (d,) the point
-        of reference, of a
-            footing the middle of its base, of a wall a point at the level from which ``height``
-            counts [m]; the middle of the part at the level of its lowest point when None.
+    Args:
+        name: names the columns; that of the group ``part`` when left out. centre: (d,) the point of
+            reference, of a footing the middle of its base, of a wall a point at the level from
+            which ``height`` counts [m]; the middle of the part at the level of its lowest point
+            when None.
         part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces
             too: a node belongs wholly, with all its force and weight, to each part that it is in;
             where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both
             are None.
         normal: direction of N towards the support; the part's mean contact direction when None.
+
     Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on
-    a held support. InputError for both part and where, and for a part of no contact points."""
+    a held support. InputError for both part and where, and for a part of no contact points.
+    """
 
     name: str = ""
     centre: Sequence[float] | None = None

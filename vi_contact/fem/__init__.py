@@ -2,6 +2,7 @@
 fields.
 
 In this order: ``build_mesh`` or ``read_mesh``, ``assemble``, ``contact_surface`` or ``contact_pair``: README.md.
+
 >>> from mpi4py import MPI
 >>> from vi_contact import core, fem, laws, meshes
 >>> mesh, tags = fem.build_mesh(meshes.WallMesh(divisions=(2, 3)), MPI.COMM_WORLD)

@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .assembly import assemble as assemble
 from .contact.joined import joined_surfaces as joined_surfaces
 from .contact.matching import NodeToNode as NodeToNode
@@ -34,39 +31,3 @@ from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release
 from .space import bodies_of as bodies_of
 from .ties import Tied as Tied
-
-__all__: list[str] = [
-    "BodyForce",
-    "Cells",
-    "CompliantBase",
-    "Dashpots",
-    "DualMortar",
-    "Facets",
-    "Forms",
-    "Heterogeneous",
-    "InitialStrain",
-    "LargestStrain",
-    "LinearForm",
-    "NodeToNode",
-    "Prescribed",
-    "Pressure",
-    "Reactions",
-    "SectionForces",
-    "Tags",
-    "TangentialTraction",
-    "Tied",
-    "Traction",
-    "XDMF",
-    "as_function",
-    "assemble",
-    "bodies_of",
-    "build_mesh",
-    "contact_pair",
-    "contact_surface",
-    "joined_surfaces",
-    "node_numbers",
-    "read_function",
-    "read_mesh",
-    "release",
-    "system_from_matrices",
-]

@@ -32,9 +32,10 @@ class ElasticForms:
     """Hold the variational forms of one body; constants are cellwise: one compiled form serves all
     materials.
 
-    Attributes: fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and
-        beta: functions of DG0, of DG1
-            where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
+    Attributes:
+        fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta:
+            functions of DG0, of DG1 where a material changes inside of cells. Lamé constants are
+            NaN in orthotropic cells.
         damping: the law of C, as it was given; largest_ratio: the largest xi of the materials, on
             all ranks.
         damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping,
@@ -44,7 +45,8 @@ class ElasticForms:
             K, in C = beta K and in stresses (``fem.dilatation``); None otherwise.
         tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what
             comes from where;
-        own_damping: whether the user gave a form of C."""
+        own_damping: whether the user gave a form of C.
+    """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     initial: Any = None  # InitialStrains

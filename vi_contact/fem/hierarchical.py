@@ -33,8 +33,10 @@ class Hierarchy:
     """Hold the edges of a space of P2 fields and the change of its unknowns. Collective, as all it
     does.
 
-    Attributes: vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H
-        and H⁻¹ = 2 - H."""
+    Attributes:
+        vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H and H⁻¹ =
+            2 - H.
+    """
 
     def __init__(self, space: Any) -> None:
         V, self._space = space.V, space

@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .chain import Processing as Processing
 from .chain import scaled_to_arias as scaled_to_arias
 from .chain import scaled_to_pga as scaled_to_pga
@@ -38,55 +35,9 @@ from .processing import scaled as scaled
 from .processing import tapered as tapered
 from .processing import trimmed as trimmed
 from .processing import without_mean as without_mean
-from .record import Record as Record
 from .record import STANDARD_GRAVITY as STANDARD_GRAVITY
 from .record import UNITS as UNITS
+from .record import Record as Record
 from .spectra import ResponseSpectrum as ResponseSpectrum
 from .spectra import fourier_spectrum as fourier_spectrum
 from .spectra import response_spectrum as response_spectrum
-
-__all__: list[str] = [
-    "EC8Spectrum",
-    "Envelope",
-    "GroundMotion",
-    "KanaiTajimi",
-    "Processing",
-    "Record",
-    "ResponseSpectrum",
-    "STANDARD_GRAVITY",
-    "UNITS",
-    "arias",
-    "baseline_corrected",
-    "cav",
-    "d5_95",
-    "filtered",
-    "fourier_spectrum",
-    "housner_intensity",
-    "husid",
-    "integrated",
-    "mean_period",
-    "padded",
-    "pga",
-    "pga_time",
-    "pgd",
-    "pgv",
-    "predominant_period",
-    "psa",
-    "read_record",
-    "record_info",
-    "resampled",
-    "response_spectrum",
-    "rms",
-    "scaled",
-    "scaled_to_arias",
-    "scaled_to_pga",
-    "scaled_to_psa",
-    "significant_duration",
-    "synthetic",
-    "tapered",
-    "trimmed",
-    "without_mean",
-    "write_at2",
-    "write_columns",
-    "write_path_series",
-]

@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .excitation import FullSine as FullSine
 from .excitation import HalfSine as HalfSine
 from .excitation import Harmonic as Harmonic
@@ -30,35 +27,3 @@ from .materials import Rayleigh as Rayleigh
 from .materials import Solid as Solid
 from .orthotropic import Orthotropic as Orthotropic
 from .weight import with_weight as with_weight
-
-__all__: list[str] = [
-    "ComponentReset",
-    "ConsistentMass",
-    "Coulomb",
-    "DampingRatio",
-    "Elastic",
-    "ExponentialDecay",
-    "FullSine",
-    "HalfSine",
-    "Harmonic",
-    "ImpulseUpdate",
-    "Inelastic",
-    "KelvinVoigt",
-    "LinearElastic",
-    "MassProportional",
-    "Newton",
-    "NoDamping",
-    "Orthotropic",
-    "PlaneStrain",
-    "PlaneStress",
-    "Rayleigh",
-    "Rectangular",
-    "Redistributed",
-    "Ricker",
-    "SlipRateCoulomb",
-    "Solid",
-    "StaticKinetic",
-    "Tabulated",
-    "Tresca",
-    "with_weight",
-]

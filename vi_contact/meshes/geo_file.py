@@ -40,13 +40,17 @@ class GeoFile:
     Statements that change no mesh, such as ``Printf``, ``Save``, ``Mesh 2`` and options of Gmsh's
     window, are left out, and a warning in the log lists them.
 
-    Args: path: the script. refine: how often Gmsh divides all cells into 2^d; new nodes lie on the
-        curves of the geometry. time_limit: seconds that the meshing may take. numbers: values of
-        names that the script uses and does not set, or sets by DefineConstant alone; as Gmsh's
-            option -setnumber.
-    Raises: InputError: words that are not allowed, all with their lines; numbers without effect;
-        when Gmsh fails, or time
-            or memory is over.
+    Args:
+        path: the script.
+        refine: how often Gmsh divides all cells into 2^d; new nodes lie on the curves of the
+            geometry.
+        time_limit: seconds that the meshing may take.
+        numbers: values of names that the script uses and does not set, or sets by DefineConstant
+            alone; as Gmsh's option -setnumber.
+
+    Raises:
+        InputError: words that are not allowed, all with their lines; numbers without effect; when
+            Gmsh fails, or time or memory is over.
     """
 
     path: Path

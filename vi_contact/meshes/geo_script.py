@@ -85,12 +85,14 @@ class Script:
 def allowed(path: Path, numbers: Mapping[str, float] | None = None) -> Script:
     """Return the script in listed words alone, each in its line.
 
-    Args: path: the script. numbers: values of names that the script uses and does not set, or sets
-        by DefineConstant alone, as Gmsh's
-            option -setnumber gives them.
-    Raises: InputError: a file that cannot be read, words that are not allowed, all of them with
-        their lines, and a number
-            that the script does not use or sets itself.
+    Args:
+        path: the script.
+        numbers: values of names that the script uses and does not set, or sets by DefineConstant
+            alone, as Gmsh's option -setnumber gives them.
+
+    Raises:
+        InputError: a file that cannot be read, words that are not allowed, all of them with their
+            lines, and a number that the script does not use or sets itself.
     """
     text = _read(path)
     given = dict(numbers or {})

@@ -58,10 +58,10 @@ def simulate(
     """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank
     gets the solution.
 
-    Args: scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
-        Zienkiewicz-Wood-Taylor
-            step. A problem that names no mass matrix gets the one of the scheme
-            (``run.method.with_defaults``).
+    Args:
+        scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
+            Zienkiewicz-Wood-Taylor step. A problem that names no mass matrix gets the one of the
+            scheme (``run.method.with_defaults``).
         solver: None means Automatic().
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and
             checkpoint_every count base steps.
@@ -90,12 +90,17 @@ def simulate(
             are read-only. If it returns True on some rank, the run ends with this base step, with a
             checkpoint and status "stopped". If it raises an error, the run ends with an InputError
             that says where, on all ranks and with a checkpoint.
-    Raises: InputError: before anything is computed or overwritten; also when another run writes
-        into the folder. Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM
-        or SIGHUP, with a checkpoint. OutOfTime: before the wall time is over, with a checkpoint.
+
+    Raises:
+        InputError: before anything is computed or overwritten; also when another run writes into
+            the folder.
+        Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with
+            a checkpoint.
+        OutOfTime: before the wall time is over, with a checkpoint.
         StepFailure: no solver could certify a step. ViContactError: the disk refused to read or
-        write. All that was
-            computed is then in the folder, and summary.json says why the run ended."""
+            write. All that was computed is then in the folder, and summary.json says why the run
+            ended.
+    """
     with opened(**locals()) as (session, writer):
         return session.go(writer)
 

@@ -1,6 +1,3 @@
-# ruff: noqa
-# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes
-# __all__.
 from .contact_stabilised import ContactStabilisedNewmark as ContactStabilisedNewmark
 from .generalised_alpha import GeneralisedAlpha as GeneralisedAlpha
 from .hht import HHT as HHT
@@ -13,16 +10,4 @@ from .ss22 import SS22 as SS22
 from .trapezoidal import Trapezoidal as Trapezoidal
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor as ZienkiewiczWoodTaylor
 
-__all__: list[str] = [
-    "ContactStabilisedNewmark",
-    "GeneralisedAlpha",
-    "HHT",
-    "Houbolt",
-    "LinearMultistep",
-    "Midpoint",
-    "MoreauJean",
-    "Newmark",
-    "SS22",
-    "Trapezoidal",
-    "ZienkiewiczWoodTaylor",
-]
+__all__: list[str]

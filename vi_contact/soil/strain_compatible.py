@@ -49,19 +49,23 @@ def strain_compatible(
 ) -> StrainCompatible[T]:
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
-    Args: material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the
-        middle. curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their
-        material. run: run(material, strain): assemble the body of this material with
-        ``damping=DampingRatio(…)``, march with
-            ``strain`` among the recorders, and return anything. All else is yours: contact, gravity
-            first, free fields.
+    Args:
+        material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the
+            middle.
+        curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their material.
+        run: run(material, strain): assemble the body of this material with
+            ``damping=DampingRatio(…)``, march with ``strain`` among the recorders, and return
+            anything. All else is yours: contact, gravity first, free fields.
         ratio: of the effective to the largest strain. tolerance: of the largest relative change of
             G or xi in a cell.
+
     Poisson's ratio is kept.
+
     Raises:
         InputError: cells named twice, Orthotropic ones, an effective strain that ends beyond its
             curves, with place.
-        ViContactError: no end after so many runs."""
+        ViContactError: no end after so many runs.
+    """
     function(OWNER, "run", run, "give a function of a material and a recorder")
     number(OWNER, "ratio", ratio, positive=True)
     comm, remedy = MpiComm(mesh.comm), "give (cells, SoilCurves) pairs"

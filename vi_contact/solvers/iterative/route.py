@@ -56,19 +56,21 @@ class Iterative:
     """Solve each step on all unknowns by conjugate gradients, on any number of ranks, and hold the
     settings for it.
 
-    Attributes: preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank),
-        "gamg" (algebraic multigrid
-            with rigid body modes), or "auto", which takes the first up to a Courant number of 0.5
-            in A, the second up to 30, and the third beyond. PETSc's options may name another.
+    Attributes:
+        preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg"
+            (algebraic multigrid with rigid body modes), or "auto", which takes the first up to a
+            Courant number of 0.5 in A, the second up to 30, and the third beyond. PETSc's options
+            may name another.
         petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold":
-            0.02}; those of ICC begin with sub_pc_. Options of the command line override them. One
+            0.02}; those of ICC begin with ``sub_pc_``. Options of the command line override them. One
             that nothing reads is refused.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: it stops when the residual, measured as the certificate, and the estimated error
             are below this.
         changes: number of changes of the contact set in a step without friction; after more, or
             when a set comes twice, projected gradients continue.
-        patience: number of linear iterations within which the residual has to fall tenfold."""
+        patience: number of linear iterations within which the residual has to fall tenfold.
+    """
 
     preconditioner: str = AUTO
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)

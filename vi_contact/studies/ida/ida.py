@@ -144,16 +144,21 @@ def run_ida(
     checkpoints, and tries failed ones again. The table is made anew after every run, in one piece,
     the figure at the end.
 
-    Args: jobs: processes at the same time. part: (i, n): only every n-th run from the i-th on, for
-        job arrays that share the folder. launch: words in front of the command of a run, ("mpirun",
-        "-n", "4"); each has a process of its own then. say: takes a line about each run, and every
-        half a minute one about the time left. wall_time: as of ``simulate``: every run gets what is
-        left of it, and ends with a checkpoint before it is over.
-    Raises: InputError: a folder of another study, or in which the same part runs, a part or number
-        of jobs that makes no
-            sense, inside mpirun.
+    Args:
+        jobs: processes at the same time.
+        part: (i, n): only every n-th run from the i-th on, for job arrays that share the folder.
+        launch: words in front of the command of a run, ("mpirun", "-n", "4"); each has a process of
+            its own then.
+        say: takes a line about each run, and every half a minute one about the time left.
+        wall_time: as of ``simulate``: every run gets what is left of it, and ends with a checkpoint
+            before it is over.
+
+    Raises:
+        InputError: a folder of another study, or in which the same part runs, a part or number of
+            jobs that makes no sense, inside mpirun.
         KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to
-            go on."""
+            go on.
+    """
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
         raise InputError(
