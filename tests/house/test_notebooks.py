@@ -52,7 +52,7 @@ def test_there_are_notebooks() -> None:
         (FOLDER / "index.md").read_text("utf-8").partition("```{toctree}")[2],
         re.MULTILINE,
     )
-    known = re.search(r"^NAMES = \((.*)\)$", RUN.read_text("utf-8"), re.MULTILINE)
+    known = re.search(r"^NAMES = \((.*?)^\)$", RUN.read_text("utf-8"), re.MULTILINE | re.DOTALL)
     assert (
         known
         and set(re.findall(r'"(\w+)"', known[1])) == set(NAMES) == set(listed)
