@@ -4,7 +4,8 @@ Everything above this file (schemes, condensed solver, recorders) is written aga
 below and never asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and
 needs no finite element package; ``fem.petsc_algebra`` serves any number of ranks. Rules: a vector
 is the float64 array of its owned entries; scalars returned by ``dot`` and by ``Comm`` are the same
-number on every rank."""
+number on every rank.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -23,7 +24,8 @@ Indices = NDArray[np.int64]
 
 def max_abs(x: Array) -> float:
     """Return max |x| over the entries given, 0 for none; NaN stays NaN. The places are found faster
-    than the values."""
+    than the values.
+    """
     return float(max(x.item(x.argmax()), -x.item(x.argmin()))) if x.size else 0.0
 
 
@@ -46,7 +48,8 @@ class Comm(Protocol):
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
     """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one
-    rank says True."""
+    rank says True.
+    """
     return float(value) if comm.size == 1 else float(comm.max(np.array([float(value)]))[0])
 
 
@@ -62,7 +65,8 @@ def from_each(comm: Comm, value: Any) -> list[Any]:
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
     """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers; elsewhere
-    none. Collective."""
+    none. Collective.
+    """
     parts = comm.gather((numbers, rows))
     if parts is None:
         return rows[:0]
@@ -74,7 +78,8 @@ def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
 
 class Matrix(Protocol):
     """Provide products with a square sparse matrix whose rows are distributed like the vectors it
-    multiplies."""
+    multiplies.
+    """
 
     @property
     def rows(self) -> int:
@@ -95,12 +100,14 @@ class Factor(Protocol):
     ) -> Array:
         """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row
         ``owned[k]`` of the owning rank. Returns the owned rows, shape (rows, m), or only those of
-        them that are named: the whole may not fit."""
+        them that are named: the whole may not fit.
+        """
 
 
 class Algebra(Protocol):
     """Make matrices out of matrices: of M, C, K and their combinations, all of them ``symmetric``
-    or not."""
+    or not.
+    """
 
     symmetric: bool
 
@@ -112,43 +119,52 @@ class Algebra(Protocol):
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         """Return the matrix of entries between the n unknowns of one rank; those given twice add
-        up."""
+        up.
+        """
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         """Return A with the rows and columns of the masked unknowns replaced by those of the
-        identity."""
+        identity.
+        """
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
         """Return the rows and columns of A of the masked unknowns, which their ranks own."""
 
     def first(self, n: int) -> int:
         """Return the number, among those of all ranks, of the first of the n unknowns that this
-        rank owns."""
+        rank owns.
+        """
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         """Return these owned rows of A, ascending, their columns numbered over all ranks.
-        Collective."""
+
+        Collective.
+        """
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity of n owned rows with some of them replaced, columns numbered over all
-        ranks."""
+        ranks.
+        """
 
     def factor(self, A: Matrix) -> Factor: ...
     def contact_last(self, A: Matrix, last: Indices) -> Any:
         """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are
         numbered over all ranks and the same on every rank. None where ``factor`` serves better or
-        there is none. Collective."""
+        there is none. Collective.
+        """
 
     def dot(self, x: Array, y: Array) -> float: ...
 
 
 class EffectiveMatrix:
-    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it
-    lives as long as dt.
+    """Hold the matrix A of a step and its factor.
+
+    A prepared solver belongs to one of these; it lives as long as dt.
 
     ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k
     K. None: not known. ``image(x)``: A x, made of products with M, C and K that others need too,
-    where that is told."""
+    where that is told.
+    """
 
     def __init__(
         self,
@@ -168,7 +184,8 @@ class EffectiveMatrix:
 
     def contact_last(self, last: Indices) -> Any:
         """Return the factor with these unknowns last (see ``Algebra``), which is then ``factor``
-        too. Collective."""
+        too. Collective.
+        """
         if self._last is None or not np.array_equal(self._last[0], last):
             self._last = last, self.algebra.contact_last(self.matrix, last)
             if self._last[1] is not None:
@@ -241,7 +258,8 @@ class SerialMatrix:
 
 class SerialFactor:
     """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged
-    where they must."""
+    where they must.
+    """
 
     def __init__(self, matrix: SerialMatrix) -> None:
         self._lu = splu(
@@ -263,7 +281,8 @@ class SerialFactor:
 
 class SerialAlgebra:
     """Combine matrices of scipy.sparse on one process; solvers that need symmetric ones ask for
-    ``symmetric``."""
+    ``symmetric``.
+    """
 
     def __init__(self, *, symmetric: bool = True) -> None:
         self.comm: Comm = SerialComm()
@@ -314,7 +333,8 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
     """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin
-    at ``first``."""
+    at ``first``.
+    """
     counts, columns, values = (
         [np.zeros(1, dtype=np.int64)],
         [rows.indices[:0]],
@@ -334,7 +354,8 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
 
 def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
     """Return n rows of the identity, whose ones begin in column ``first``, with these rows replaced
-    by the entries."""
+    by the entries.
+    """
     kept = np.setdiff1d(np.arange(n), rows)
     where = np.concatenate([kept, np.repeat(rows, np.diff(entries.indptr))])
     column = np.concatenate([first + kept, entries.indices])

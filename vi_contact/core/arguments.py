@@ -3,7 +3,8 @@ and no traceback.
 
 ``@checked`` is for functions that users call with their own values, and that look at these before
 any other function does. Limits of numbers (positive, finite) are checked by the functions
-themselves."""
+themselves.
+"""
 
 import os
 import types
@@ -28,7 +29,8 @@ R = TypeVar("R")
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function with a check of its arguments: InputError for one that is not of its
-    type."""
+    type.
+    """
     name, of = function.__qualname__, signature(function)
 
     @wraps(function)
@@ -47,7 +49,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 def check_fields(one: Any) -> None:
     """Raise InputError for the first field of a dataclass that is not of its type: call it in
-    ``__post_init__``."""
+    ``__post_init__``.
+    """
     kind: Any = type(one)
     hints = _hints(kind)
     for field in fields(one):

@@ -45,7 +45,8 @@ class Census:
 
     def in_words(self) -> str:
         """Return how many points of how many nodes there are, and the other kinds with their first
-        places."""
+        places.
+        """
         kinds = [self._kind(kind, points) for kind, points in self.places.items()]
         return "; ".join([f"{self.points} points of {self.nodes} nodes", *kinds])
 

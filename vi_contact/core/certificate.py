@@ -1,5 +1,7 @@
-"""Judge one step: how far an answer is from solving its inequality problem. ``core.verify``
-computes it."""
+"""Judge one step: how far an answer is from solving its inequality problem.
+
+``core.verify`` computes it.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -2,7 +2,8 @@
 
 Every constructor and every entry point of the package asks here, before any work is done. A check
 returns the value in the type that the caller goes on with, so that one line reads and checks an
-argument."""
+argument.
+"""
 
 import math
 import re
@@ -34,7 +35,8 @@ def number(
     unit: str = "",
 ) -> float:
     """Return a finite real number as a float; InputError for texts, NaN, infinity, truth values and
-    wrong signs."""
+    wrong signs.
+    """
     kind = "a finite number above zero" if positive else "zero or a positive finite number"
     wanted = (kind if positive or not_negative else "a finite number") + (
         f" in {unit}" if unit else ""
@@ -53,7 +55,8 @@ def number(
 
 def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | None = None) -> int:
     """Return a whole number between ``least`` and ``most`` as an int; 3.0 counts as one, True does
-    not."""
+    not.
+    """
     found = real(value)
     if (
         not math.isfinite(found)
@@ -84,7 +87,8 @@ def counted(
     owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST
 ) -> int:
     """Return how many things an input asks for, before memory is taken for them; InputError above
-    ``most``, and NaN."""
+    ``most``, and NaN.
+    """
     found = real(value)
     if not found <= most:
         raise InputError(
@@ -105,7 +109,8 @@ def attributes(
 ) -> None:
     """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not
     > 0, or not >= 0, or no whole number of at least 1 (``counts``), or neither True nor False
-    (``flags``)."""
+    (``flags``).
+    """
     what = type(owner).__name__
     for name in finite + positive + not_negative:
         number(
@@ -137,7 +142,8 @@ def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
 
 def column_name(kind: str, name: Any) -> str:
     """Return a name that columns may carry; InputError unless it is made of letters, digits and
-    underscores."""
+    underscores.
+    """
     if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
         return str(name)
     raise InputError(
@@ -147,7 +153,8 @@ def column_name(kind: str, name: Any) -> str:
 
 def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...]:
     """Return the members of a list or tuple; InputError for one object, a text or a mapping in its
-    place."""
+    place.
+    """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
@@ -157,7 +164,8 @@ def instance(
     owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...], remedy: str
 ) -> Any:
     """Return an object of one of these types; InputError for a class instead of an object, and for
-    anything else."""
+    anything else.
+    """
     if isinstance(value, kinds):
         return value
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
@@ -173,7 +181,8 @@ def provides(
     lacks: tuple[str, ...] = (),
 ) -> Any:
     """Return an object with these attributes (a protocol's) and without those of other kinds; else
-    InputError."""
+    InputError.
+    """
     fits = all(hasattr(value, name) for name in names) and not any(
         hasattr(value, name) for name in lacks
     )
@@ -186,7 +195,8 @@ def array(
     owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *, unit: str = ""
 ) -> Array:
     """Return finite real values as a float array of this shape; None stands for any length along an
-    axis."""
+    axis.
+    """
     unit = f" in {unit}" if unit else ""
     wanted = (
         "("
@@ -225,7 +235,8 @@ def optional(
 
 def shape_of(value: Any) -> tuple[int, ...]:
     """Return the shape of numbers in lists or arrays; (-1,) for lists of different lengths, which
-    have none."""
+    have none.
+    """
     try:
         return np.shape(value)
     except ValueError:
@@ -242,7 +253,8 @@ def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]
 
 def mask(owner: str, meaning: str, value: Any, shape: tuple[int, ...]) -> Mask:
     """Return truth values of this shape; InputError for indices, numbers, texts and other
-    shapes."""
+    shapes.
+    """
     try:
         found = np.asarray(value)
     except ValueError:
@@ -284,7 +296,8 @@ def _called(value: Any) -> str:
 
 def real(value: Any) -> float:
     """Return the value as a float, NaN for what is no real number; integers too large for a float
-    are infinite."""
+    are infinite.
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Integral):
@@ -297,7 +310,8 @@ def real(value: Any) -> float:
 
 def refuse(defects: Iterable[str], comm: Comm) -> None:
     """Raise InputError on all ranks with the first text that is not empty, whichever rank found it;
-    collective."""
+    collective.
+    """
     mine = next((text for text in defects if text), "")
     if largest(comm, bool(mine)):
         found = comm.bcast(comm.gather(mine))
@@ -306,7 +320,8 @@ def refuse(defects: Iterable[str], comm: Comm) -> None:
 
 def ended(name: str, error: Exception) -> str:
     """Return the sentence about an error in a user's function: the package's own as it is, others
-    with their line."""
+    with their line.
+    """
     place = traceback.extract_tb(error.__traceback__)[-1]
     said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
     if of_machine(error):
@@ -320,7 +335,8 @@ def ended(name: str, error: Exception) -> str:
 
 def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
     """Return what a call of a user's function returns; InputError on all ranks where it raises on
-    one. Collective."""
+    one. Collective.
+    """
     found, defect, failure = [], "", None
     try:
         found.append(call())

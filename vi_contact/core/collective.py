@@ -9,7 +9,8 @@ call such a function:
   on with another value; at the end of the frame all ranks are asked once, however many functions
   were called. This is for every step.
 
-On one rank a frame does nothing, and errors are raised where they happen."""
+On one rank a frame does nothing, and errors are raised where they happen.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -47,7 +48,8 @@ def together(comm: Comm) -> Iterator[None]:
     Where ``users`` kept an error, all ranks raise the first of these. Otherwise a rank raises its
     own error, and those without one raise that of the first rank that has one. What is raised
     within the frame between collective calls, and not by a function that ``users`` calls, may still
-    leave the others waiting: give it a frame of its own."""
+    leave the others waiting: give it a frame of its own.
+    """
     if comm.size == 1:
         yield
         return
@@ -66,7 +68,8 @@ def together(comm: Comm) -> Iterator[None]:
 
 def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
     """Open a frame for calls of a scheme, a solver or a law of the user's own, which may raise
-    anywhere."""
+    anywhere.
+    """
     return nullcontext() if type(value).__module__.startswith("vi_contact.") else together(comm)
 
 
@@ -93,10 +96,13 @@ def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> 
 
 
 def users(name: str, call: Callable[[], T], instead: T, *, as_it_is: bool = False) -> T:
-    """Return what a user's function returns. Where it raises, InputError says so with its name and
+    """Return what a user's function returns.
+
+    Where it raises, InputError says so with its name and
     line: at once, or in a frame of several ranks at its end, and ``instead`` is returned.
     ``as_it_is``: its own rank raises what it has raised, and the other ranks alone that
-    InputError."""
+    InputError.
+    """
     try:
         return call()
     except Exception as error:
@@ -116,7 +122,8 @@ def _input_error(name: str, error: Exception) -> ViContactError:
 
 def kept_error(name: str, error: Exception, instead: T) -> T:
     """Raise what a user's function has raised, or keep it for the end of the frame and return
-    ``instead``."""
+    ``instead``.
+    """
     told = _input_error(name, error)
     if not _OPEN:
         raise told from (None if told is error else error)
@@ -148,7 +155,8 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
 
     Numbers, texts, arrays, and lists and dataclasses of these are compared; of functions and of
     other objects the type alone. ``Parts`` says of which argument each rank may hold its part:
-    there lists and arrays are not compared."""
+    there lists and arrays are not compared.
+    """
     if comm.size == 1:
         return
     own = {
@@ -183,7 +191,8 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
 
 class Parts:
     """Wrap an argument of which each rank may hold its part: its tuples, lists and arrays are not
-    compared."""
+    compared.
+    """
 
     def __init__(self, value: Any) -> None:
         self.value = value

@@ -4,7 +4,8 @@ as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact.
 ``loops.c`` needs a C compiler only. ``contact_last.c`` needs CHOLMOD too, and takes none but the
 one that PETSc has brought into the process: another one beside it would share names with it, and
 with the METIS and the BLAS of PETSc, so that functions of one call those of the other. Compiling
-against the header beside that CHOLMOD makes any version do."""
+against the header beside that CHOLMOD makes any version do.
+"""
 
 import ctypes
 import logging
@@ -33,14 +34,16 @@ OF_CHOLMOD = ("order", "factorise", "columns", "release", "substitute")
 
 def library(comm: Comm) -> Any:
     """Return the functions of ``loops.c``, or None, the same on all ranks; the first rank compiles
-    them. Collective."""
+    them. Collective.
+    """
     return _alike(comm, _loops)
 
 
 def cholmod(comm: Comm) -> Any:
     """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD, or None where PETSc has no
     CHOLMOD or nothing can be compiled, the same on all ranks; the first rank compiles it.
-    Collective."""
+    Collective.
+    """
     return _alike(comm, _factoriser)
 
 
@@ -78,7 +81,8 @@ def _loops() -> Any:
 
 def _factoriser() -> Any:
     """The functions for the CHOLMOD of this process, which a PETSc may bring later than we are
-    asked first."""
+    asked first.
+    """
     try:
         return _with_cholmod(cholmod_of_petsc())
     except OSError as problem:
@@ -113,7 +117,8 @@ def _without_cholmod(reason: str) -> None:
 
 def cholmod_of_petsc() -> Path:
     """Return the file of the CHOLMOD that PETSc has brought into this process; OSError, which says
-    why, without one."""
+    why, without one.
+    """
     if not packages.petsc_is_here():
         raise OSError("no PETSc is in this process")
     if not packages.petsc_has("cholmod"):
@@ -128,7 +133,8 @@ def cholmod_of_petsc() -> Path:
 
 def _header(file: Path) -> Path:
     """The folder of the header that was installed with this library: lib, or lib/x86_64-linux-gnu,
-    beside include."""
+    beside include.
+    """
     for parent in file.parents[1:3]:
         for folder in (parent / "include" / "suitesparse", parent / "include"):
             if (folder / "cholmod.h").is_file():
@@ -137,12 +143,14 @@ def _header(file: Path) -> Path:
 
 
 def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
-    """Return the file of the compiled functions, made unless one that can be loaded is there. Safe
-    in any number of processes: each compiles aside, and the last one to end replaces the file as a
-    whole.
+    """Return the file of the compiled functions, made unless one that can be loaded is there.
+
+    Safe in any number of processes: each compiles aside, and the last one to end replaces the file
+    as a whole.
 
     ``libraries``: files to link with, which are in the process already; a changed one is another
-    result."""
+    result.
+    """
     command = [*shlex.split(os.environ.get("CC") or "cc"), "-O3", "-shared", "-fPIC", *options]
     stamps = [(str(one), one.stat().st_size, one.stat().st_mtime_ns) for one in libraries]
     text = f"{source.read_text(encoding='utf-8')}{command}{stamps}{platform.machine()}"

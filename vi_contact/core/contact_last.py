@@ -8,7 +8,8 @@ any x_c that contact asks for may be put in between the two substitutions: with 
 equilibrium.
 
 Loads, answers and contact values may also be of several runs, a row for each: L is then read once
-for eight of them."""
+for eight of them.
+"""
 
 import ctypes
 import weakref
@@ -34,7 +35,8 @@ class ContactLast:
     last rows of L.
 
     Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the
-    owned rows. Vectors of c are in the order of ``last``. ``corner``: L_cc, lower triangular."""
+    owned rows. Vectors of c are in the order of ``last``. ``corner``: L_cc, lower triangular.
+    """
 
     def __init__(
         self,
@@ -85,7 +87,8 @@ class ContactLast:
 
     def backward(self, x_c: Array) -> Array:
         """Return x, the owned entries, whose contact unknowns are exactly x_c and the others in
-        equilibrium with them under the load of the last ``forward``."""
+        equilibrium with them under the load of the last ``forward``.
+        """
         if x_c.ndim == 2:
             return self._backward_many(x_c)
         if self._columns:
@@ -191,5 +194,6 @@ def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
 
 def at(array: NDArray[Any]) -> ctypes.c_void_p:
     """Return where an array lies in memory; ``array.ctypes`` takes several times as long to
-    tell."""
+    tell.
+    """
     return ctypes.c_void_p(array.__array_interface__["data"][0])

@@ -1,5 +1,6 @@
 """Solve with a well-conditioned matrix, as mass matrices are, without a factor: conjugate gradients
-to round-off."""
+to round-off.
+"""
 
 import numpy as np
 
@@ -17,7 +18,8 @@ def solve_free(algebra: Algebra, A: Matrix, b: Array, held: Mask, x: Array) -> A
 
     A is symmetric and positive definite on the others; it is preconditioned by its diagonal.
     StepFailure when it takes too long. Collective; a product and two reductions of one number an
-    iteration."""
+    iteration.
+    """
     diagonal = A.diagonal()
     inverse = np.divide(1.0, diagonal, out=np.zeros(len(b)), where=~held & (diagonal != 0.0))
     x, d = x.copy(), np.zeros(len(b))

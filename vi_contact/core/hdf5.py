@@ -3,7 +3,8 @@ memory can hold.
 
 An HDF5 file may send its reader on: by a soft or external link, by a virtual data set, by external
 storage. It may announce an array that no memory holds. Nothing of this is followed. Writing is in
-``core.files``."""
+``core.files``.
+"""
 
 import os
 from collections.abc import Iterator
@@ -22,7 +23,8 @@ class StoredGroup:
     """Hold a group of an HDF5 file that is open to be read: ``group[name]`` is a group or a data
     set of numbers.
 
-    KeyError for a name that is not there, InputError for what does not lie in this file."""
+    KeyError for a name that is not there, InputError for what does not lie in this file.
+    """
 
     def __init__(self, path: Path, group: Any, size: int) -> None:
         self._path, self._group, self._size = path, group, size
@@ -76,8 +78,10 @@ class StoredGroup:
 
 
 class StoredFile(StoredGroup):
-    """Open an HDF5 file of a run folder to be read. OSError when it is none, InputError when it is
-    a link."""
+    """Open an HDF5 file of a run folder to be read.
+
+    OSError when it is none, InputError when it is a link.
+    """
 
     def __init__(self, path: Path) -> None:
         import h5py  # late: no step needs it

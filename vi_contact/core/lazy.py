@@ -1,5 +1,6 @@
 """Give a package its public names, each imported when it is first used: what nobody asks for need
-not be installed."""
+not be installed.
+"""
 
 import ast
 import sys
@@ -21,7 +22,8 @@ def lazy(
 
     A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module,
     here and for checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a
-    room and hands on all its names."""
+    room and hands on all its names.
+    """
     home: dict[str, str] = {}
     with open(
         splitext(file)[0] + ".pyi", encoding="utf-8"
@@ -48,7 +50,8 @@ def lazy(
 
     class Room(ModuleType):
         """Keep names when Python binds a module of the same name: ``run.simulate`` stays the
-        function."""
+        function.
+        """
 
         def __setattr__(self, name: str, value: Any) -> None:
             if name not in home or not isinstance(value, ModuleType):
@@ -60,7 +63,8 @@ def lazy(
 
 def _renamed(package: str, name: str) -> Any:
     """Return what an old public name of a package is called now, with a warning; None for a name
-    that never was."""
+    that never was.
+    """
     path = NAMES.get(package, {}).get(name)
     if path is None:
         return None

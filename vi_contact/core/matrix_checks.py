@@ -3,7 +3,8 @@ number of ranks.
 
 A matrix is seen through its products A w and Aᵀ w with a vector made of the numbers of the
 unknowns, in units in which its diagonal is one: nothing is stored, and the answer depends neither
-on the ranks nor on the units."""
+on the ranks nor on the units.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -24,7 +25,8 @@ def probe(numbers: Any, j: int) -> Array:
 
 def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
     """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them; ``numbers`` (n,) are
-    those of the owned unknowns. Collective."""
+    those of the owned unknowns. Collective.
+    """
     size = np.sqrt(np.abs(A.diagonal()))
     size = np.where(size > 0.0, size, largest(comm, max_abs(size)) or 1.0)
     w = probe(numbers, 0) / size
@@ -38,7 +40,8 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
 
 def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix) -> Iterator[str]:
     """Yield a sentence for each matrix that is not finite, and for M that is not symmetric or has
-    masses below zero. Collective: take all of them on every rank."""
+    masses below zero. Collective: take all of them on every rank.
+    """
     for name, A in matrices.items():
         found = asymmetry(A, comm, numbers)
         if not np.isfinite(found):

@@ -1,5 +1,6 @@
 """Say where a rigid obstacle lies: contact directions and initial gaps, and what is asked of
-them."""
+them.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,20 +23,23 @@ REMEDY = (
 
 class Obstacle(Protocol):
     """Say where a rigid support lies: the contact direction of each point of a boundary, and its
-    initial gap."""
+    initial gap.
+    """
 
     def directions(self, points: Array, normals: Array) -> Array:
         """Return the unit contact directions (k, d), from the body to the obstacle.
 
         ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d)
         unit outward normals of the body there. Asked before ``gap``, with the same arrays;
-        InputError when body and support do not fit."""
+        InputError when body and support do not fit.
+        """
 
     def gap(self, points: Array, normals: Array) -> Array:
         """Return the initial gaps (k,) [m] along these directions, >= 0 but for round-off.
 
         ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the
-        point moves by u."""
+        point moves by u.
+        """
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ class HalfSpace:
     towards the body.
 
     The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact
-    direction is -normal."""
+    direction is -normal.
+    """
 
     point: tuple[float, ...]
     normal: tuple[float, ...]
@@ -88,7 +93,8 @@ class HalfSpace:
 class AnalyticGap:
     """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's
     outward normal. It is asked for the points of each rank by themselves: let no gap depend on
-    other points, as on their mean or lowest."""
+    other points, as on their mean or lowest.
+    """
 
     function: Callable[[Array], Array]
 
@@ -134,7 +140,8 @@ def facing(
         them only are refused where others might decide.
     Raises: InputError: other shapes, what are no real numbers, directions of no length, along the
         boundary or into the
-            body."""
+            body.
+    """
     owner, m = type(obstacle).__name__, len(points)
     directions = array(
         owner, "what directions returns", obstacle.directions(points, normals), points.shape
@@ -174,7 +181,8 @@ def facing(
 
 def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> None:
     """Raise InputError, once for a whole boundary, for unit directions along it or into the
-    body."""
+    body.
+    """
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
@@ -202,7 +210,8 @@ def _of(name: str) -> str:
 
 def _turned_smoothly(cosines: Array, angle: float) -> Mask:
     """Which normals (m,), by their cosines with the direction, are reached from the one that looks
-    towards it most by turns of no more than ``angle`` from one normal to the next."""
+    towards it most by turns of no more than ``angle`` from one normal to the next.
+    """
     turns = np.arccos(np.clip(cosines, -1.0, 1.0))
     steps = np.unique(turns)
     wide = np.flatnonzero(np.diff(steps) > angle * (1.0 + 1e-9))
@@ -216,7 +225,8 @@ def _unit(vector: Array) -> Array:
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:
     """Return the initial gap without round-off (1e-12 of the body's size); InputError where the
-    body penetrates."""
+    body penetrates.
+    """
     if not np.all(np.isfinite(gap)):
         raise InputError(
             "the initial gap contains NaN or infinite values: check the obstacle's gap function"

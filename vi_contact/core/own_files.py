@@ -42,7 +42,8 @@ DEVICES = (
 
 def is_own(path: Path) -> bool:
     """Return whether there is a regular file of this name; InputError for anything else of this
-    name."""
+    name.
+    """
     mode = _mode(path)
     if mode is not None and not stat.S_ISREG(mode):
         raise _foreign(path, mode, "file")
@@ -51,7 +52,8 @@ def is_own(path: Path) -> bool:
 
 def inner_folder(folder: Path, *names: str) -> Path:
     """Return a folder inside a run folder, which need not exist; InputError where it, or one above
-    it, is a link."""
+    it, is a link.
+    """
     for name in names:
         folder = folder / name
         mode = _mode(folder)
@@ -69,8 +71,10 @@ def make_inner_folder(folder: Path, *names: str) -> Path:
 
 
 def open_to_read(path: Path) -> Any:
-    """Open a regular file, buffered. InputError for anything else of this name; OSError names the
-    file."""
+    """Open a regular file, buffered.
+
+    InputError for anything else of this name; OSError names the file.
+    """
     return os.fdopen(_opened(path, os.O_RDONLY), "rb")
 
 
@@ -79,7 +83,8 @@ def open_to_append(path: Path, *, make: bool = False) -> Any:
     is none.
 
     A file that has another name too (a hard link) stays as it is under that name: this one gets a
-    copy. InputError for anything but a regular file; OSError names the file."""
+    copy. InputError for anything but a regular file; OSError names the file.
+    """
     flags = os.O_RDWR | os.O_APPEND | (os.O_CREAT if make else 0)
     file = _unbuffered(_opened(path, flags), path, "ab+")
     if names(file) > 1:
@@ -91,19 +96,23 @@ def open_to_append(path: Path, *, make: bool = False) -> Any:
 
 def open_lock(path: Path) -> Any:
     """Open a regular file that processes lock, unbuffered, and make it where there is none;
-    InputError for others."""
+    InputError for others.
+    """
     return _unbuffered(_opened(path, os.O_RDWR | os.O_CREAT), path, "rb+")
 
 
 def names(file: Any) -> int:
     """Return how many names an open file has; more than one where there are hard links, 0 when it
-    was removed."""
+    was removed.
+    """
     return os.fstat(file.fileno()).st_nlink
 
 
 def open_new(path: Path) -> Any:
     """Make a file anew, unbuffered, in the place of whatever has its name, but for a folder.
-    OSError names the file."""
+
+    OSError names the file.
+    """
     for _ in range(TRIES):
         try:
             return _unbuffered(
@@ -116,26 +125,32 @@ def open_new(path: Path) -> Any:
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a regular file; InputError for anything else of this name; OSError
-    names the file."""
+    names the file.
+    """
     with open_to_read(path) as file:
         return bytes(file.read())
 
 
 def read_text(path: Path) -> str:
     """Return the text of a regular file; ValueError when it is not UTF-8, else as
-    ``read_bytes``."""
+    ``read_bytes``.
+    """
     return read_bytes(path).decode("utf-8")
 
 
 def remove(path: Path) -> None:
-    """Remove a name, if there is one: of a link the link alone. OSError for a folder, which
-    stays."""
+    """Remove a name, if there is one: of a link the link alone.
+
+    OSError for a folder, which
+    stays.
+    """
     path.unlink(missing_ok=True)
 
 
 def is_stream(path: Path) -> bool:
     """Return whether a user has named a stream, such as /dev/stdout, as the place of an output:
-    never replace these."""
+    never replace these.
+    """
     path = Path(os.path.abspath(path))
     return path.parent in DEVICES and os.path.lexists(path)
 
@@ -179,7 +194,8 @@ def _copied(path: Path) -> None:
 
 def temporary_of(path: Path) -> Path:
     """Return the name under which this process makes a file that is to take the place of
-    another."""
+    another.
+    """
     return path.with_name(f".{path.name}.{os.getpid()}.tmp")
 
 

@@ -1,5 +1,6 @@
 """State the problem that is marched: a semi-discrete system, its contact surface, and the laws of
-both."""
+both.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -29,7 +30,8 @@ class ContactProblem:
     velocities unchanged. ``mass=None`` leaves the choice of the mass matrix to the time scheme.
     InputError is raised on all ranks for parts of the wrong kind or size, and for a surface of
     another system. A friction law that is a dataclass may hold tuples with a value for every
-    contact point: of this rank, or of all ranks by their numbers. Collective."""
+    contact point: of this rank, or of all ranks by their numbers. Collective.
+    """
 
     system: SemiDiscreteSystem
     surface: ContactSurface
@@ -53,7 +55,8 @@ class ContactProblem:
 
     def __repr__(self) -> str:
         """Return unknowns, conditions and laws in a few lines, those of all ranks: not the
-        arrays."""
+        arrays.
+        """
         laws = {
             "friction": self.friction,
             "impact": self.impact,
@@ -88,7 +91,8 @@ class ContactProblem:
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
         """Return the system that schemes see: in the rotated basis, with the inertia loads -M r
-        a_g(t)."""
+        a_g(t).
+        """
         system = self.unshaken
         ways = (
             (np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations
@@ -101,7 +105,8 @@ class ContactProblem:
     def beside(self, other: "ContactProblem") -> "ContactProblem | None":
         """Return the same problem with the matrices of another one, and the factors made of them;
         None where these are not its own: for another system, surface, mass or impact law, or
-        friction where the other has none."""
+        friction where the other has none.
+        """
         ours, theirs = ((one.system, one.surface, one.frictional) for one in (self, other))
         if any(a is not b for a, b in zip(ours, theirs, strict=True)):
             return None
@@ -116,13 +121,15 @@ class ContactProblem:
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
         """Return the system in the basis of the equations, without excitation: the gravity
-        stage."""
+        stage.
+        """
         return self._relative(self.turned)
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:
         """Return the system in the nodal frames, every body in its own unknowns: one for all
-        problems on a surface."""
+        problems on a surface.
+        """
         system, basis, dual = self.system, self.surface.basis, self.surface.dual
         if basis is None:
             return system
@@ -149,7 +156,8 @@ class ContactProblem:
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
         """Return B_t u plus what the obstacle slides: where the slip of a step is zero; None
-        without friction."""
+        without friction.
+        """
         return self.surface.slip_origin(u, start, end) if self.frictional else None
 
     def cartesian(self, x: Array) -> Array:
@@ -170,7 +178,8 @@ def with_values(
     law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
 ) -> Any:
     """Return the law with its tuples changed on several ranks, also in the laws that it is made
-    of."""
+    of.
+    """
     if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
     found: dict[str, Any] = {}
@@ -186,7 +195,8 @@ def check_parts(problem: Any) -> None:
 
     Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems
     of that space take it. Sizes are compared on all ranks together, so that all of them raise the
-    same sentence."""
+    same sentence.
+    """
     owner, system, surface, excitations = (
         "ContactProblem",
         problem.system,
@@ -294,7 +304,8 @@ def _sizes(owner: str, values: dict[str, Any], shapes: dict[str, tuple[int, ...]
 
 def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int) -> Iterator[str]:
     """What is wrong with a surface on this rank, and with its places in the unknowns of the
-    system."""
+    system.
+    """
     m, d, n = surface.count, system.influence.shape[1], system.rows
     shapes: dict[str, tuple[int, ...]] = {
         "points": (m, d),

@@ -2,7 +2,8 @@
 load.
 
 Remembered are read-only vectors (``frozen``), each known as the object it is; what is handed out is
-read-only too."""
+read-only too.
+"""
 
 from collections.abc import Callable
 from typing import Any

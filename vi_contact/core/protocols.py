@@ -1,5 +1,6 @@
 """Describe what a problem asks of its laws and of what shakes it: the protocols that users' own
-classes satisfy."""
+classes satisfy.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,23 +19,27 @@ EXCITATION = ("acceleration", "direction", "duration")  # what is asked of one
 
 class Excitation(Protocol):
     """Shake the ground in one direction, or give any motion its history: the contract of every
-    excitation."""
+    excitation.
+    """
 
     @property
     def direction(self) -> tuple[float, ...]:
         """Return the components of the direction, (d,), not all zero; its length is a factor on the
-        acceleration."""
+        acceleration.
+        """
 
     @property
     def duration(self) -> float:
         """Return the time [s] after which the acceleration stays zero or negligible; infinite if it
-        never does."""
+        never does.
+        """
 
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] at time ``t`` [s], positive along the direction.
 
         Asked for at any time >= 0, also twice and between the steps; the same on every rank, a
-        finite number."""
+        finite number.
+        """
 
     def __call__(self, t: float) -> Array:
         """Return the vector acceleration(t) · direction [m/s²] at time ``t`` [s], shape (d,)."""
@@ -61,7 +66,8 @@ def check_excitation(
 
 def finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
     """Return `values` as a tuple of floats; InputError naming the first entry that is not a finite
-    number."""
+    number.
+    """
     entries = several(owner, name, values, "give a sequence of numbers")
     return tuple(number(owner, f"{name}[{k}]", value) for k, value in enumerate(entries))
 
@@ -70,7 +76,8 @@ class FrictionLaw(Protocol):
     """Bound the tangential reaction by the normal one: what a solver asks of a friction law.
 
     |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0); r_t = limit along the slip where there is
-    one."""
+    one.
+    """
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return the largest tangential reaction of each condition, (m,), in the unit of ``r_n``;
@@ -79,11 +86,13 @@ class FrictionLaw(Protocol):
         Args: r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as
             zero. weights: tributary lengths times thickness, or areas (m,) [m²]: what turns
             stresses into forces. scale: of the step: 1 for forces, dt [s] for impulses. A limit
-            that ignores r_n is multiplied by it."""
+            that ignores r_n is multiplied by it.
+        """
 
     def slope(self, weights: Array) -> Array:
         """Return d limit / d r_n >= 0 of each condition under pressure, (m,); ``weights`` as in
-        ``limit``."""
+        ``limit``.
+        """
 
     def at(self, speed: Array) -> "FrictionLaw":
         """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0, with limit and slope of
@@ -121,7 +130,8 @@ class Impact:
     Attributes:
         before: (m,) normal velocities before the step [m/s], > 0 towards the obstacle.
         v_n: (m,) normal velocities that the step left [m/s].
-        active: (m,) which are closed. closing: (m,) which have just closed."""
+        active: (m,) which are closed. closing: (m,) which have just closed.
+    """
 
     before: Array
     v_n: Array
@@ -132,14 +142,16 @@ class Impact:
 class ImpactLaw(Protocol):
     """Change velocities after a step in which conditions are closed: a law of ``laws.impact``, or
     your own. One that says ``by_rows = True`` also gets those of several runs, (k, m) and (k, n),
-    and returns them."""
+    and returns them.
+    """
 
     def target(self, impact: Impact) -> Array:
         """Return the normal velocities (m,) [m/s] after ``impact``; NaN where the law leaves the
         velocity alone.
 
         > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is
-        active."""
+        active.
+        """
 
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
@@ -149,7 +161,8 @@ class ImpactLaw(Protocol):
 
         Args: system: the equations that are marched, whose M says what an impulse does. surface:
             its contact conditions, ``surface.normal_values(v)`` are the velocities to change. v:
-            the velocity (n,) [m/s] that the step left; not to be written to. Collective."""
+            the velocity (n,) [m/s] that the step left; not to be written to. Collective.
+        """
 
 
 class MassLaw(Protocol):

@@ -1,5 +1,6 @@
 """Say which problems are small: those that a dense matrix on every rank, or a factor made in
-passing, suits."""
+passing, suits.
+"""
 
 from .algebra import Comm, total
 from .errors import InputError
@@ -25,7 +26,8 @@ def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool
 
     Such problems are condensed with a factor of their own, whatever solves the steps; larger ones
     are solved by conjugate gradients. ``worth``: for problems that come again and again, so many
-    times larger. Collective."""
+    times larger. Collective.
+    """
     return (
         total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
     )

@@ -19,7 +19,8 @@ _shown = [False]
 
 def stage(name: str) -> Callable[[F], F]:
     """Return a decorator: the first rank tells how long the function took, and all give back what
-    memory it freed."""
+    memory it freed.
+    """
 
     def decorate(function: F) -> F:
         @wraps(function)
@@ -53,7 +54,8 @@ def _tell(name: str, seconds: float) -> None:
 
 def show(shown: bool) -> None:
     """Choose whether stages that take longer than a second are told too where standard error is a
-    terminal."""
+    terminal.
+    """
     _shown[0] = shown and sys.stderr is not None and sys.stderr.isatty()
 
 

@@ -46,7 +46,8 @@ class State:
 
     ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here, mean or end
     values as the scheme says. ``active`` (m,) are the closed conditions. ``memory`` holds what a
-    scheme carries besides u and v: vectors (n,), and arrays that are the same on every rank."""
+    scheme carries besides u and v: vectors (n,), and arrays that are the same on every rank.
+    """
 
     t: float
     k: int
@@ -71,12 +72,14 @@ class State:
 
 @dataclass(frozen=True)
 class StepProblem:
-    """Pose one step, as every solver sees it. ``guess`` (n,): predicted x; ``active`` (m,):
-    predicted contact set.
+    """Pose one step, as every solver sees it.
+
+    ``guess`` (n,): predicted x; ``active`` (m,): predicted contact set.
 
     ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for
     velocities, 0 in static problems, where friction is that of rest. ``lower`` (m,): bounds from
-    below too, which ``Volume`` alone knows (``vi``); None in the steps of a scheme."""
+    below too, which ``Volume`` alone knows (``vi``); None in the steps of a scheme.
+    """
 
     A: EffectiveMatrix
     b: Array
@@ -107,8 +110,10 @@ class StepProblem:
 
     def friction_at(self, slip: Array) -> FrictionLaw:
         """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1).
+
         Collective: what a law of the user's own raises on one rank is raised on all. InputError for
-        limits that are negative or no numbers."""
+        limits that are negative or no numbers.
+        """
         speed = self.rate_factor * np.linalg.norm(slip, axis=1)
 
         def law() -> FrictionLaw:
@@ -122,7 +127,8 @@ class StepProblem:
 def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: float) -> None:
     """Raise InputError unless limit = cohesion + slope max(r_n, 0) has cohesion and slope >= 0 at
     every condition of this rank. Laws whose ``never_negative`` is true were checked when they were
-    made."""
+    made.
+    """
     if getattr(law, "never_negative", False):
         return
     weights = surface.weights
@@ -154,7 +160,8 @@ class StepResult:
 
     ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
     ``history``: how the method converged, in a measure of its own. ``aim``: the residual at which
-    an iterative method stopped because it was told to, 0 for one that goes on to round-off."""
+    an iterative method stopped because it was told to, 0 for one that goes on to round-off.
+    """
 
     x: Array
     r_n: Array
@@ -170,7 +177,8 @@ class StepResult:
 class Answers:
     """Answer a step of several runs: ``rows`` holds x (k, n), r_n, active (k, m) and r_t (k, m, d -
     1). Of each run ``iterations`` and, with friction, ``histories``; ``failed``: what those raise
-    that have no answer."""
+    that have no answer.
+    """
 
     rows: StepResult
     iterations: Sequence[int]
@@ -193,7 +201,8 @@ class Balance:
         M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
     Multiplying it by the displacement increment gives the energy ledger of any scheme
-    (verify.energy_balance)."""
+    (verify.energy_balance).
+    """
 
     u: Array
     v: Array
@@ -210,15 +219,18 @@ class Scheme(Protocol):
     may lie inside the obstacle, and it goes on from them. A scheme is a value without state of its
     own: what it carries from step to step is in ``State.memory``, so that a checkpoint holds all of
     it. One that says ``by_rows = True`` steps several runs at once: ``step`` and ``finish`` then
-    also get vectors as rows, (k, n) and (k, m), and return them."""
+    also get vectors as rows, (k, n) and (k, m), and return them.
+    """
 
     @property
     def mass(self) -> MassLaw:
         """Return the mass matrix that it takes when the problem does not say which."""
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError unless ``problem`` suits the scheme. Called before anything is computed,
-        on all ranks."""
+        """Raise InputError unless ``problem`` suits the scheme.
+
+        Called before anything is computed, on all ranks.
+        """
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return ``state`` with the memory that steps of ``dt`` [s] need: accelerations or earlier
@@ -234,14 +246,16 @@ class Scheme(Protocol):
         gave, same u and t.
 
         What the scheme remembers of accelerations has to fit the new velocity before the next step
-        of ``dt`` [s]."""
+        of ``dt`` [s].
+        """
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A (n rows) of ``problem`` for all steps of ``dt`` [s], as a rule
         ``problem.equations.effective(…)``.
 
         A is symmetric positive definite; nothing in it depends on time or state. It is made once
-        for every dt."""
+        for every dt.
+        """
 
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
@@ -250,7 +264,8 @@ class Scheme(Protocol):
         matrix ``A`` is.
 
         ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and
-        ``scale`` fit it, and ``scale`` is the same in all steps of one dt."""
+        ``scale`` fit it, and ``scale`` is the same in all steps of one dt.
+        """
 
     def finish(
         self,
@@ -265,42 +280,50 @@ class Scheme(Protocol):
 
         ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and
         ``result`` its certified answer: reactions in it are ``scale`` times newtons, those of the
-        new state are newtons."""
+        new state are newtons.
+        """
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new``
         satisfied, for the ledger.
 
         ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a
-        recorder asks."""
+        recorder asks.
+        """
 
 
 class PreparedSolver(Protocol):
-    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns. One
-    with ``solve_many`` answers several at once (``solvers.condensed``)."""
+    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns.
+
+    One with ``solve_many`` answers several at once (``solvers.condensed``).
+    """
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return x, reactions and closed conditions of ``step``, whose A, surface and scale are
         those it was made for.
 
         The answer is judged by its certificate, so the method may stop where it finds best.
-        StepFailure, on all ranks, when there is none. Collective."""
+        StepFailure, on all ranks, when there is none. Collective.
+        """
 
 
 class Solver(Protocol):
     """Hold the settings of a one-step solver; ``prepare`` does the work that is shared by all steps
-    with the same A."""
+    with the same A.
+    """
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError unless the solver can treat ``problem``: its friction law, supports and
-        matrices."""
+        matrices.
+        """
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
         """Return a solver of steps with the matrix ``A`` on ``surface`` whose reactions are
         ``scale`` times newtons.
 
         Called once for every dt; factors and whatever else depends on A alone belong here.
-        Collective."""
+        Collective.
+        """
 
 
 @dataclass(frozen=True)
@@ -309,7 +332,8 @@ class Report:
     before it.
 
     ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was
-    given."""
+    given.
+    """
 
     problem: ContactProblem
     old: State
@@ -329,14 +353,17 @@ class Report:
 
 class Recorder(Protocol):
     """Listen to the loop: name columns once, and fill a row after every step. Numbers are equal on
-    every rank; arrays count on rank 0, and may be empty on the others."""
+    every rank; arrays count on rank 0, and may be empty on the others.
+    """
 
     def columns(self) -> Mapping[str, tuple[str, str]]:
-        """Return what ``start`` and ``row`` fill in: name -> (unit, meaning). Called after
-        ``start``, always the same.
+        """Return what ``start`` and ``row`` fill in: name -> (unit, meaning).
+
+        Called after ``start``, always the same.
 
         Names are made of letters, digits and underscores; no two recorders of a run have one in
-        common."""
+        common.
+        """
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
@@ -345,13 +372,15 @@ class Recorder(Protocol):
         has left.
 
         ``resumed``: the last row of the run that a restart continues, from which sums over time go
-        on; else None."""
+        on; else None.
+        """
 
     def row(self, report: Report) -> Mapping[str, Any]:
         """Return the row of the step that ``report`` tells of: numbers, or arrays of one shape (to
         HDF5 only).
 
-        Called once a step, in order, on all ranks: collective operations are allowed here."""
+        Called once a step, in order, on all ranks: collective operations are allowed here.
+        """
 
 
 Columns = Mapping[str, tuple[str, str]]

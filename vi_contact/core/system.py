@@ -1,5 +1,6 @@
 """Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their
-right-hand side."""
+right-hand side.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +17,8 @@ from .products import Remembered
 
 class Companion(Protocol):
     """Provide a motion among the loads that is marched beside the run: of the ground, or of a free
-    field."""
+    field.
+    """
 
     def bind(self, scheme: Any, dt: Any) -> None:
         """Take over ``scheme``, a ``core.step.Scheme``, and the time steps ``dt`` [s] of the run
@@ -24,7 +26,8 @@ class Companion(Protocol):
 
         Called on every rank before each base step, so binding the same again must change nothing;
         another scheme or other steps begin the motion anew, from rest at t = 0. ``dt`` is a number
-        or a plan of ``run.time_steps``. InputError for a plan that the motion cannot follow."""
+        or a plan of ``run.time_steps``. InputError for a plan that the motion cannot follow.
+        """
 
 
 class Space(Protocol):
@@ -32,7 +35,8 @@ class Space(Protocol):
 
     ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component;
     ``coordinates`` (rows, d) [m]; ``hierarchy``: of displacements whose contact conditions need
-    one, else None."""
+    one, else None.
+    """
 
     dimension: int
     unknowns: int
@@ -48,11 +52,13 @@ class Space(Protocol):
 
     def find_nodes(self, points: Array) -> np.ndarray:
         """Return the node numbers nearest to the points (k, d); InputError for a point outside the
-        body."""
+        body.
+        """
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
         """Return the values (k, d) at the nodes, on every rank; derivative 0, 1, 2: of the
-        prescribed motion."""
+        prescribed motion.
+        """
 
 
 OTHERS = 4  # surfaces and the like of which factors are kept
@@ -73,7 +79,8 @@ class Load:
     Separable parts cost one vector update a step; the others are evaluated anew at every time.
     Viscous and inertial parts are the shares in C u' and M u'' of what moves in a given way (a
     base, a free field): a mass law that changes C changes the former alike, and a body at rest
-    feels neither."""
+    feels neither.
+    """
 
     constant: Array
     separable: tuple[tuple[Array, Callable[[float], float]], ...] = ()
@@ -101,7 +108,8 @@ class Load:
 
     def at_rest(self, t: float) -> Array:
         """Return the load of a static stage at time t: what moves in a given way stands still where
-        it then is."""
+        it then is.
+        """
         total = self.constant.copy()
         for vector, history in self.separable:
             total += history_value(history, t) * vector
@@ -171,7 +179,8 @@ class SemiDiscreteSystem:
         absolute: True when a boundary lets waves in: displacements are those of space, and nothing
             else may shake it.
         companions: motions among its loads that are marched beside the run, with its scheme and
-            time steps."""
+            time steps.
+    """
 
     algebra: Algebra
     M: Matrix
@@ -257,7 +266,8 @@ class SemiDiscreteSystem:
 
         ``of``: the objects beside M, C and K that it depends on, as the contact surface; each of
         the last few has its own. What depends on the load does not belong here: systems that differ
-        in it share this memory (``loaded``)."""
+        in it share this memory (``loaded``).
+        """
         known: dict[tuple[int, ...], tuple[Any, Any]] = self._cache.setdefault(name, {})
         key = tuple(map(id, of))
         if key not in known:
@@ -273,7 +283,8 @@ class SemiDiscreteSystem:
 
     def product(self, name: str, x: Array) -> Array:
         """Return M x, C x or K x, read-only; made once for each of the last frozen vectors
-        (core.products)."""
+        (core.products).
+        """
         return (self._products.get(name) or self._remembered(name))(x)
 
     def _remembered(self, name: str) -> Remembered:
@@ -282,7 +293,8 @@ class SemiDiscreteSystem:
 
     def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Any, Any]) -> None:
         """Take (name, x, rows), and ("load", t, t): the product with x is a row of that with the
-        rows, when asked."""
+        rows, when asked.
+        """
 
         def value(name: str, rows: Any) -> Callable[[], Array]:
             return lambda: np.asarray(many.product(name, rows)[row])
@@ -297,14 +309,16 @@ class SemiDiscreteSystem:
 
     def load_at(self, t: float) -> Array:
         """Return f(t), read-only; made once for each of the last two times, unless something is
-        marched beside it."""
+        marched beside it.
+        """
         if self.companions:
             return self.load(t)
         return (self._products.get("load") or self._remembered("load"))(float(t))
 
     def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
         """Return (u1 - u0)/dt and (v1 - v0)/dt; the products C and M of them are made of those with
-        their ends."""
+        their ends.
+        """
 
         def change(name: str, x0: Array, x1: Array) -> Array:
             product = self._remembered(name)
@@ -314,7 +328,8 @@ class SemiDiscreteSystem:
 
     def changed(self, **values: Any) -> "SemiDiscreteSystem":
         """Return the same system with other values of the attributes that are named, and no factor
-        of the old one."""
+        of the old one.
+        """
         return replace(self, **values)
 
     def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
@@ -322,7 +337,8 @@ class SemiDiscreteSystem:
         needed.
 
         ``shares``: whether the scheme needs M x, C x and K x in its next step, so that A x may be
-        made of them."""
+        made of them.
+        """
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
             terms.append((c, self.C))
@@ -351,7 +367,8 @@ class SemiDiscreteSystem:
 
     def inertia(self, direction: Array) -> Array:
         """Return M r: the force [N] that accelerates body and prescribed nodes by one in this
-        direction (d,)."""
+        direction (d,).
+        """
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 
@@ -359,14 +376,16 @@ class SemiDiscreteSystem:
         """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
         Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is
-        orthogonal (None)."""
+        orthogonal (None).
+        """
         return self._in_unknowns(T, (T if dual is None else dual).transpose_apply)
 
     def in_relative(self, R: Matrix) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns ǔ of û = R ǔ, in which contact points move
         relative to the other body.
 
-        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R."""
+        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
+        """
         return self._in_unknowns(R, lambda x: 2.0 * x - R @ x)
 
     def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":

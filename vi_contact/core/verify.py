@@ -23,7 +23,8 @@ ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certific
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     """Return how well (x, r_n) satisfies the inequality problem of a step. ``Certificate`` defines
-    the residuals."""
+    the residuals.
+    """
     return _judged(step, result, _sizes(step, result)[0])
 
 
@@ -31,14 +32,16 @@ def kkt_residuals(
     many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
 ) -> list[Certificate]:
     """Return the certificate of each of several steps on one rank, whose rows these hold; ``own``
-    makes one of each."""
+    makes one of each.
+    """
     rubs, rows = many.slip0 is not None, enumerate(_sizes(many, result))
     return [_judged(*(own(row) if rubs else (many, result)), sizes) for row, sizes in rows]
 
 
 def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
     """The largest sizes in the definitions, over all ranks, of each step in rows; infinite for NaN,
-    which would go."""
+    which would go.
+    """
     comm, functions = step.surface.comm, already()
     Ax = step.A.image(result.x)
     found = (
@@ -64,7 +67,8 @@ def _places(
 ) -> tuple[list[Any], list[Any]]:
     """Where compiled functions find the arrays, room and sizes, and what lies there, of their types
     and sizes whatever a solver gave: copies on the desk where they are small, which takes less than
-    to ask numpy where an array lies."""
+    to ask numpy where an array lies.
+    """
     shapes = tuple([None if one is None else one.shape for one in arrays])
     if shapes in desk:
         for copy, one in zip(desk[shapes][1], arrays, strict=False):
@@ -133,7 +137,8 @@ def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certi
 
 def _maxima(step: StepProblem, *arrays: Array) -> list[float]:
     """Largest sizes of the entries on all ranks, by one reduction; infinite for NaN, which no
-    reduction keeps."""
+    reduction keeps.
+    """
     sizes = [size if size >= 0.0 else np.inf for size in map(max_abs, arrays)]
     comm = step.surface.comm
     return sizes if comm.size == 1 else comm.max(np.array(sizes)).tolist()
@@ -159,7 +164,8 @@ def _friction_residuals(
 
 def _over(value: float, reference: float) -> float:
     """value/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN for infinity over
-    infinity."""
+    infinity.
+    """
     if value == 0.0 and reference < np.inf:
         return 0.0
     return value / reference if reference else np.inf
@@ -168,7 +174,8 @@ def _over(value: float, reference: float) -> float:
 @dataclass(frozen=True)
 class StepEnergy:
     """Say where energy went [J]: change = input - damping - contact - friction - algorithmic +
-    defect."""
+    defect.
+    """
 
     change: float
     input: float
@@ -180,7 +187,8 @@ class StepEnergy:
     @property
     def defect(self) -> float:
         """Return what the ledger cannot explain; rounding and the tolerance of the solver when it
-        was solved."""
+        was solved.
+        """
         return self.change - (
             self.input - self.damping - self.contact - self.friction - self.algorithmic
         )
@@ -189,7 +197,8 @@ class StepEnergy:
 @dataclass(frozen=True)
 class Energies:
     """Hold M v, K u and the energies of a state [J]; a ledger carries them on, so that none is made
-    twice."""
+    twice.
+    """
 
     momentum: Array
     elastic: Array
@@ -235,7 +244,8 @@ def energy_balance(
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du   (0 for the midpoint rule)
     and change is the difference of the energies themselves, so the defect measures the equation of
     motion. ``before``, ``after``: the energies of both states, when known; one product (two with
-    damping) is left then."""
+    damping) is left then.
+    """
     system, surface = problem.equations, problem.surface
     before = before or energies(system, old.u, old.v)
     after = after or energies(system, new.u, new.v)
@@ -273,7 +283,8 @@ def _obstacle_work(
     problem: ContactProblem, start: float, end: float, balance: Balance
 ) -> tuple[float, float]:
     """Work that a moving obstacle does on the body on this rank, (normal, tangential): r_n·advance
-    and -r_t·sliding."""
+    and -r_t·sliding.
+    """
     advance, sliding = problem.surface.advance(start, end), problem.surface.sliding(start, end)
     pushed = 0.0 if advance is None else float(balance.r_n @ advance)
     dragged = (

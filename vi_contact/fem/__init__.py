@@ -7,7 +7,8 @@ In this order: ``build_mesh`` or ``read_mesh``, ``assemble``, ``contact_surface`
 >>> mesh, tags = fem.build_mesh(meshes.WallMesh(divisions=(2, 3)), MPI.COMM_WORLD)
 >>> system = fem.assemble(mesh, laws.LinearElastic(2.0e10, 0.0, 2400.0), clamped=tags["base"])
 >>> fem.contact_surface(system, tags["face"], obstacle=core.Touching()).total  # conditions of all ranks
-3"""
+3
+"""
 
 from importlib.util import find_spec
 

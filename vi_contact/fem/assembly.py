@@ -4,7 +4,8 @@ method, eqs. 7-10a).
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u =
-P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'')."""
+P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -102,7 +103,8 @@ def assemble(
         folded; NaN in data,
             components that do not exist, a damping law that damps nothing, ratios xi that no law
             reads, dashpots on held facets, groups without facets or cells, of another mesh or kind,
-            contradictions."""
+            contradictions.
+    """
     if hasattr(mesh, "comm"):
         agree(
             MpiComm(mesh.comm),
@@ -214,7 +216,8 @@ def _stated(
 
 def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
     """C of materials and absorbing boundaries, before elimination (PETSc); None where nothing
-    damps."""
+    damps.
+    """
     terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     if not terms:
         return None
@@ -227,7 +230,8 @@ def _reduced(
     full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
     """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is
-    destroyed."""
+    destroyed.
+    """
     pull: tuple[Callable[[float], Array], ...] = ()
     if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
         matrix, held = (
@@ -242,7 +246,8 @@ def _reduced(
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
     """Assemble f(t) on the free unknowns: tractions, body forces, linear forms and initial
-    strains."""
+    strains.
+    """
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
@@ -261,7 +266,8 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 
 def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
     """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its
-    own."""
+    own.
+    """
     if isinstance(load, InitialStrain):
         return lambda t: space.forms.initial.forces(t, only=load)
     if isinstance(load, LinearForm):

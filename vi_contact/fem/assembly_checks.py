@@ -1,5 +1,6 @@
 """Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not
-contradict."""
+contradict.
+"""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -55,7 +56,8 @@ def check_body(
     integration: Any = "full",
 ) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None; InputError for objects of another kind, cells
-    of another mesh."""
+    of another mesh.
+    """
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(
@@ -142,7 +144,8 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
     that no law reads.
 
     body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
-    those of materials, and not the user's own forms."""
+    those of materials, and not the user's own forms.
+    """
     law, ratio = body.damping, body.largest_ratio
     if isinstance(law, DampingRatio) and not any(
         callable(one.xi) or one.xi for _, one in body.materials
@@ -171,7 +174,8 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
 
 def _refuse_ratio_behind(body: ElasticForms) -> None:
     """Raise InputError for a ratio of a material that only dashpots have: they have no damping but
-    their own."""
+    their own.
+    """
     inside = [one for _, one in body.materials]
     for boundary in body.boundaries:
         behind = boundary.material
@@ -185,7 +189,8 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:
     """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell, as parts of
-    meshes may leave."""
+    meshes may leave.
+    """
     own = np.arange(mesh.geometry.index_map().size_local)
     lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
     if lonely:
@@ -199,7 +204,8 @@ def _refuse_lonely_nodes(mesh: Mesh) -> None:
 
 def _check_degree(mesh: Mesh, degree: Any) -> None:
     """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not
-    folded. Collective."""
+    folded. Collective.
+    """
     if isinstance(degree, bool) or degree not in (1, 2):
         raise InputError(
             f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
@@ -242,7 +248,8 @@ def _check_integration(
     integration: Any,
 ) -> None:
     """Raise InputError for a word that is none, and where cells cannot or need not be integrated
-    selectively."""
+    selectively.
+    """
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":
         return
@@ -285,7 +292,8 @@ def check_boundaries(
 ) -> None:
     """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of
     another mesh, and for prescribed displacements that contradict each other on the same facets.
-    Collective. All are tuples."""
+    Collective. All are tuples.
+    """
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
@@ -324,7 +332,8 @@ def _refuse_empty(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
     """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and
-    loads nothing."""
+    loads nothing.
+    """
     own = {
         "clamped": clamped,
         "prescribed": prescribed,
@@ -355,7 +364,8 @@ def _contradictions(
     held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
 ) -> Iterator[str]:
     """Pairs of conditions on the same facets of this rank: other values of one component, ties and
-    dashpots."""
+    dashpots.
+    """
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
             yield (

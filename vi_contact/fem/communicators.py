@@ -1,5 +1,6 @@
 """Offer collective operations, communicators that last, and what frees PETSc objects that wait on
-them."""
+them.
+"""
 
 from typing import Any
 
@@ -41,10 +42,12 @@ class MpiComm:
 
 def kept(comm: Any) -> Any:
     """Return the communicator of the ranks of ``comm`` that lasts as long as the program.
+
     Collective the first time.
 
     PETSc objects that Python drops wait on their communicator for ``give_back``. A mesh frees its
-    own at its end: what waits there would wait for ever."""
+    own at its end: what waits there would wait for ever.
+    """
     alike = (MPI.IDENT, MPI.CONGRUENT)
     found = next((one for one in _KEPT if MPI.Comm.Compare(one, comm) in alike), None)
     if found is None:
@@ -58,7 +61,8 @@ _KEPT: list[Any] = []
 
 def give_back(comm: Any) -> None:
     """Free the PETSc objects that nobody holds any more: PETSc keeps them until all ranks ask it
-    to. Collective."""
+    to. Collective.
+    """
     for _ in range(2):  # what one held may be free only after it
         PETSc.garbage_cleanup(comm)
     trim()

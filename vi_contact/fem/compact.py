@@ -4,7 +4,8 @@ what it changed.
 Half of K in blocks of nodes takes 0.2 kB an unknown on tetrahedra where AIJ takes 0.53, and its
 product half the time; of M, whose components are not coupled along the axes, only what is not zero
 is stored. A change of basis that is the identity but for the contact nodes changes few rows: the
-others are shared with the matrix it was made from."""
+others are shared with the matrix it was made from.
+"""
 
 from typing import Any
 
@@ -43,7 +44,8 @@ class Half(PetscMatrix):
 
 class Replaced(PetscMatrix):
     """Hold a symmetric matrix that is another but for ``part``, some owned rows; ``alike``: same
-    places."""
+    places.
+    """
 
     def __init__(self, base: PetscMatrix, rows: Indices, part: Any, alike: bool) -> None:
         super().__init__(part)

@@ -4,7 +4,8 @@ nowhere else.
 Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version.
 What changed: dofmaps became two-dimensional arrays and the ghost mode went to the partitioner
 (0.6), UFL elements became Basix elements and function spaces take tuples (0.7), `create_mesh`
-swapped two arguments (0.10), the geometry has one dofmap per cell type (0.11)."""
+swapped two arguments (0.10), the geometry has one dofmap per cell type (0.11).
+"""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -60,7 +61,8 @@ TOGETHER = (
 
 def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
     """Return make(), for which DOLFINx may have to compile; InputError, on all ranks, where no C
-    compiler works."""
+    compiler works.
+    """
     try:
         return make()
     except (RuntimeError, VerificationError) as error:
@@ -96,7 +98,8 @@ def create_mesh(
     `cells` (n_cells, n_nodes) holds rows of `x` in DOLFINx's order of vertices and mid-points, `x`
     (n_points, gdim) the points [m], `destinations` the ranks each cell goes to, its owner first,
     and the offsets of the cells in that list. A rank without input passes arrays of the right width
-    and no rows. Collective."""
+    and no rows. Collective.
+    """
 
     def told(
         *_: Any,
@@ -123,7 +126,8 @@ def create_mesh(
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
     """Return the local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_nodes),
-    vertices first."""
+    vertices first.
+    """
     if _DOFMAP_PER_CELL_TYPE:
         return mesh.geometry.dofmaps[0]
     rows = mesh.geometry.dofmap
@@ -137,13 +141,15 @@ def sub_entities(mesh: Mesh, dim: int) -> list[list[int]]:
 
 def gmsh_order(cell: str, nodes: int) -> Any:
     """Return the places in Gmsh's row of a cell of the nodes in DOLFINx's order; `cell` is a UFL
-    name."""
+    name.
+    """
     return dolfinx.cpp.io.perm_gmsh(getattr(_mesh.CellType, cell), nodes)
 
 
 def vtk_order(mesh: Mesh, nodes: int) -> Any:
     """Return the places in DOLFINx's row of a cell of the nodes in VTK's order, which is that of
-    XDMF."""
+    XDMF.
+    """
     return np.argsort(dolfinx.cpp.io.perm_vtk(mesh.topology.cell_type, nodes))
 
 
@@ -159,7 +165,9 @@ def mesh_bytes(mesh: Mesh) -> int:
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     """Return local geometry nodes of the vertices of each entity, (n_entities, n_vertices).
-    Collective."""
+
+    Collective.
+    """
     tdim, cell = mesh.topology.dim, mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
@@ -176,7 +184,8 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
 
 def tags_of(tags: Any, mesh: Mesh) -> bool:
     """Return whether MeshTags are those of this mesh; what they refer to, a mesh or a topology,
-    changed in 0.7."""
+    changed in 0.7.
+    """
     if hasattr(tags, "topology"):
         return _bare(tags.topology) is _bare(mesh.topology)
     return _bare(tags.mesh) is _bare(mesh)
@@ -194,7 +203,8 @@ def is_on(space: Any, mesh: Mesh) -> bool:
 
 def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indices:
     """Return the local cells, or facets of the boundary, whose vertices ``marker`` (x (3, n) ->
-    (n,)) all marks."""
+    (n,)) all marks.
+    """
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, mesh.topology.dim)
     locate = _mesh.locate_entities if dim == mesh.topology.dim else _mesh.locate_entities_boundary
@@ -203,7 +213,8 @@ def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indice
 
 def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     """Return numbers of the owned cells: those of the input, which any ranks leave as they are,
-    where there are any."""
+    where there are any.
+    """
     cells, given = mesh.topology.index_map(mesh.topology.dim), ()
     with suppress(RuntimeError):  # a part of a mesh has none: an empty array in 0.5, an error since
         given = mesh.topology.original_cell_index
@@ -214,7 +225,8 @@ def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
     """Return dx (dim = topological dimension) or ds (one less) on these local entities; ds skips
-    inner facets."""
+    inner facets.
+    """
     kind = "dx" if dim == mesh.topology.dim else "ds"
     tags = meshtags(
         mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32)
@@ -228,7 +240,8 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 
 def vector_space(mesh: Mesh, degree: int = 1) -> Any:
     """Make the space of continuous vector fields (P1, Q1, P2, Q2) with gdim components; the block
-    size is gdim."""
+    size is gdim.
+    """
     return lagrange(mesh, degree, (mesh.geometry.dim,))
 
 
@@ -260,7 +273,8 @@ def dof_to_node(space: Any) -> Indices:
     second-order cells.
 
     Unknown c of block i (index bs*i + c) is component c at the point
-    `mesh.geometry.x[dof_to_node(space)[i]]`."""
+    `mesh.geometry.x[dof_to_node(space)[i]]`.
+    """
     index_map = space.dofmap.index_map
     nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
     nodes[cell_blocks(space)] = geometry_dofmap(space.mesh)
@@ -269,13 +283,15 @@ def dof_to_node(space: Any) -> Indices:
 
 def cell_blocks(space: Any) -> Indices:
     """Return the local blocks of unknowns of each cell (owned, then ghosts), (n_cells, n_nodes),
-    vertices first."""
+    vertices first.
+    """
     return _as_table(space.dofmap.list, space.dofmap.dof_layout)
 
 
 def blocks_of_cells(space: Any) -> Indices:
     """Return the same of the space of a ``dirichletbc``, of V or of V.sub(i): in C++ up to 0.11, in
-    Python since."""
+    Python since.
+    """
     rows = getattr(space.dofmap, "map", None) or space.dofmap.list
     table = _as_table(rows() if callable(rows) else rows, space.dofmap.dof_layout)
     return (
@@ -287,7 +303,8 @@ def blocks_of_cells(space: Any) -> Indices:
 
 def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
     """Return (local unknowns that a ``dirichletbc`` holds, ghosts too; their values) on a space
-    with so many."""
+    with so many.
+    """
     values = np.zeros(count)
     bc.set(values, None, 1.0) if hasattr(bc, "set") else fem.set_bc(values, [bc])
     dofs = bc.dof_indices()[0]
@@ -305,14 +322,16 @@ def _as_table(rows: Any, layout: Any) -> Indices:
 
 def compile_form(ufl_form: ufl.Form) -> Any:
     """Generate, compile and load the code of a variational form; collective, cached on disk by its
-    signature."""
+    signature.
+    """
     comm = ufl_form.ufl_domain().ufl_cargo().comm
     return _compiling(comm, lambda: fem.form(ufl_form))
 
 
 def assemble_matrix(form: Any) -> PETSc.Mat:
     """Assemble the matrix of a compiled bilinear form, without boundary conditions, ready to
-    use."""
+    use.
+    """
     matrix = fem_petsc.assemble_matrix(form)
     matrix.assemble()
     return matrix
@@ -320,7 +339,8 @@ def assemble_matrix(form: Any) -> PETSc.Mat:
 
 def assemble_vector(form: Any) -> PETSc.Vec:
     """Assemble a compiled linear form, contributions of all ranks added on the owner; ghost entries
-    are left stale."""
+    are left stale.
+    """
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
@@ -328,7 +348,8 @@ def assemble_vector(form: Any) -> PETSc.Vec:
 
 def assemble_scalar(form: Any) -> float:
     """Assemble a compiled functional over the cells and facets of this rank; the ranks' values are
-    not added."""
+    not added.
+    """
     return float(fem.assemble_scalar(form))
 
 
@@ -339,7 +360,8 @@ def cell_space(mesh: Mesh) -> Any:
 
 def expression(expr: Any, space: Any) -> Any:
     """Make what ``Function.interpolate`` takes of an expression of UFL; the points became a
-    property in 0.10."""
+    property in 0.10.
+    """
     points = space.element.interpolation_points
     there = points() if callable(points) else points
     return _compiling(space.mesh.comm, lambda: fem.Expression(expr, there))
@@ -357,7 +379,8 @@ def function(space: Any) -> Any:
 
 def facet_dofs(space: Any, facets: Indices) -> Indices:
     """Return the local blocks of unknowns on the facets, found on every rank that owns or ghosts
-    them; collective."""
+    them; collective.
+    """
     mesh = space.mesh
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
@@ -366,7 +389,8 @@ def facet_dofs(space: Any, facets: Indices) -> Indices:
 
 def nodal(space: Any) -> bool:
     """Say whether the unknowns of a space are values at points, of one field: not moments, and no
-    mixed element."""
+    mixed element.
+    """
     element = space.element
     return (
         element.num_sub_elements in (0, space.dofmap.index_map_bs) and element.interpolation_ident

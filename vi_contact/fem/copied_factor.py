@@ -1,5 +1,6 @@
 """Factorise PETSc matrices with contact unknowns last: by CHOLMOD, a whole copy of the factor on
-every rank."""
+every rank.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +16,8 @@ from .petsc_rows import rows_of
 
 def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
     """Return the factor of an AIJ matrix on an MpiComm; None without CHOLMOD, and where it cannot:
-    not positive definite, which PETSc says better, or too large. Collective."""
+    not positive definite, which PETSc says better, or too large. Collective.
+    """
     functions = cholmod(comm)
     if functions is None:
         return None
@@ -38,7 +40,8 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
 
 def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
     """Return what multiplies a matrix on one rank with every row of x, and reads it once for eight
-    of them."""
+    of them.
+    """
     functions, A, n = library(SerialComm()), rows_of(matrix.mat), matrix.rows
     if functions is None or A.indices.dtype != np.int32:
         return lambda x: np.stack([matrix @ row for row in x])

@@ -2,7 +2,8 @@
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
-Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C."""
+Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -44,7 +45,8 @@ class ElasticForms:
             K, in C = beta K and in stresses (``fem.dilatation``); None otherwise.
         tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what
             comes from where;
-        own_damping: whether the user gave a form of C."""
+        own_damping: whether the user gave a form of C.
+    """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     initial: Any = None  # InitialStrains
@@ -106,7 +108,8 @@ class ElasticForms:
 
     def own(self, system: SemiDiscreteSystem) -> None:
         """Remember the matrices of a system as made of these materials; the forms are then those of
-        its space."""
+        its space.
+        """
         self.space.forms = self
         for name, known in self._matrices.items():
             if getattr(system, name) is not None:
@@ -114,20 +117,24 @@ class ElasticForms:
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
         """Return the letters of ``names`` whose matrices in a system were not made of these
-        materials."""
+        materials.
+        """
         return "".join(
             name for name in names if getattr(system, name) not in (None, *self._matrices[name])
         )
 
     def stress(self, u: Any) -> Any:
         """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains.
+
         With these, or with selective integration: ``follow`` when its values or the time have
-        changed since."""
+        changed since.
+        """
         return self.stresses(u)[0]
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
         """Return the stress and sigma_zz(u) times the thickness of a body in the plane, 0 in plane
-        stress and else."""
+        stress and else.
+        """
         eps, trace = ufl.sym(ufl.grad(u)), self._trace(u)
         if self.initial is None or u is self.u:
             return self.hooke(eps, 0.0, trace)
@@ -136,7 +143,8 @@ class ElasticForms:
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
         """Return (sigma (d, d), sigma_zz) times the thickness of a strain, that across the plane,
-        and its trace."""
+        and its trace.
+        """
         d, fields = self.space.dimension, self.fields
         if self._anisotropic is None:
             sigma = fields["lame"] * trace * ufl.Identity(d) + 2 * fields["shear"] * eps
@@ -152,14 +160,17 @@ class ElasticForms:
 
     def _trace(self, u: Any) -> Any:
         """tr eps or, of a Function, its mean over each cell; none in bilinear forms where
-        ``dilatation`` adds it."""
+        ``dilatation`` adds it.
+        """
         if self.dilatation is None:
             return ufl.tr(ufl.sym(ufl.grad(u)))
         return 0.0 if u is self.u else self.dilatation.of(u)
 
     def follow(self, u: Any, t: float | None = None) -> None:
         """Bring stresses of a Function up to its values, and initial strains up to a time.
-        Collective."""
+
+        Collective.
+        """
         if self.dilatation is not None:
             self.dilatation.update(u)
         if self.initial is not None and t is not None:
@@ -167,7 +178,8 @@ class ElasticForms:
 
     def bilinear(self, name: str) -> Any:
         """Return the form of M, K, or C of the materials in the trial function ``u`` and the test
-        function ``v``."""
+        function ``v``.
+        """
         u, v, fields = self.u, self.v, self.fields
         if name == "M":  # forms=… without a stress take the mass from here
             return fields["rho"] * ufl.inner(u, v) * ufl.dx
@@ -179,7 +191,8 @@ class ElasticForms:
 
     def against(self, name: str, r: Any, inside: Any) -> Any:
         """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r
-        as test function. ``follow`` when the values of the Function r have changed since."""
+        as test function. ``follow`` when the values of the Function r have changed since.
+        """
         form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
         if self.dilatation is None or name == "M":
             return form
@@ -207,7 +220,9 @@ class ElasticForms:
 
 def cell_constants(space: Any, material: Materials) -> Array:
     """Return E, nu, rho and xi of the local cells, (4, cells), NaN where Orthotropic has none; DG0.
-    Collective."""
+
+    Collective.
+    """
     place = compat.cell_blocks(space)[:, 0]
     found = np.empty((4, len(place)))
     for where, one in cell_materials(space.mesh, material):
@@ -219,7 +234,8 @@ def cell_constants(space: Any, material: Materials) -> Array:
 
 def _constants(space: Any, cells: Any, material: Material) -> Any:
     """The material, or its values at all unknowns of the space where it is given by functions or
-    has no Lamé constants. Collective."""
+    has no Lamé constants. Collective.
+    """
     if isinstance(material, Heterogeneous):
         return material.at(space, cells)
     if isinstance(material, Orthotropic):
@@ -280,7 +296,8 @@ def _anisotropic(
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:
     """Return (local cells, material) pairs that cover every local cell once; InputError for cells
-    with none or two."""
+    with none or two.
+    """
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts
     if isinstance(material, KINDS):

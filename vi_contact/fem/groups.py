@@ -2,7 +2,8 @@
 on.
 
 Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would
-name other places."""
+name other places.
+"""
 
 from typing import Any, cast
 
@@ -17,13 +18,15 @@ KINDS: dict[type[Group], str] = {Facets: "boundary group", Cells: "cell group"}
 
 def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
     """Return the boundary group, of this mesh if one is given; InputError, with the remedy, for
-    anything else."""
+    anything else.
+    """
     return cast(Facets, _group(owner, meaning, group, mesh, Facets))
 
 
 def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
     """Return the cell group, of this mesh if one is given; InputError, with the remedy, for
-    anything else."""
+    anything else.
+    """
     return cast(Cells, _group(owner, meaning, group, mesh, Cells))
 
 
@@ -54,7 +57,8 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
 
 def field_given(owner: str, meaning: str, value: Any) -> None:
     """Raise InputError unless it is a function or a vector of numbers (size and NaN are told where
-    it is used)."""
+    it is used).
+    """
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
         return
@@ -67,7 +71,8 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
 
 def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -> tuple[int, ...]:
     """Return the components that are given, all of them for None; InputError for one that does not
-    exist."""
+    exist.
+    """
     for c in given or ():
         if not 0 <= c < dimension:
             raise InputError(
@@ -78,7 +83,8 @@ def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -
 
 def components_given(owner: str, value: Any) -> None:
     """Raise InputError unless it is None or a tuple of whole numbers (whose range is told where
-    they are used)."""
+    they are used).
+    """
     for one in (
         ()
         if value is None

@@ -48,7 +48,8 @@ class Heterogeneous:
 
     Raises InputError: neither number nor function; and when a body is assembled, values outside E >
     0, -1 < nu < 1/2, rho > 0, 0 <= xi < 1, with the first place of them, and Functions or
-    expressions of another mesh."""
+    expressions of another mesh.
+    """
 
     E: Values
     nu: Values
@@ -80,8 +81,10 @@ class Heterogeneous:
         )
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
-        """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for
-        values on these cells that no material has. Collective."""
+        """Return the constants at all unknowns of a DG0 or DG1 space.
+
+        InputError, on all ranks, for values on these cells that no material has. Collective.
+        """
         comm = MpiComm(space.mesh.comm)
         mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
         mine[compat.cell_blocks(space)[cells]] = True

@@ -7,7 +7,8 @@ v are displacements of vertices, e what edges bend beside them: a field is that 
 one bubble an edge. Rigid translations have e = 0, so that row sums of a mass matrix in these
 unknowns are those of first order, positive, where nodal ones of vertices are negative (tetrahedra)
 or zero (triangles). Rotations have e = 0 too where edges are straight. The nodal unknowns are u = H
-û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H."""
+û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H.
+"""
 
 from typing import Any
 
@@ -25,16 +26,19 @@ TETRAHEDRON = 10  # nodes of one of degree 2
 
 def needs_hierarchy(V: Any) -> bool:
     """Say whether vertices have no weight of their own in a pressure on the sides of cells: P2
-    tetrahedra."""
+    tetrahedra.
+    """
     return V.mesh.topology.dim == 3 and len(supports(V)) == TETRAHEDRON
 
 
 class Hierarchy:
-    """Hold the edges of a space of P2 fields and the change of its unknowns. Collective, as all it
-    does.
+    """Hold the edges of a space of P2 fields and the change of its unknowns.
+
+    Collective, as all it does.
 
     Attributes: vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H
-        and H⁻¹ = 2 - H."""
+        and H⁻¹ = 2 - H.
+    """
 
     def __init__(self, space: Any) -> None:
         V, self._space = space.V, space
@@ -65,7 +69,8 @@ class Hierarchy:
 
     def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
         """Return owned nodal values (k, c), with a ``mean`` of the ends of edges at mid-points that
-        are known."""
+        are known.
+        """
         every, found = (
             self.with_ghosts(nodal),
             self.with_ghosts(known[:, None])[self._mids, 0] > 0.0,
@@ -75,7 +80,8 @@ class Hierarchy:
 
     def around(self, turn: Matrix | None, dual: Matrix | None) -> tuple[Matrix, Matrix]:
         """Return (T, T⁻ᵀ) of u = T û, the nodal unknowns of û being turned by ``turn`` and forces
-        by ``dual``."""
+        by ``dual``.
+        """
         return _product(self.H, turn), _product(
             PetscMatrix(self.back.mat.transpose(PETSc.Mat())), dual
         )

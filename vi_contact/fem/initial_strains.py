@@ -1,5 +1,6 @@
 """Strain a body before it has stresses: temperature, swelling, given dislocations (boundary method,
-eq. 25)."""
+eq. 25).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -40,7 +41,8 @@ class InitialStrain(ActingLoad):
             (T - T_0); nu = 0 is a bar with free sides.
         history: factor s(t) of the value at t = 0 s; cells: the part of the body that is strained.
     Raises: InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not
-        tell C."""
+        tell C.
+    """
 
     value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]  # as given
     history: Callable[[float], float] | None = None
@@ -61,7 +63,8 @@ class InitialStrain(ActingLoad):
 
     def at(self, points: Array, room: Array, t: float) -> Array:
         """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the
-        room."""
+        room.
+        """
         value: Any = (
             self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
         )
@@ -82,7 +85,8 @@ def _tensors(
     owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
 ) -> Array:
     """Return strains, one or one at each point, as tensors; InputError unless one of these
-    dimensions has the shape."""
+    dimensions has the shape.
+    """
     shape = shape_of(value)
     if shape != leading and shape not in {
         (*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)
@@ -100,7 +104,8 @@ def _tensors(
 
 class InitialStrains:
     """Hold the sum of the initial strains of a body at a time, as tensors (3, 3), its load and
-    energy. Collective."""
+    energy. Collective.
+    """
 
     def __init__(self, body: ElasticForms, given: Sequence[InitialStrain]) -> None:
         self._space, self._body, self._given, mesh = body.space, body, given, body.space.mesh
@@ -135,7 +140,8 @@ class InitialStrains:
 
     def against(self, r: Any, inside: Any) -> Any:
         """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what
-        ``follow`` returns."""
+        ``follow`` returns.
+        """
         own, across = self._split(ufl.TestFunction(self.tensors))
         return (
             -inside
@@ -145,7 +151,8 @@ class InitialStrains:
 
     def follow(self, t: float, *, only: InitialStrain | None = None) -> Array:
         """Sum up the strains at a time, or one of them less its history; return the owned
-        values."""
+        values.
+        """
         points, blocks = self.tensors.tabulate_dof_coordinates(), compat.cell_blocks(self.tensors)
         values = self._field.x.array.reshape(-1, 9)
         values[:] = 0.0

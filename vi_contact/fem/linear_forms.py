@@ -1,5 +1,6 @@
 """Take loads as a user of UFL writes them: as linear forms, the virtual work of the load on a
-displacement v."""
+displacement v.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -43,7 +44,8 @@ class LinearForm:
     Raises: InputError: history and update together; from ``assemble``, on all ranks: what is no
         linear form in v on this
             mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an
-            error."""
+            error.
+    """
 
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None
@@ -77,7 +79,9 @@ class LinearForm:
 
     def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
         """Return t -> the forces (owned full,), less the history; without update as once assembled.
-        Collective."""
+
+        Collective.
+        """
         if space in self._once:
             return lambda t: np.asarray(self._once[space])
         name, v = f"{NAME}: form", ufl.TestFunction(space.V)

@@ -3,7 +3,8 @@ method, eqs. 3, 4, 6).
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values
 (k, d). They are interpolated at the nodes and then integrated exactly, so a load costs one sparse
-product a step."""
+product a step.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,8 +25,10 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """Evaluate the value at this rank's points, (k, d). InputError on all ranks for NaN, other
-    shapes. Collective."""
+    """Evaluate the value at this rank's points, (k, d).
+
+    InputError on all ranks for NaN, other shapes. Collective.
+    """
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
     return result
@@ -33,7 +36,8 @@ def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Ar
 
 def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
     """Return (values at the points, what is wrong with them or an empty text); zeros where
-    something is wrong."""
+    something is wrong.
+    """
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
     try:
@@ -71,7 +75,8 @@ class Prescribed:
     ``components``: which displacement components are prescribed (all when None); the others stay
     free (rollers). The mass and damping of the boundary nodes enter the equations, so all three
     time functions are needed; left out they are zero (a clamped part, or a displacement constant in
-    time)."""
+    time).
+    """
 
     facets: Facets
     displacement: Value = _zero
@@ -102,13 +107,15 @@ class Prescribed:
 
     def places(self, space: Any) -> tuple[Any, Any]:
         """Return (owned blocks, components) of a FemSpace that are held, as indices of an array of
-        nodal values."""
+        nodal values.
+        """
         held = components_of("prescribed", self.components, space.dimension)
         return space.facet_blocks(self.facets.indices)[:, None], held
 
     def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
         """Return (values of the motion or a rate at the places, what is wrong with them or an empty
-        text)."""
+        text).
+        """
         name = f"prescribed motion on '{self.facets.name}'"
         motion, defect = evaluate_here(
             name, self.motions[derivative], space.points[places[0][:, 0]], t
@@ -123,7 +130,8 @@ class Prescribed:
     @property
     def companions(self) -> tuple[Any, ...]:
         """Return the motions that are marched beside the run: objects whose methods are given, as
-        ``BaseMotion``."""
+        ``BaseMotion``.
+        """
         owners = {
             id(owner): owner
             for owner in (getattr(value, "__self__", None) for value in self.motions)
@@ -179,11 +187,13 @@ class ActingLoad:
 
 @dataclass(frozen=True)
 class Traction(ActingLoad):
-    """Apply the traction S_i = F_i(x, t) [Pa] on facets. ``history`` is a factor f(t) of a value
-    constant in time.
+    """Apply the traction S_i = F_i(x, t) [Pa] on facets.
+
+    ``history`` is a factor f(t) of a value constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is
-    evaluated every step."""
+    evaluated every step.
+    """
 
     facets: Facets
     value: Value
@@ -200,7 +210,8 @@ class Traction(ActingLoad):
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
     """Apply the tangential traction S_T = C_T(x, t) on the contact boundary: ``value`` less its
-    normal part."""
+    normal part.
+    """
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
         n = ufl.FacetNormal(mesh)
@@ -215,7 +226,8 @@ class Pressure(Traction):
     ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all
     nodes of the body; it is kept as the first component of a vector field. p is interpolated at
     nodes: resultants of one that is linear between them are exact, so let a node lie at the water
-    level. ``history``: as of ``Traction``."""
+    level. ``history``: as of ``Traction``.
+    """
 
     value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
 
@@ -243,8 +255,10 @@ class Pressure(Traction):
 
 @dataclass(frozen=True)
 class BodyForce(ActingLoad):
-    """Apply a volume force f_i(x, t) [N/m³]. The weight of a material is BodyForce((0, -rho *
-    9.80665))."""
+    """Apply a volume force f_i(x, t) [N/m³].
+
+    The weight of a material is BodyForce((0, -rho * 9.80665)).
+    """
 
     value: Value
     history: Callable[[float], float] | None = None

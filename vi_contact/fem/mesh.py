@@ -2,7 +2,8 @@
 
 Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError.
 Groups are recognised on each rank by the vertices of their members, numbered as in the input: a
-facet may be in several."""
+facet may be in several.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -66,10 +67,12 @@ class Group:
     @classmethod
     def tagged(cls, name: str, meshtags: Any, value: int, mesh: Mesh) -> Self:
         """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags.
+
         Collective.
 
         InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
-        any rank has."""
+        any rank has.
+        """
         owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
         instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
@@ -106,7 +109,8 @@ class Group:
         marked. Collective.
 
         ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
-        it fails or marks none on any rank."""
+        it fails or marks none on any rank.
+        """
         owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
         instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
         function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
@@ -139,7 +143,8 @@ class Facets(Group):
     ascending. Collective.
 
     ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks
-    points. InputError, on all ranks, for numbers that are no facets of this mesh."""
+    points. InputError, on all ranks, for numbers that are no facets of this mesh.
+    """
 
     codimension: ClassVar[int] = 1
 
@@ -149,7 +154,8 @@ class Cells(Group):
     """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
     ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks
-    points. InputError, on all ranks, for numbers that are no cells of this mesh."""
+    points. InputError, on all ranks, for numbers that are no cells of this mesh.
+    """
 
     codimension: ClassVar[int] = 0
 
@@ -164,7 +170,8 @@ def local_count(mesh: Mesh, codimension: int) -> int:
 
 class Tags(dict[str, Any]):
     """Hold the groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks;
-    InputError for others."""
+    InputError for others.
+    """
 
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
@@ -191,7 +198,8 @@ def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in
     metres. The file is in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on
     every rank if the file is missing, is a script, or is not a usable mesh
-    (`vi_contact.meshes.extract.extract` lists the reasons). Collective."""
+    (`vi_contact.meshes.extract.extract` lists the reasons). Collective.
+    """
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
 
@@ -200,7 +208,8 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with
     `build(gmsh)`.
 
-    It raises the errors of `read_mesh`. Collective."""
+    It raises the errors of `read_mesh`. Collective.
+    """
     if isinstance(comm, MPI.Comm):
         agree(MpiComm(comm), "build_mesh", {"mesh": Parts(mesh)})
     provides(
@@ -218,7 +227,8 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     the nodes in use.
 
     Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is
-    numbered in their order."""
+    numbered in their order.
+    """
     instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
     if (

@@ -1,5 +1,6 @@
 """Say what unknowns mean that are displacements of nodes: where the nodes are, which rank has them,
-what is a body."""
+what is a body.
+"""
 
 from typing import Any
 
@@ -26,7 +27,8 @@ class NodalSpace:
             those of all ranks, also of a component that follows another; held: (k, d) components
             that are given.
         ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how
-            many on all ranks."""
+            many on all ranks.
+    """
 
     algebra: Algebra
     comm: Comm
@@ -43,18 +45,21 @@ class NodalSpace:
     @property
     def hierarchy(self) -> Any:
         """Return the change to unknowns of a hierarchy, where contact conditions need one; None
-        elsewhere."""
+        elsewhere.
+        """
         return None
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Expand a vector of unknowns (n,) at time t -> displacements of owned nodes (k, d), or
-        their derivatives."""
+        their derivatives.
+        """
         where = self.free_index.reshape(-1, self.dimension)
         return np.where(where >= 0, u.take(where, mode="clip") if len(u) else 0.0, 0.0)
 
     def leaders(self, nodes: Indices) -> Indices:
         """Return these node numbers, of nodes that follow another that of the other; -1 for those
-        tied in part."""
+        tied in part.
+        """
         return nodes
 
     def blocks_of(self, nodes: Indices) -> Indices:
@@ -67,7 +72,8 @@ class NodalSpace:
 
     def at_nodes(self, numbers: Indices, values: Array) -> Array:
         """Return owned nodal values (k, c) at node numbers, on every rank; zero for nodes of
-        nobody. Collective."""
+        nobody. Collective.
+        """
         found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
@@ -78,10 +84,12 @@ class NodalSpace:
 
     def find_nodes(self, points: Array) -> Indices:
         """Find the numbers of the nodes nearest to the points (k, d), equal on all ranks.
+
         Collective.
 
         InputError for a point farther from every node than the body is large (5 % of its
-        diagonal)."""
+        diagonal).
+        """
         found = np.empty(len(points), dtype=np.int64)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
@@ -114,7 +122,8 @@ def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indi
     """Return the part (0, 1, ..., in the order of least numbers) that each of the numbers (n,) of
     this rank belongs to when ``first`` and ``second``, places among them, are joined; ``shared``:
     places of those that other ranks have too, where parts of different ranks meet and are one.
-    Collective."""
+    Collective.
+    """
     part = _smallest(first, second, numbers)
     meeting = np.column_stack([numbers[shared], part[shared]])
     meeting = np.unique(np.concatenate(from_each(comm, meeting)), axis=0)

@@ -4,7 +4,8 @@ Nodes of P1 and Q1 are those of the mesh and have its numbers; so have those of 
 second-order cells. On first-order cells P2 and Q2 have the mid-points of edges too, Q2 also those
 of quadrilateral sides and of cells. They are numbered after the vertices: those of edges, of sides,
 of cells, each in the order of the numbers of the vertices around them. Every rank sorts a share of
-them, so that none holds them all."""
+them, so that none holds them all.
+"""
 
 from typing import Any
 
@@ -26,7 +27,8 @@ def supports(V: Any) -> list[list[int]]:
     """Return, for every node of a cell, the local vertices whose mean it is: one, or those of its
     edge, side or cell.
 
-    ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``."""
+    ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``.
+    """
     dim, count = V.mesh.topology.dim, V.dofmap.dof_layout.num_dofs
     return [vertices for one in range(dim + 1) for vertices in compat.sub_entities(V.mesh, one)][
         :count
@@ -35,7 +37,8 @@ def supports(V: Any) -> list[list[int]]:
 
 def numbered(V: Any) -> tuple[Indices, Array]:
     """Return (numbers, points (k, gdim)) of the local blocks of unknowns of a space, owned, then
-    ghosts. Collective."""
+    ghosts. Collective.
+    """
     mesh = V.mesh
     if compat.cell_blocks(V).shape[1] == compat.geometry_dofmap(mesh).shape[1]:
         nodes = compat.dof_to_node(V)
@@ -70,7 +73,8 @@ def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
     those are).
 
     Members are less than ``count`` and ascend in a row: its first one tells which rank sorts it.
-    Collective."""
+    Collective.
+    """
     sorts = keys[:, 0] * comm.size // count
     order = np.argsort(sorts, kind="stable")
     received = comm.alltoall(
@@ -89,7 +93,8 @@ def facet_rows(V: Any, facets: Any) -> Indices:
     """Return the local blocks (k, n) on each of these local facets: of its vertices first, then of
     mid-points.
 
-    Collective."""
+    Collective.
+    """
     mesh, tdim = V.mesh, V.mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     mesh.topology.create_connectivity(tdim, tdim - 1)

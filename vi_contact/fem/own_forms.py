@@ -41,7 +41,8 @@ class Forms:
     Raises: InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms
         that are not bilinear in
             u and v or on another mesh, masses that are not positive, and entries that are not
-            finite."""
+            finite.
+    """
 
     stiffness: Bilinear
     mass: Bilinear | None = None
@@ -59,7 +60,8 @@ class OwnForms(ElasticForms):
     """Hold the user's forms of one body; ``fields`` are those of the material beside them, empty
     where there is none.
 
-    Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective."""
+    Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective.
+    """
 
     def __init__(
         self,

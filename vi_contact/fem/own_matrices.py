@@ -67,7 +67,8 @@ def system_from_arrays(
         u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
     Raises: InputError: matrices that are not real, finite, square and of one size, M that is not
         symmetric or has masses
-            below zero; coordinates, unknowns or vectors that do not fit them."""
+            below zero; coordinates, unknowns or vectors that do not fit them.
+    """
     matrices = {
         name: _serial(name, A)
         for name, A in (("M", M), ("C", C), ("K", K))
@@ -112,7 +113,8 @@ def own_system(
 ) -> SemiDiscreteSystem:
     """Return the system of matrices M, K and perhaps C of one size and of what is given of this
     rank's rows and nodes, which is checked here. ``unsymmetric``: the algebra for C or K that are
-    not symmetric. Collective."""
+    not symmetric. Collective.
+    """
     comm, n = algebra.comm, matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
@@ -225,13 +227,16 @@ class MatrixSpace(NodalSpace):
 
     Attributes: coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1
         for what is no displacement;
-            bodies: (n,) body of each."""
+            bodies: (n,) body of each.
+    """
 
     def __init__(
         self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix
     ) -> None:
         """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks.
-        Collective."""
+
+        Collective.
+        """
         self.algebra, self.comm, self.points = algebra, algebra.comm, points
         (k, d), n, first = points.shape, len(block), algebra.first(len(block))
         self.dimension, self.unknowns = d, round(total(self.comm, n))
@@ -249,7 +254,8 @@ class MatrixSpace(NodalSpace):
 
 def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
     """Return the body (0, 1, ..., in the order of least numbers) of each owned unknown: K or a node
-    joins those of one body. ``block``: (n,) the node of each, all on one rank. Collective."""
+    joins those of one body. ``block``: (n,) the node of each, all on one rank. Collective.
+    """
     n, first = K.rows, algebra.first(K.rows)
     entries, own = algebra.entries(K, np.arange(n)), first + np.arange(n)
     entries.eliminate_zeros()

@@ -1,5 +1,6 @@
 """Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises,
-vectors are of numpy."""
+vectors are of numpy.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,7 +32,8 @@ RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the d
 
 def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
     """Room that all matrices share, as a product needs it only for as long as it takes, and a
-    vector in it."""
+    vector in it.
+    """
     room = _ROOM.get((size, way))
     if room is None:
         _ROOM[size, way] = room = np.zeros(size)
@@ -43,7 +45,8 @@ _ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
 
 class PetscMatrix:
     """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat``
-    too unless it is stored otherwise: then it is made anew (``fem.compact``)."""
+    too unless it is stored otherwise: then it is made anew (``fem.compact``).
+    """
 
     def __init__(self, mat: Any) -> None:
         self.stored = mat
@@ -95,7 +98,8 @@ class PetscFactor:
     large 3D matrices on several ranks, and what is too large to be copied. Where PETSc has no MUMPS
     its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log
     says so. Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix
-    cannot be factorised. ``symmetric`` False: LU of MUMPS."""
+    cannot be factorised. ``symmetric`` False: LU of MUMPS.
+    """
 
     def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
         mat = matrix.mat
@@ -145,7 +149,8 @@ class PetscFactor:
     @property
     def bytes(self) -> float:
         """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell
-        nothing, as copies."""
+        nothing, as copies.
+        """
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
         count = self._pc.getFactorMatrix().getInfo()[
@@ -195,7 +200,8 @@ class PetscFactor:
 @contextmanager
 def _default_options(values: Mapping[str, object]) -> Iterator[None]:
     """PETSc options of the factor that hold while it is made, unless the user has given them:
-    others may differ."""
+    others may differ.
+    """
     database = PETSc.Options(PREFIX)
     added = [name for name in values if not database.hasName(name)]
     for name in added:
@@ -209,7 +215,8 @@ def _default_options(values: Mapping[str, object]) -> Iterator[None]:
 
 class PetscAlgebra:
     """Make and combine PETSc matrices on one communicator; ``symmetric``: whether those of its
-    system are."""
+    system are.
+    """
 
     symmetric = True
 
@@ -309,7 +316,8 @@ class UnsymmetricAlgebra(PetscAlgebra):
 
 def triple_product(K: Any, P: Any) -> Any:
     """Return PᵀKP of PETSc matrices, a copy: what PETSc makes holds K and P for as long as it
-    lives."""
+    lives.
+    """
     give_back(K.comm)
     product = K.PtAP(P)
     made = product.duplicate(copy=True)

@@ -44,7 +44,8 @@ def system_from_matrices(
         any degree. unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each
         of its rows. clamped: its rows that stand still, counted from 0 on every rank.
     Raises: InputError: matrices of another type, layout or communicator; what
-        ``system_from_arrays`` refuses."""
+        ``system_from_arrays`` refuses.
+    """
     given = {
         "coordinates": coordinates,
         "unknowns": unknowns,
@@ -70,7 +71,8 @@ def system_from_matrices(
 
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
     """A copy of this rank's rows of a matrix with the layout of K; InputError for another type or
-    layout."""
+    layout.
+    """
     (n, _), (_, columns), first = K.getLocalSize(), K.getSize(), K.getOwnershipRangeColumn()[0]
     if name == "M" and not isinstance(A, PETSc.Mat):
         masses = array(OWNER, name, A.array_r if isinstance(A, PETSc.Vec) else A, (n,), unit="kg")

@@ -1,5 +1,6 @@
 """Say what the unknowns of a finite element system mean: nodes, bodies, free and prescribed parts,
-points, output."""
+points, output.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -31,7 +32,8 @@ from .ties import PLACE_TOLERANCE, Links, Tied, linked
 
 def body_numbers(mesh: Any) -> Indices:
     """Return the body (0, 1, ..., in the order of their least node number) of each local geometry
-    node. Collective."""
+    node. Collective.
+    """
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     ghosts = numbers[
@@ -56,10 +58,12 @@ def space_of(owner: str, system: Any) -> "FemSpace":
 
 def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     """Return the numbers of the bodies that a cell group is, parts of the mesh that share no node.
+
     Collective.
 
     They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part
-    of a body."""
+    of a body.
+    """
     space = space_of("bodies_of", system)
     cells_of("bodies_of", "cells", cells, space.mesh)
     body = body_numbers(space.mesh)[compat.geometry_dofmap(space.mesh)[:, 0]]
@@ -80,7 +84,8 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     """Warn when M, C or K of a system is not what fem.assemble made, for outputs that go by the
     materials given there.
 
-    Springs added to K leave the stresses of the elements as they are; another material does not."""
+    Springs added to K leave the stresses of the elements as they are; another material does not.
+    """
     found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
     if found and system.algebra.comm.rank == 0:
         log.warning(
@@ -110,7 +115,8 @@ class FemSpace(NodalSpace):
             mid-points too); points: their coordinates (k, d); node_of_block: the numbers, those of
             ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
-        unknowns: number of free unknowns on all ranks."""
+        unknowns: number of free unknowns on all ranks.
+    """
 
     def __init__(
         self,
@@ -159,7 +165,8 @@ class FemSpace(NodalSpace):
 
     def compiled(self, form: Any) -> Any:
         """Return a form compiled, its integrals with the degree of the space, if any, unless they
-        say their own."""
+        say their own.
+        """
         degree = self.quadrature_degree
         if degree is None:
             return compat.compile_form(form)
@@ -188,7 +195,8 @@ class FemSpace(NodalSpace):
 
     def corners_of_facets(self, facets: Any) -> Indices:
         """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too, that
-        may have contact conditions: all, in a hierarchy the vertices. Collective."""
+        may have contact conditions: all, in a hierarchy the vertices. Collective.
+        """
         if self.degree == 1:
             return node_numbers(self.mesh)[
                 compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
@@ -199,8 +207,11 @@ class FemSpace(NodalSpace):
 
     @cached_property
     def hierarchy(self) -> Hierarchy | None:
-        """Return the hierarchy of P2 tetrahedra, None of other cells. Collective when first
-        asked."""
+        """Return the hierarchy of P2 tetrahedra, None of other cells.
+
+        Collective when first
+        asked.
+        """
         return Hierarchy(self) if needs_hierarchy(self.V) else None
 
     def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
@@ -213,7 +224,8 @@ class FemSpace(NodalSpace):
 
     def _followers(self, links: Links) -> Mask:
         """Which owned components follow another node; InputError where some of those that move as
-        one are held."""
+        one are held.
+        """
         held = [
             self._of_unknowns(numbers, self.held) > 0.0
             for numbers in (links.followers, links.leaders)
@@ -229,13 +241,15 @@ class FemSpace(NodalSpace):
 
     def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
         """Return owned nodal values (k, d) of unknowns, node number * d + component, on every
-        rank."""
+        rank.
+        """
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
 
     def leaders(self, nodes: Indices) -> Indices:
         """Return these node numbers, of nodes that follow another that of the other; -1 for those
-        tied in part."""
+        tied in part.
+        """
         return (
             np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
             if self._leader
@@ -265,7 +279,8 @@ class FemSpace(NodalSpace):
     @property
     def tied_unknowns(self) -> Mask | None:
         """Return the free unknowns of nodes that move together with others; None when no boundaries
-        are tied."""
+        are tied.
+        """
         if self._P is None:
             return None
         return np.repeat(np.isin(self.nodes, self.tied_nodes), self.dimension)[self.free]
@@ -278,7 +293,8 @@ class FemSpace(NodalSpace):
     @cached_property
     def body_of_node(self) -> Indices:
         """Return the body of every owned node: parts of the mesh that share no node, in the order
-        of node numbers."""
+        of node numbers.
+        """
         body = np.empty_like(self.node_of_block)
         body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[
             compat.geometry_dofmap(self.mesh)[:, :1]
@@ -297,7 +313,8 @@ class FemSpace(NodalSpace):
         """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
 
         Where conditions meet, the later one counts; what they say is added to where an earlier
-        stage left the nodes."""
+        stage left the nodes.
+        """
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
         for condition, places in zip(self.prescribed, self._where_held, strict=True):
@@ -320,7 +337,8 @@ class FemSpace(NodalSpace):
 
     def pull(self, force: Array) -> Array:
         """Pull back by Pᵀ: forces on all owned components -> on the free ones; tied nodes count at
-        their partners."""
+        their partners.
+        """
         return force[self.free] if self._P is None else self._P.transpose_apply(force)
 
     def reduced(self, full: Any) -> Any:

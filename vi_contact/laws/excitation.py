@@ -5,7 +5,8 @@ components) and `duration` (the time [s] after which it is zero, or negligible, 
 it returns the vector a(t) · direction of shape (d,). The direction is used as given, never
 normalised: (1, 0.5) shakes the second axis half as much. The vector is the acceleration of the
 ground; in the frame that moves with the ground it loads the body with -M r a(t). Horizontal and
-vertical motion together are a sequence of excitations."""
+vertical motion together are a sequence of excitations.
+"""
 
 import math
 from bisect import bisect_right
@@ -24,7 +25,8 @@ class Harmonic:
     """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
 
     amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or
-    not finite."""
+    not finite.
+    """
 
     amplitude: float
     frequency: float
@@ -50,7 +52,8 @@ class Ricker:
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the
     time of the peak, by default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller
     one starts with a jump. Velocity and displacement both return to zero. Raises InputError for
-    values out of range or not finite."""
+    values out of range or not finite.
+    """
 
     amplitude: float
     frequency: float
@@ -82,7 +85,8 @@ class Ricker:
 @dataclass(frozen=True)
 class Pulse:
     """Hold what one-sided and two-sided pulses share; amplitude [m/s²] is finite and duration [s] >
-    0 (InputError)."""
+    0 (InputError).
+    """
 
     amplitude: float
     duration: float
@@ -93,7 +97,8 @@ class Pulse:
 
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] inside the pulse, 0 outside; the value at a jump is the
-        one after it."""
+        one after it.
+        """
         return self.amplitude * self._shape(t) if 0.0 <= t < self.duration else 0.0
 
     def _shape(self, t: float) -> float:
@@ -105,7 +110,8 @@ class Pulse:
 @dataclass(frozen=True)
 class HalfSine(Pulse):
     """Shake with a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero
-    elsewhere."""
+    elsewhere.
+    """
 
     def _shape(self, t: float) -> float:
         return math.sin(math.pi * t / self.duration)
@@ -114,7 +120,8 @@ class HalfSine(Pulse):
 @dataclass(frozen=True)
 class FullSine(Pulse):
     """Shake with a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity
-    ends at zero."""
+    ends at zero.
+    """
 
     def _shape(self, t: float) -> float:
         return math.sin(2.0 * math.pi * t / self.duration)
@@ -131,7 +138,8 @@ class Tabulated:
     and after them.
 
     times: strictly increasing, at least two; values: as many, kept as tuples. InputError for
-    others, NaN, infinity."""
+    others, NaN, infinity.
+    """
 
     times: Sequence[float]
     values: Sequence[float]

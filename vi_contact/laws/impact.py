@@ -14,7 +14,8 @@ A law sees the velocity before the contact (the old state's) and the one the ste
 refers to the former: what the step leaves of the approach depends on when in the step the gap
 closed. The step's contact work and the impact loss are therefore to be read together: what the step
 took beyond the collision, the law gives back. Restitution here is a nodal law; on a fine mesh it
-has no macroscopic effect."""
+has no macroscopic effect.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -48,7 +49,8 @@ class VelocityUpdate(Protocol):
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
         """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they
-        are not NaN."""
+        are not NaN.
+        """
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,8 @@ class ComponentReset:
 
     At a corner with oblique faces of which some only are closed the velocity of the node changes
     along the normals of these, and with it the normal components on its other faces, as at any
-    other node."""
+    other node.
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -78,7 +81,8 @@ class ImpulseUpdate:
     decays to round-off within thirty elements; else an impact costs half a substitution
     (``core.condensation``). Large systems, from 50 000 unknowns in space and 300 000 in the plane,
     are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to round-off
-    at every impact."""
+    at every impact.
+    """
 
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
@@ -167,7 +171,8 @@ class Newton(ByUpdate):
     are left to the step.
 
     v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed
-    at every dt."""
+    at every dt.
+    """
 
     e: float
     update: VelocityUpdate = field(default_factory=ComponentReset)

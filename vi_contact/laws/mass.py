@@ -4,7 +4,8 @@ nodes.
 With mass at the contact nodes every closure is an impact of that mass: forces ring and, with
 contact in the acceleration balance, energy grows. Without it the contact unknowns follow the body
 statically (Khenous, Laborde and Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete
-problem has a unique energy-conserving solution, and contact forces are those of the waves alone."""
+problem has a unique energy-conserving solution, and contact forces are those of the waves alone.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -56,7 +57,8 @@ class Redistributed:
     negative on curved ones: those want lumping 0. P2 tetrahedra are not lumped: their vertices
     would bear it all, and frequencies fall by per cents. InputError for lumping outside [0, 1] or
     above 0 with negative row sums, a contact node with no material behind it, or a mesh too coarse
-    to hold the inertia."""
+    to hold the inertia.
+    """
 
     lumping: float = 0.4
 
@@ -142,7 +144,8 @@ def _inertia_correction(
     system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array
 ) -> Matrix:
     """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d)
-    matrix of polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
+    matrix of polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R.
+    """
     comm, d = system.algebra.comm, system.influence.shape[1]
     points = system.space.coordinates
     high = comm.max(np.max(points[body], axis=0, initial=-np.inf))
@@ -195,7 +198,8 @@ def _inertia_correction(
 def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
     """Columns c such that the polynomials powers @ c are orthonormal with the nodal masses as
     weights: with them the smallest coefficients are the smallest changes of nodal masses. Dependent
-    polynomials are left out."""
+    polynomials are left out.
+    """
     values, vectors = np.linalg.eigh(comm.sum(powers.T @ (nodal[:, None] * powers)))
     kept = values > 1e-10 * values[-1]
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
@@ -205,7 +209,8 @@ def _pairs_of_components(
     system: SemiDiscreteSystem, inner: Mask
 ) -> Iterator[tuple[Indices, Indices]]:
     """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c
-    <= e."""
+    <= e.
+    """
     d = system.influence.shape[1]
     mine = np.flatnonzero(inner)
     numbers, component = np.divmod(np.asarray(system.space.ids)[mine], d)

@@ -6,7 +6,8 @@ fits its neighbours J best, weighted with their entries w_J of the mass matrix:
 
     v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J,   R = (q, q·(e_k x (X - X_c)) for rotations k)
 
-so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour."""
+so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -61,7 +62,8 @@ def _rows(
     system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
 ) -> tuple[Indices, sp.csr_matrix]:
     """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors;
-    ``exact``: enough of them to keep every rigid motion. Collective."""
+    ``exact``: enough of them to keep every rigid motion. Collective.
+    """
     asked = np.flatnonzero(left)
     entries = system.algebra.entries(system.M, asked)
     neighbours = _neighbours(system, donors, entries.indices)
@@ -103,7 +105,8 @@ class _Neighbours:
     """Unknowns of all donor nodes next to the contact nodes of this rank, and some others, sorted
     by column.
 
-    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d)."""
+    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d).
+    """
 
     columns: Indices
     node: Indices
@@ -142,7 +145,8 @@ class _Neighbours:
     ) -> tuple[Array, Array]:
         """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid
         motion each loses); with ``turning`` False of translations only, which a single neighbour
-        can tell."""
+        can tell.
+        """
         offset = self.points[used] - points[:, None, :]
         size = np.max(np.abs(offset), axis=(1, 2))[:, None, None]
         R = rigid_motions(self.directions[used], offset / size)
@@ -163,7 +167,8 @@ class _Neighbours:
 
 def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
     """What this rank needs of the donor nodes in these columns; what other ranks own is told to
-    all. Collective."""
+    all. Collective.
+    """
     d, first = system.influence.shape[1], system.algebra.first(system.rows)
     node, every = np.asarray(system.space.ids) // d, system.space.coordinates
 
@@ -197,7 +202,8 @@ def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
     """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions
-    (…, d) at offsets."""
+    (…, d) at offsets.
+    """
     d = directions.shape[-1]
     turns = [
         directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]

@@ -2,7 +2,8 @@
 of its motion.
 
 Everything here is a frozen value checked when it is built; SI units throughout; no finite element
-is needed."""
+is needed.
+"""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +28,8 @@ class LinearElastic:
 
     E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0;
     xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads it.
-    InputError is raised when one of them is outside its range or not finite."""
+    InputError is raised when one of them is outside its range or not finite.
+    """
 
     E: float
     nu: float
@@ -69,7 +71,8 @@ class LinearElastic:
         damping ratio xi.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 +
-        nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1."""
+        nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
+        """
         for name, speed in (("c_p [m/s]", c_p), ("c_s [m/s]", c_s), ("rho [kg/m³]", rho)):
             number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
@@ -88,13 +91,15 @@ class LinearElastic:
     @property
     def shear_modulus(self) -> float:
         """Return the second Lamé constant E / (2 (1 + nu)) [Pa]; never called mu here, mu is
-        friction."""
+        friction.
+        """
         return self.E / (2.0 * (1.0 + self.nu))
 
     @property
     def c_p(self) -> float:
         """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s], also in
-        plane strain."""
+        plane strain.
+        """
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
     @property
@@ -106,7 +111,8 @@ class LinearElastic:
 @dataclass(frozen=True)
 class ElasticValues:
     """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points, (k,) each or one for all;
-    sections and damping take them alike."""
+    sections and damping take them alike.
+    """
 
     E: Any
     nu: Any
@@ -118,20 +124,23 @@ class ElasticValues:
 
 class Section(Protocol):
     """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness`
-    [m] (solids: 1)."""
+    [m] (solids: 1).
+    """
 
     @property
     def thickness(self) -> float: ...
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """Return (lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus
-        eps, in plane."""
+        eps, in plane.
+        """
 
 
 @dataclass(frozen=True)
 class PlaneStress:
     """Cut a panel of this thickness [m], free of stress across it: lambda_eff = 2 lambda mu /
-    (lambda + 2 mu)."""
+    (lambda + 2 mu).
+    """
 
     thickness: float = 1.0
 
@@ -140,7 +149,8 @@ class PlaneStress:
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """Return (lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 +
-        nu)))."""
+        nu))).
+        """
         lame, shear = material.lame_lambda, material.shear_modulus
         return 2.0 * lame * shear / (lame + 2.0 * shear), shear
 
@@ -148,7 +158,8 @@ class PlaneStress:
 @dataclass(frozen=True)
 class PlaneStrain:
     """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis:
-    lambda_eff = lambda."""
+    lambda_eff = lambda.
+    """
 
     thickness: float = 1.0
 
@@ -176,7 +187,8 @@ class Damping(Protocol):
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of
-        `material`."""
+        `material`.
+        """
 
 
 @dataclass(frozen=True)
@@ -191,7 +203,8 @@ class NoDamping:
 @dataclass(frozen=True)
 class MassProportional:
     """Damp by a force c u' per unit volume, rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >=
-    0."""
+    0.
+    """
 
     c: float
 
@@ -202,7 +215,8 @@ class MassProportional:
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (c / rho, 0): integrating c against the shape functions is c / rho times the
-        consistent mass."""
+        consistent mass.
+        """
         return self.c / material.rho, 0.0
 
 
@@ -212,7 +226,8 @@ class Rayleigh:
     contact term.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with
-    uplift prefer alpha = 0. Raises InputError for a negative or non-finite coefficient."""
+    uplift prefer alpha = 0. Raises InputError for a negative or non-finite coefficient.
+    """
 
     alpha: float
     beta: float
@@ -229,7 +244,8 @@ class Rayleigh:
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²);
         for equal ratios xi alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and
         10 Hz: 0.5712 1/s and 1.4469e-3 s. Raises InputError when f1 = f2 or when the solution needs
-        a negative coefficient."""
+        a negative coefficient.
+        """
         for name, f in (("f1", f1), ("f2", f2)):
             number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
         for name, xi in (("xi1", xi1), ("xi2", xi2)):
@@ -259,7 +275,8 @@ class Rayleigh:
         """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi
         [Hz] > 0.
 
-        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta)."""
+        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
+        """
         number("Rayleigh.ratio", "the frequency f [Hz]", f, positive=True)
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)
@@ -277,7 +294,8 @@ class DampingRatio:
 
     ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies
     the ratio is less than xi between them and more outside, and alpha M also resists rigid rocking
-    (see ``Rayleigh``)."""
+    (see ``Rayleigh``).
+    """
 
     frequency: float
     second: float = 0.0
@@ -306,7 +324,8 @@ class KelvinVoigt:
     strain across the panel would have a motion of its own (``assemble`` refuses it). With
     viscosities beta times the shear and bulk moduli, mu and lambda + 2/3 mu, it is Rayleigh(0,
     beta), the solid of one retardation time, which goes with PlaneStress too. Raises InputError for
-    a viscosity that is negative or not finite."""
+    a viscosity that is negative or not finite.
+    """
 
     shear: float
     bulk: float = 0.0

@@ -1,5 +1,6 @@
 """Describe orthotropic elasticity: nine engineering constants along three material axes at right
-angles."""
+angles.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +36,8 @@ class Orthotropic:
             it.
     Raises: InputError: a modulus or density that is not positive, ratios with which some strain
         would have negative energy,
-            axes that are no rotation."""
+            axes that are no rotation.
+    """
 
     E1: float
     E2: float
@@ -106,7 +108,8 @@ class Orthotropic:
         strains [Pa].
 
         (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and
-        on a line."""
+        on a line.
+        """
         if dimension not in VOIGT:
             raise InputError(
                 "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"

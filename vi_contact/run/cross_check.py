@@ -1,7 +1,8 @@
 """Compare independent routes to the same step, step by step from the same state.
 
 Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state
-must not."""
+must not.
+"""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -23,7 +24,8 @@ from .time_steps import TimeSteps
 @dataclass
 class Disagreement:
     """Hold how far the answers of a solver are off those of the primary one so far: of u, r_n and,
-    in steps with friction, r_t the largest difference ``off`` and the largest value ``size``."""
+    in steps with friction, r_t the largest difference ``off`` and the largest value ``size``.
+    """
 
     method: str = ""
     off: dict[str, float] = field(default_factory=lambda: {"u": 0.0, "r_n": 0.0})
@@ -34,7 +36,8 @@ class Disagreement:
     @property
     def relative(self) -> dict[str, float]:
         """Return max |x - x'| / max |x| over all components and steps, by name; max |x - x'| where
-        x is zero."""
+        x is zero.
+        """
         return {name: off / (self.size[name] or 1.0) for name, off in self.off.items()}
 
     @property
@@ -48,7 +51,8 @@ class CrossChecked:
     """Solve by one solver, whose answer counts, ask others at every step too, and remember how far
     they are off.
 
-    ``found``: without attempts that ``HalvedAtImpact`` threw away."""
+    ``found``: without attempts that ``HalvedAtImpact`` threw away.
+    """
 
     primary: Solver
     others: Sequence[Solver]
@@ -69,7 +73,8 @@ class CrossChecked:
 
     def begin(self, step: StepProblem) -> None:
         """Forget the attempt before when this one is of the same step but shorter: that was thrown
-        away."""
+        away.
+        """
         k, t = self._last
         if step.k == k and step.t < t:
             self.found = self._earlier
@@ -89,7 +94,8 @@ class CrossChecked:
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
         """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per
-        step: what summary.json shows. A name that comes again gets a number."""
+        step: what summary.json shows. A name that comes again gets a number.
+        """
         names = [one.method for one in self.found]
         return {
             name if names.count(name) == 1 else f"{name} #{rank}": one.relative
@@ -151,7 +157,8 @@ def cross_check(
     result tells.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted
-    ones."""
+    ones.
+    """
     given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
     if len(given) < 2:
         raise InputError(f"cross_check: {len(given)} solvers are given; give two or more")

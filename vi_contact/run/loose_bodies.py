@@ -27,7 +27,8 @@ SAME = 1e-9  # of the size of the bodies: nodes that are nearer lie at one place
 @dataclass(frozen=True)
 class LooseBody:
     """Hold the middle [m] of a loose body, its number of nodes, and how many of them lie at nodes
-    of other bodies."""
+    of other bodies.
+    """
 
     middle: Array
     nodes: int
@@ -36,7 +37,9 @@ class LooseBody:
 
 def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     """Return the bodies with a rigid motion that neither a stiffness nor a contact condition meets.
-    Collective."""
+
+    Collective.
+    """
     # Nearly every body is touched: the rest, which gathers nodes, is for those that are not.
     system = problem.system
     rows = rows_of_bodies(system)
@@ -70,7 +73,8 @@ def _distinct(parts: list[Array]) -> Array:
 
 def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
     """Return for every body whether its translation alone moves some contact condition, as side 1
-    or 2. Collective."""
+    or 2. Collective.
+    """
     surface = problem.surface
     moved = np.zeros(len(bodies))
     for number, rows in enumerate(bodies):
@@ -89,7 +93,8 @@ def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
 
 def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
     """Yield a sentence on every loose body, and whether it is refused: where its nodes lie at
-    another's. Collective."""
+    another's. Collective.
+    """
     for body in find_loose_bodies(problem):
         what = (
             f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no "
@@ -109,7 +114,8 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
 
 def refuse_loose_bodies(problem: ContactProblem) -> None:
     """Raise InputError for a loose body whose nodes lie at another body's; warn, on rank 0, of
-    others. Collective."""
+    others. Collective.
+    """
     for sentence, refused in judge_loose_bodies(problem):
         if refused:
             raise InputError(sentence)

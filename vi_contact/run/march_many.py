@@ -1,5 +1,6 @@
 """March many: several runs of one body at once, which differ in what shakes it, how it rubs and
-where it starts."""
+where it starts.
+"""
 
 from collections.abc import Iterator, Sequence
 from typing import Any

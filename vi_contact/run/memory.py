@@ -1,5 +1,6 @@
 """Say what a run takes of the memory: the peak of every rank, and the bytes of matrices, factor and
-mesh."""
+mesh.
+"""
 
 from collections.abc import Mapping
 from resource import RUSAGE_SELF, getrusage
@@ -12,7 +13,8 @@ from ..core.problem import ContactProblem
 def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
     """Return peak_bytes, the largest resident memory of every rank so far, and the bytes, of all
     ranks together, of what tells them: the matrices of all bases, A, its factor, the mesh.
-    Collective."""
+    Collective.
+    """
     comm, systems = problem.system.algebra.comm, (problem.system, problem.turned, problem.equations)
     owners: dict[str, list[Any]] = {
         name: [getattr(one, name) for one in systems] for name in ("K", "M", "C")

@@ -1,5 +1,6 @@
 """Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it
-starts from."""
+starts from.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +29,8 @@ SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state 
 @dataclass(frozen=True)
 class Method:
     """Hold how a problem is marched: scheme, solver and its escalation, time steps [s] as asked
-    for, tolerance."""
+    for, tolerance.
+    """
 
     problem: ContactProblem
     scheme: Scheme
@@ -38,7 +40,8 @@ class Method:
 
     def bind(self) -> None:
         """Hand scheme and time steps to the motions that are marched beside the run, unless they
-        have them."""
+        have them.
+        """
         for companion in (*self.problem.system.companions, *self.problem.surface.companions):
             companion.bind(self.scheme, self.dt)
 
@@ -59,7 +62,8 @@ def checked_method(
     the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the
-    obstacle. Collective."""
+    obstacle. Collective.
+    """
     check_problem_given(owner, problem)
     comm = problem.surface.comm
     agree(
@@ -104,7 +108,8 @@ def with_defaults(
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass
     at the contact nodes asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains
-    energy. Without a mass: the scheme's. ``others``: the first that has its matrices lends them."""
+    energy. Without a mass: the scheme's. ``others``: the first that has its matrices lends them.
+    """
     check_problem_given("march", problem)
     for one in several("march", "others", others, "give a list of problems, or leave it out"):
         check_problem_given("march", one)
@@ -135,7 +140,8 @@ def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
 
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
     """Raise InputError unless these are a solver or None, a list of solvers, and a tolerance
-    between 0 and 1."""
+    between 0 and 1.
+    """
     if solver is not None:
         check_solver(owner, solver)
     for one in several(owner, "escalation", escalation, "give a list of solvers"):

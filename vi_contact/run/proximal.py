@@ -15,7 +15,8 @@ recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
 
 Rigid motions that no load drives stay where they start: along them P-weighted means of u are those
 of u0 (the centre of mass of a block free to slide on level ground does not move). On a conservative
-problem all else is unique."""
+problem all else is unique.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -70,7 +71,8 @@ class _Progress:
 
     def take(self, result: StepResult, worst: float, pace: float) -> None:
         """An answer is better with a smaller residual or, near round-off, with the smallest step:
-        the residual of a stiff body is there long before soft motions are."""
+        the residual of a stiff body is there long before soft motions are.
+        """
         better = worst < self.least or (worst <= NEAR * self.tolerance and pace < self.slowest)
         self.vain, self.best = (0, result) if better else (self.vain + 1, self.best)
         self.least, self.slowest = min(worst, self.least), min(pace, self.slowest)
@@ -107,14 +109,16 @@ class Proximal:
 
     def certificate(self, result: StepResult) -> Certificate:
         """Return the certificate of the stage itself, with the equilibrium of every body as a rigid
-        one."""
+        one.
+        """
         reaction = self.step.surface.reaction_load(result.r_n, len(result.x), result.r_t)
         resultant = self._bodies.imbalance(self.step.b, reaction)
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
     def solve(self, step: StepProblem) -> StepResult:
         """Iterate until two answers running are no better; once, if the solver fails, with stronger
-        springs instead."""
+        springs instead.
+        """
         self.step = step
         progress = _Progress(self._tolerance)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
@@ -173,7 +177,8 @@ class Proximal:
 
     def _missing(self, inner: StepProblem, found: StepResult) -> Array:
         """What a solver left of a step's resultants: the next carries it, or bodies would drift
-        along what P holds."""
+        along what P holds.
+        """
         if found.aim == 0.0:
             return np.zeros_like(found.x)
         reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
@@ -183,7 +188,8 @@ class Proximal:
         self, answer: StepResult, share: float, centre: Array, carried: Array
     ) -> StepProblem:
         """The next step, b with the forces' own resultants: K u has none, and its round-off would
-        move the body."""
+        move the body.
+        """
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
@@ -238,7 +244,8 @@ class Proximal:
         """How many times d to go further at once: the sum of the steps to come when each is
         ‖d_new‖/‖d_old‖ of the one before (Aitken), or only to the next contact. 0 unless d_new and
         d_old are parallel, to the accuracy which that distance needs. Any start of the next step
-        will do, so nothing but the speed depends on it."""
+        will do, so nothing but the speed depends on it.
+        """
         if 0.0 in (old.pace, new.pace) or self.step.surface.some(old.active != new.active):
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace

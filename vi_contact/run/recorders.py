@@ -2,7 +2,8 @@
 
 Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or arrays (HDF5 only),
 those of rank 0. Displacements and velocities are those of the equations: relative to the ground
-when an excitation shakes the body."""
+when an excitation shakes the body.
+"""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -36,7 +37,8 @@ def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
 
 def refuse_overflow(row: Row) -> None:
     """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy
-    ledger."""
+    ledger.
+    """
     for name, value in row.items():
         if not isinstance(value, float) or isfinite(value):
             continue
@@ -49,7 +51,8 @@ def refuse_overflow(row: Row) -> None:
 
 class Steps:
     """Record the columns of every run: time, step, iterations, certificate, escalation and ground
-    acceleration."""
+    acceleration.
+    """
 
     _axes = AXES  # those of the problem, once it is started
 
@@ -90,7 +93,8 @@ class Energy:
     themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is
     the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the summed work
     of the residual of the equation of motion; ``summary.json`` has its size over the largest energy
-    or work. Each step costs three products, and damping and impacts cost one more each."""
+    or work. Each step costs three products, and damping and impacts cost one more each.
+    """
 
     _COLUMNS: ClassVar[Columns] = {
         name: ("J", meaning) for name, meaning in WORDS["columns"].items()
@@ -105,7 +109,8 @@ class Energy:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Return the initial energies; works and losses are zero, or those of the run that is
-        continued."""
+        continued.
+        """
         self._problem = problem
         self._now, self._stored = (
             energies(problem.equations, state.u, state.v),
@@ -167,7 +172,8 @@ def told_pressures(surface: ContactSurface) -> Mask | None:
     """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all
     of them.
 
-    Where all on all ranks are ``uncovered`` all count. Collective."""
+    Where all on all ranks are ``uncovered`` all count. Collective.
+    """
     uncovered = (
         np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
     )
@@ -177,8 +183,9 @@ def told_pressures(surface: ContactSurface) -> Mask | None:
 
 @dataclass
 class Contact:
-    """Record gaps, pressures, forces and slip of the contact. Reactions are mean or end values, as
-    the scheme says.
+    """Record gaps, pressures, forces and slip of the contact.
+
+    Reactions are mean or end values, as the scheme says.
 
     gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight; the
     largest is that of points that are covered (``ContactSurface.uncovered``). The force on the body
@@ -203,8 +210,10 @@ class Contact:
         attributes(self, flags=("arrays",))
 
     def columns(self) -> Columns:
-        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call
-        ``start`` first."""
+        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active.
+
+        Call ``start`` first.
+        """
         every = _named(
             _COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes
         )
@@ -314,7 +323,8 @@ class Probe:
     ground when an excitation shakes the body.
 
     InputError if a label has other characters than letters, digits and underscores, or a point is
-    outside the body."""
+    outside the body.
+    """
 
     points: Mapping[Any, Sequence[float]]
     velocity: bool = False

@@ -3,7 +3,8 @@ forces balance it.
 
 Every body is asked by itself, in its own unknowns (``problem.turned``): with w a rigid motion of it
 and K w = 0, a static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and
-moments. No stiffness enters it."""
+moments. No stiffness enters it.
+"""
 
 import numpy as np
 
@@ -24,7 +25,8 @@ class RigidBodies:
     def imbalance(self, load: Array, reaction: Array) -> float:
         """Return the largest |w·(load - reaction)| over max |w| times the sum of |load| and
         |reaction| on the body, forces [N] on the unknowns of ``problem.static_load``. 0 when
-        prescribed displacements hold every body."""
+        prescribed displacements hold every body.
+        """
         f, r = self._own(load), self._own(reaction)
         worst = 0.0
         for body in self._free:
@@ -36,7 +38,8 @@ class RigidBodies:
 
     def resultants(self, force: Array) -> Array:
         """Return m w (w·force), m = diag M: the part of a force on ``static_load``'s unknowns with
-        its resultants."""
+        its resultants.
+        """
         own, part = self._own(force), np.zeros_like(force)
         for body in self._free:
             part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])
@@ -57,7 +60,8 @@ def body_springs(problem: ContactProblem) -> Matrix:
 
     It does not grow as meshes are refined, as it would with the largest K_ii / M_ii. Weaker springs
     take fewer steps to push a stiff body into a soft one, and cost digits: round-off of the first
-    step is 1e-16 / WEAK² at worst."""
+    step is 1e-16 / WEAK² at worst.
+    """
     system, surface = problem.turned, problem.surface
     algebra, numbers = system.algebra, np.asarray(system.space.bodies)
     count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]

@@ -4,7 +4,8 @@ is not seen.
 A sine of frequency f is zero at every step if dt is a multiple of half its period 1/(2 f), whatever
 its amplitude; with fewer than ``FEWEST`` steps in a period the steps miss its peaks. The same holds
 for pulses, by the sine that they are cut from, and for records and tables, by the distance of their
-samples."""
+samples.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -37,14 +38,16 @@ DEEP = 5  # how far a motion is looked for in what holds it
 def sampling_warning(problem: ContactProblem, dt: float) -> str | None:
     """Return a sentence when the time step [s] is too long for an excitation, a load or a motion of
     the problem whose frequency, period or samples are known; None when it is not, or nothing is
-    known."""
+    known.
+    """
     said = (one for source in _sources(problem) for one in _said(source, dt))
     return next(said, None)
 
 
 def _sources(problem: ContactProblem) -> Iterator[Any]:
     """Everything that acts as a function of the time: first excitations, then loads, prescribed and
-    moving parts."""
+    moving parts.
+    """
     yield from problem.excitations
     system, surface = problem.system, problem.surface
     for _, history in system.load.separable:
@@ -92,7 +95,8 @@ def _frequency(source: Any) -> float | None:
 
 def _held(source: Any) -> Iterator[Any]:
     """What a function or an object may have its motion from: its owner, a part of it, or what it
-    closes over."""
+    closes over.
+    """
     for name in PARTS:
         found = getattr(source, name, None)
         yield from found if isinstance(found, list | tuple) else (found,)

@@ -1,5 +1,6 @@
 """Run the loop over certified steps, with everything that has to happen when it ends, well or
-badly."""
+badly.
+"""
 
 import logging
 import time
@@ -61,7 +62,8 @@ class Session:
         have ended. table: the rows so far. step_plan: the base steps. place: the end of the last
         base step. loop: its steps, where others have them too. resumed_from: the step of the
         checkpoint that it continues, None
-            for a new run. stopped: in words, when the callback has asked for the end."""
+            for a new run. stopped: in words, when the callback has asked for the end.
+    """
 
     method: Method
     recorders: Sequence[Recorder]
@@ -200,7 +202,8 @@ class Session:
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
         """Interrupted on all ranks, with a checkpoint, by a signal to one, or by the end of the
-        time. Collective."""
+        time. Collective.
+        """
         number, late = signals.asked(self._comm, self.wall_time.over())
         if not (number or late):
             return
@@ -218,7 +221,9 @@ class Session:
         self, callback: Callable[[State, Report], Any], report: Report, writer: Writer
     ) -> None:
         """Show a step to the callback, which may ask for the end of the run or raise, on one rank.
-        Collective."""
+
+        Collective.
+        """
         state = report.new
         for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
             if array is not None:
@@ -284,8 +289,11 @@ class Session:
     def _rescue(
         self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool
     ) -> None:
-        """Save what there is. A checkpoint of the last base step only on one rank, or where
-        ``all_ranks`` raise the same error: others might not come."""
+        """Save what there is.
+
+        A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the same
+        error: others might not come.
+        """
         # Of any kind: the error that ended the run is the one to tell, and it may keep each of
         # these from working.
         with suppress(Exception):
@@ -340,7 +348,8 @@ class Session:
 
     def _seconds_per_linear_step(self) -> float:
         """Median time of right-hand side, one back-substitution and update with the same A, from
-        the last state [s]."""
+        the last state [s].
+        """
         if (
             self.last is None or not self.last.step.A.factorised
         ):  # none is made for this: it may not fit
@@ -366,7 +375,8 @@ class Session:
 
 def _locked(value: T) -> T:
     """The value with read-only views of its arrays: some of them, such as the gap at rest, belong
-    to the problem."""
+    to the problem.
+    """
     own: Any = value
     views = {
         one.name: array.view()

@@ -1,5 +1,6 @@
 """Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot
-spoil."""
+spoil.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -55,8 +56,9 @@ def simulate(
     wall_time: str | None = None,
     callback: Callable[[State, Report], Any] | None = None,
 ) -> Solution:
-    """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank
-    gets the solution.
+    """Compute steps in time until t_end, or so many steps, and record them.
+
+    Collective; every rank gets the solution.
 
     Args: scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
         Zienkiewicz-Wood-Taylor
@@ -95,7 +97,8 @@ def simulate(
         or SIGHUP, with a checkpoint. OutOfTime: before the wall time is over, with a checkpoint.
         StepFailure: no solver could certify a step. ViContactError: the disk refused to read or
         write. All that was
-            computed is then in the folder, and summary.json says why the run ended."""
+            computed is then in the folder, and summary.json says why the run ended.
+    """
     with opened(**locals()) as (session, writer):
         return session.go(writer)
 
@@ -124,9 +127,11 @@ def opened(
     others: Sequence[ContactProblem] = (),
     runs: int = 1,
 ) -> Iterator[tuple[Session, Writer]]:
-    """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``:
-    problems that lend their matrices and factors to it, if they are its own. ``runs``: how many
-    take turns. Collective."""
+    """Check the arguments of ``simulate`` and set a run up, in its locked folder.
+
+    ``others``: problems that lend their matrices and factors to it, if they are its own. ``runs``:
+    how many take turns. Collective.
+    """
     check_problem_given("simulate", problem)
     comm = problem.system.algebra.comm
     agree(
@@ -231,7 +236,8 @@ def _check_outputs(
     cross_check: Any,
 ) -> None:
     """InputError for what is no recorder, folder, number of steps, writer of fields or
-    cross-check."""
+    cross-check.
+    """
     owner = "simulate"
     for one in (
         ()
@@ -280,8 +286,10 @@ def _started(
     state: State,
     resumed: Mapping[str, Any] | None = None,
 ) -> tuple[Columns, Row]:
-    """Start the recorders: their columns, and the row of the state. InputError when two record the
-    same column."""
+    """Start the recorders: their columns, and the row of the state.
+
+    InputError when two record the same column.
+    """
     row: dict[str, Any] = {}
     nothing: Row = {}
     columns: dict[str, tuple[str, str]] = {}
@@ -305,7 +313,8 @@ def _started(
 
 def _kinds(record: Any) -> Any:
     """What is compared over ranks of recorders: kinds, and settings of those of the package, as
-    each rank may hold its part of what is recorded."""
+    each rank may hold its part of what is recorded.
+    """
     if not isinstance(record, list | tuple):
         return record
     return [
@@ -316,7 +325,9 @@ def _kinds(record: Any) -> Any:
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
     """Put the rows of an earlier run into the table, arrays on rank 0 only; the last of them.
-    Collective."""
+
+    Collective.
+    """
     blocks = stored.blocks()
     last: Row = {}
     while True:

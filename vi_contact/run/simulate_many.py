@@ -1,5 +1,6 @@
 """Simulate many: several runs of one body at once, each recorded in its own folder as ``simulate``
-does."""
+does.
+"""
 
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -36,7 +37,8 @@ def simulate_many(
 
     Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as
     ``simulate`` does, when all runs that have begun have written their checkpoints:
-    ``restart=True`` continues them."""
+    ``restart=True`` continues them.
+    """
     every = [
         _arguments(run)
         for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")

@@ -33,7 +33,8 @@ class Solution:
         state. columns: column -> (unit, meaning). state: the final state in the basis of the nodal
         frames (``problem.cartesian`` turns it back). facts: the contents of summary.json; the times
         of a step are medians in seconds, nan without steps. problem: the solved problem, with the
-        mass matrix that the scheme chose. folder: the run folder, or None."""
+        mass matrix that the scheme chose. folder: the run folder, or None.
+    """
 
     history: Mapping[str, Array]
     columns: Columns
@@ -54,7 +55,8 @@ class Solution:
         ``fem.as_function`` of the end state.
 
         With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``.
-        Collective. InputError for a system without a mesh, and without such a frame."""
+        Collective. InputError for a system without a mesh, and without such a frame.
+        """
         if not hasattr(self.problem.system.space, "V"):
             raise InputError(
                 "function: the system has no mesh and so no Functions; use history and state"
@@ -84,7 +86,8 @@ class Solution:
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger,
-        certificates."""
+        certificates.
+        """
         return import_module("vi_contact.plots").plot_overview(
             self
         )  # by name: on a floor above, and no run needs it
@@ -108,7 +111,8 @@ class Solution:
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
     """Return a sentence when the run had more energy than was put in, by more than CREATED of the
-    largest energy."""
+    largest energy.
+    """
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
     return (

@@ -10,7 +10,8 @@ step, implicit Euler):
 so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed``
 displacements, and obstacles that move. Without friction every stage is the equilibrium of its own
 loads. Slip between stages has no rate, so a law that asks for one is refused: its value at rest
-would be wrong for points in motion wherever it jumps there."""
+would be wrong for points in motion wherever it jumps there.
+"""
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
@@ -54,7 +55,8 @@ def static_equilibrium(
     ``solver`` is None, it is Automatic().
 
     Raises: InputError: the loads drive a rigid motion that nothing stops, so that there is no
-        equilibrium. StepFailure: no answer has a certificate below the tolerance."""
+        equilibrium. StepFailure: no answer has a certificate below the tolerance.
+    """
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
     agree(problem.surface.comm, owner, {"solver": solver, "t": t, "tolerance": tolerance})
@@ -72,7 +74,8 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     """Warn, on rank 0, where much of a contact that touches at the start, and is pressed, is open
     at rest. Collective.
 
-    The place is that of the open point with the lowest number."""
+    The place is that of the open point with the lowest number.
+    """
     surface = problem.surface
     touching = surface.gap0 <= TOUCHING * largest(surface.comm, max_abs(surface.points))
     opened = touching & ~state.active
@@ -119,7 +122,8 @@ class Equilibria:
 
     def after(self, old: State, t: float) -> State:
         """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was;
-        its number too."""
+        its number too.
+        """
         problem = self._problem
         with together(
             problem.surface.comm
@@ -153,8 +157,9 @@ def quasi_static(
     state: State | None = None,
     tolerance: float = TOLERANCE,
 ) -> Iterator[State]:
-    """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k
-    counts stages.
+    """Yield the equilibrium at each of the times, from where the one before left the body.
+
+    v = 0; k counts stages.
 
     A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at
     least a step for every turn, and more where zones of slip grow (small steps follow the path, the
@@ -168,7 +173,8 @@ def quasi_static(
     Raises: InputError: times that do not increase; friction that depends on the slip rate; loads
         that drive a rigid motion
             which nothing stops.
-        StepFailure: no answer below the certificate tolerance."""
+        StepFailure: no answer below the certificate tolerance.
+    """
     check_problem_given("quasi_static", problem)
     if isinstance(times, Iterable) and not isinstance(times, str | bytes):
         times = list(times)

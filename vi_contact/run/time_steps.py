@@ -3,7 +3,8 @@ contact closes.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it
 from them (``start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*:
-of the plan, halved or not."""
+of the plan, halved or not.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +31,8 @@ class Schedule:
 
     A piece ends with the first step that reaches its time, even if the piece is not a whole number
     of steps long. InputError if there are no pieces, if a dt is not positive, or if the times do
-    not increase."""
+    not increase.
+    """
 
     pieces: tuple[tuple[float, float], ...]
 
@@ -63,7 +65,8 @@ class HalvedAtImpact:
     The halves may be halved again, down to dt/2**halvings, which resolves the time of an impact.
     Every accepted part is a certified step like any other. At most one matrix is factorised for
     each of the halvings + 1 lengths of a piece. InputError if dt is not positive, or if halvings is
-    not a whole number from 0 to 20."""
+    not a whole number from 0 to 20.
+    """
 
     dt: float | Schedule
     halvings: int = 3
@@ -88,7 +91,8 @@ def described(plan: TimeSteps) -> float | str:
 
 def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
     """Return the pieces (dt, until) of a plan, endless for a constant dt [s]; InputError for no
-    dt."""
+    dt.
+    """
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
     return dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
 
@@ -96,7 +100,8 @@ def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
 @dataclass(frozen=True)
 class StepPlan:
     """Hold the base steps of one run: parts (dt, number of steps), and how often each may be
-    halved."""
+    halved.
+    """
 
     parts: tuple[tuple[float, int], ...]
     halvings: int = 0
@@ -127,7 +132,8 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a
     restart, which builds it from the same t0, has the same steps. A step shorter than a millionth
     of dt would be round-off of these times, at the end of a piece and of the run alike, and is not
-    made. InputError for more than 1e9 steps."""
+    made. InputError for more than 1e9 steps.
+    """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
     pieces = pieces_of(plan)
     left = _wanted(steps, t_end, t0)

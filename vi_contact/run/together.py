@@ -4,7 +4,8 @@ read once for all.
 The scheme steps the rows as it steps one state, and the solver answers them together
 (``solve_many``); certificates, impacts and reports are a run's own. A step that is not answered at
 once with a certificate far below the tolerance is solved alone; who then has to escalate, or fails,
-goes on alone."""
+goes on alone.
+"""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -149,7 +150,8 @@ class Group:
 
     def _step(self, dt: float) -> list[Together]:
         """Make a step and hand out its reports; the runs that cannot make it, and then none is
-        made."""
+        made.
+        """
         runs, scheme, problem = self._runs, self._scheme, self._problem
         if dt != self._dt:
             states = [
@@ -193,7 +195,8 @@ class Group:
         self, many: StepProblem, rows: StepResult, parts: dict[str, Any]
     ) -> tuple[StepResult, list[int]]:
         """The answers as rows, those not good at once found alone; the rows of runs that have to
-        escalate, or fail."""
+        escalate, or fail.
+        """
         steps, results, leaving = parts["step"], parts["result"], []
         certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [
@@ -243,7 +246,8 @@ class Group:
 
     def _struck(self, rows: State, free: Each) -> tuple[State, Each]:
         """The states after the impact law, as rows and one by one: as they are where nothing was
-        struck."""
+        struck.
+        """
         problem, scheme, old, dt = self._problem, self._scheme, self._states, self._dt
         closed = rows.active & problem.surface.rigid
         if problem.impact is None or not closed.any():

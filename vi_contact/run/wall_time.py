@@ -1,5 +1,6 @@
 """End a run before its time is over: read a wall time as Slurm does, and say when what is left of
-it gets short."""
+it gets short.
+"""
 
 import math
 import os
@@ -42,7 +43,8 @@ def seconds_of(wall_time: object) -> float:
 
 def age() -> float:
     """Return the seconds since this process began; where the system does not tell, since this
-    module was imported."""
+    module was imported.
+    """
     return time.monotonic() - _born()
 
 
@@ -58,7 +60,8 @@ def _born() -> float:
 
 class WallTime:
     """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time; None:
-    there is no end."""
+    there is no end.
+    """
 
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
         self.text, self._runs = wall_time, runs

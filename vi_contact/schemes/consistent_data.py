@@ -18,7 +18,8 @@ Contact unknowns without inertia are in equilibrium with the body at every time:
 
 Initial data rarely know that. Kept as they are, what is missing in this equation would swing on at
 the contact nodes from step to step for ever, so schemes put it right once, at the start; the energy
-this takes is of the order of the mesh size, and the history starts after it."""
+this takes is of the order of the mesh size, and the history starts after it.
+"""
 
 from dataclasses import replace
 
@@ -40,7 +41,8 @@ def consistent_acceleration(
     problem: ContactProblem, state: State, dt: float
 ) -> tuple[Array, Array]:
     """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v, owned unknowns of the
-    rotated basis."""
+    rotated basis.
+    """
     system = problem.equations
     force = system.load(state.t) - system.K @ state.u
     if system.C is not None:
@@ -118,7 +120,8 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     that belong to it.
 
     Only their own block of K is factorised, however large the body is; not even that when it is
-    large itself."""
+    large itself.
+    """
     system, layer = problem.equations, problem.equations.massless
     if layer is None:
         return state
@@ -159,6 +162,7 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
 
 def massless_take(problem: ContactProblem, given: Array | float, x: Array) -> Array:
     """Return x with these values on massless unknowns: a mean velocity, without momentum to keep;
-    no acceleration."""
+    no acceleration.
+    """
     massless = problem.equations.massless
     return x if massless is None else np.where(massless, given, x)

@@ -22,7 +22,8 @@ would have no sign.
 and SS22(½, ½).
 
 Sources: Deuflhard, Krause and Ertel, Int. J. Numer. Meth. Engng 73 (2008) 1274-1290; Kane, Repetto,
-Ortiz and Marsden, Comput. Methods Appl. Mech. Engng 180 (1999) 1-26."""
+Ortiz and Marsden, Comput. Methods Appl. Mech. Engng 180 (1999) 1-26.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -42,8 +43,11 @@ from .consistent_data import mass_matrix, rigid_part
 
 @dataclass(frozen=True)
 class ContactStabilisedNewmark(SingleStep):
-    """Step by the module's equations. They need mass at contact nodes. ``projected``: whether the
-    predictor is projected. StepFailure when the projection cannot be certified."""
+    """Step by the module's equations.
+
+    They need mass at contact nodes. ``projected``: whether the predictor is projected. StepFailure
+    when the projection cannot be certified.
+    """
 
     projected: bool = True
 
@@ -108,7 +112,8 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     The same small problem as a step with A = M, solved in the increment w, so that nothing is
     rounded where nothing is in the way. Springs give way: their points are not projected. Normal
     directions only; friction has no part in it. StepFailure when the projection cannot be
-    certified."""
+    certified.
+    """
     surface, system, rigid = problem.surface, problem.equations, problem.surface.rigid
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)

@@ -22,7 +22,8 @@ creates energy when it opens. Unless rho_inf is near 0 the damping does not make
 wave crosses many elements in a step, nor on consistent mass where dt resolves the highest frequency
 of the mesh: docs/guide/schemes.md has numbers. Impulses: sum of dt r_n,f over a contact with free
 flight before and after is the change of momentum; in single steps it is not, unless the member is
-Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375."""
+Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
+"""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -42,9 +43,11 @@ SLACK = 1e-12  # round-off in the conditions of stability
 
 
 class AlphaStep(BalanceStep, ABC):
-    """Step by the module's equations, with the weights of a member. Its memory is "a" (the
-    acceleration), "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong
-    to)."""
+    """Step by the module's equations, with the weights of a member.
+
+    Its memory is "a" (the acceleration), "reaction" (Bᵀr at the same end) and "of" (alpha_m,
+    alpha_f and t they belong to).
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -52,14 +55,16 @@ class AlphaStep(BalanceStep, ABC):
     @abstractmethod
     def weights(self) -> "GeneralisedAlpha":
         """Return the member of generalised-alpha that it is, with alpha_m, alpha_f, beta and
-        gamma."""
+        gamma.
+        """
 
     def _mark(self, t: float) -> Array:
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with massless nodes in equilibrium and its acceleration; not on restarts
-        or a new dt."""
+        or a new dt.
+        """
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
         return self._restarted(problem, equilibrated(problem, state), dt)
@@ -88,7 +93,8 @@ class AlphaStep(BalanceStep, ABC):
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
         """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 -
-        alpha_f) at u1 = 0."""
+        alpha_f) at u1 = 0.
+        """
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
         mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
@@ -112,7 +118,8 @@ class AlphaStep(BalanceStep, ABC):
         dt: float,
     ) -> State:
         """Return the state with a1 and v1 from u1; massless unknowns get none and the mean velocity
-        of the step."""
+        of the step.
+        """
         w = self.weights
         v, a = self._known(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
@@ -135,7 +142,8 @@ def weighted(
     problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = ""
 ) -> Balance:
     """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else; ``level``: of
-    names in memory."""
+    names in memory.
+    """
     load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
         u=(1.0 - f) * new.u + f * old.u,
@@ -149,8 +157,10 @@ def weighted(
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(AlphaStep):
-    """Step by the module's equations. Take ``GeneralisedAlpha.spectral_radius(rho_inf)``.
-    InputError unless stable."""
+    """Step by the module's equations.
+
+    Take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable.
+    """
 
     alpha_m: float
     alpha_f: float
@@ -182,7 +192,8 @@ class GeneralisedAlpha(AlphaStep):
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> "GeneralisedAlpha":
         """Return the member of order 2 with this amplification at infinite frequency, 0 (all
-        damped) to 1 (none)."""
+        damped) to 1 (none).
+        """
         remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
         between("rho_inf", rho_inf, 0.0, 1.0, remedy)
         alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)

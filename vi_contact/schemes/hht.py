@@ -9,7 +9,8 @@ impulses). Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification
 alpha) at infinite frequency: 1 at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3. On massless
 contact nodes contact creates energy when a wave crosses many elements in a step, and the damping
 does not keep it in bounds; on consistent mass also when dt resolves the mesh: docs/guide/schemes.md
-has numbers. Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292."""
+has numbers. Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -15,7 +15,8 @@ Energy: the ledger closes with the means of both ends; the damping is its algori
 stands in the balance of forces, but what it creates at high frequencies is damped away at once:
 docs/guide/schemes.md has numbers. Impulses: those over a contact with free flight before and after
 are the change of momentum; in single steps not. Source: Houbolt, J. Aeronaut. Sci. 17 (1950)
-540-550; as a member of eqs. 11a,b: docs/reference/sources.md [1]."""
+540-550; as a member of eqs. 11a,b: docs/reference/sources.md [1].
+"""
 
 from dataclasses import dataclass, field
 

@@ -18,7 +18,8 @@ off what the impact law has just stopped. A change of dt keeps both. Unknowns wi
 (mass.Redistributed) have no acceleration and the mean velocity of the step. Energy: the ledger
 closes with the means of both ends. Unlike the midpoint form, contact in the acceleration balance at
 t_p can *gain* energy on consistent mass, booked as algorithmic or contact loss of negative sign.
-Impulses: those over a contact with free flight before and after are the change of momentum."""
+Impulses: those over a contact with free flight before and after are the change of momentum.
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -44,7 +45,8 @@ class LinearMultistep(BalanceStep):
     length q + 1 >= 2.
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u =
-    1, t and t²)."""
+    1, t and t²).
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -95,7 +97,8 @@ class LinearMultistep(BalanceStep):
 
     def spectral_radius(self) -> float:
         """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over
-        FREQUENCIES w dt and DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
+        FREQUENCIES w dt and DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z).
+        """
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         polynomials = [b] + [
             gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING
@@ -122,7 +125,8 @@ class LinearMultistep(BalanceStep):
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with a past, unless it has one for this dt; massless nodes come into
-        equilibrium, once."""
+        equilibrium, once.
+        """
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
             return self._restarted(problem, equilibrated(problem, state), dt)
@@ -189,7 +193,8 @@ class LinearMultistep(BalanceStep):
         dt: float,
     ) -> State:
         """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one
-        down."""
+        down.
+        """
         levels = self._levels(state)
         (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
         v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
@@ -207,5 +212,6 @@ class LinearMultistep(BalanceStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the mean of the equations of motion at both ends of the step, the old end after
-        its impact."""
+        its impact.
+        """
         return weighted(problem, old, new, 0.5, 0.5, "_0")

@@ -11,7 +11,8 @@ Order 2, unconditionally stable, no damping of any frequency. Energy: it changes
 damping and friction, and a closure loses r̄_n times the gap that was closed: contact never creates
 energy. Contact forces ring, since contact nodes need their mass here. Impulses: dt r̄_n is the
 change of momentum in every step. Source: Kane, Repetto, Ortiz and Marsden, Comput. Methods Appl.
-Mech. Eng. 180 (1999) 1-26."""
+Mech. Eng. 180 (1999) 1-26.
+"""
 
 from dataclasses import dataclass, field
 

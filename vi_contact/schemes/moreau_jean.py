@@ -24,7 +24,8 @@ of approach, and what it has passed by then stays while contact lasts (e = 0): a
 
 Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods
 Appl. Mech. Engng 177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound
-of separating points is ours."""
+of separating points is ours.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -48,7 +49,8 @@ class MoreauJean(SingleStep):
         coefficient of the contact nodes, from 0 to 1. allow_energy_gain: accept any theta from ½ to
         1, and use Newton's law for points that separate too.
 
-    InputError for numbers outside these ranges."""
+    InputError for numbers outside these ranges.
+    """
 
     penetrates: ClassVar[bool] = True
     theta: float = 0.5
@@ -77,7 +79,8 @@ class MoreauJean(SingleStep):
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point
-        with a gap."""
+        with a gap.
+        """
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
@@ -110,7 +113,8 @@ class MoreauJean(SingleStep):
 
     def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
         """Largest normal velocity after the step of a closed point; all refer to the velocity of
-        the obstacle."""
+        the obstacle.
+        """
         surface, advance = problem.surface, problem.surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt
         v_n = surface.normal_values(state.v) - obstacle
@@ -123,7 +127,8 @@ class MoreauJean(SingleStep):
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
         """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta)
-        C v0)."""
+        C v0).
+        """
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.product("K", state.u)
         force -= self.theta * left * dt * system.product("K", state.v)

@@ -19,7 +19,8 @@ At (¼, ½) without contact E is constant. With rigid contact its work is ½ (r_
 consistent mass a gain whenever a contact opens; on redistributed mass of order dt, and then
 Newmark(¼, ½) is Trapezoidal(). Impulses: dt times the reactions (…)_gamma are the change of
 momentum in every step; the ledger uses these means. Source: Newmark, J. Eng. Mech. Div. ASCE 85
-(1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195 (2006) 6110-6124."""
+(1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195 (2006) 6110-6124.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -46,5 +47,6 @@ class Newmark(AlphaStep):
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the equations of both ends, with the weights that make M a the change of
-        momentum."""
+        momentum.
+        """
         return weighted(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)

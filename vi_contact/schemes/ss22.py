@@ -8,7 +8,8 @@ theta2.
 In x = u1:  A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K,  scale = 1/theta2.
 Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for theta2 >= theta1 >= ½,
 order 2 at theta1 = ½. Energy: as the midpoint rule at theta1 = theta2 = ½; dissipates for theta1 > ½.
-Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2]."""
+Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2].
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -25,8 +26,10 @@ from .base import SingleStep, means, position_step, stepped
 
 @dataclass(frozen=True)
 class SS22(SingleStep):
-    """Step by the module's equations. InputError unless theta2 >= theta1 >= ½ (else only
-    conditionally stable)."""
+    """Step by the module's equations.
+
+    InputError unless theta2 >= theta1 >= ½ (else only conditionally stable).
+    """
 
     by_rows: ClassVar[bool] = True
 

@@ -11,7 +11,8 @@ Order 2 while nothing opens or closes; unconditionally stable. Energy: changes b
 damping and by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event:
 quasi-conservative, contact forces do not ring. On consistent mass this is Newmark(¼, ½), which
 gains energy in every impact; it runs there with a warning. Source: Khenous, Laborde and Renard,
-Eur. J. Mech. A 27 (2008) 918-932."""
+Eur. J. Mech. A 27 (2008) 918-932.
+"""
 
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -29,8 +30,11 @@ from .consistent_data import equilibrated, massless_take
 
 @dataclass(frozen=True)
 class Trapezoidal:
-    """Step by the module's equations. ``mass``: the mass matrix for problems that do not name
-    one."""
+    """Step by the module's equations.
+
+    ``mass``: the mass matrix for problems that do not name
+    one.
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -42,7 +46,8 @@ class Trapezoidal:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for an impact law on massless contact nodes, and a mass of its own
-        beside that of the problem; warn when contact nodes have mass."""
+        beside that of the problem; warn when contact nodes have mass.
+        """
         if self.mass not in (Redistributed(), problem.mass):
             raise InputError(
                 f"Trapezoidal: mass={self.mass} is not read, as the problem has "
@@ -53,7 +58,8 @@ class Trapezoidal:
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with massless nodes in equilibrium; once, not on restarts and changes of
-        dt."""
+        dt.
+        """
         if "force" in state.memory:
             return state
         return self._with_force(problem, equilibrated(problem, state))
@@ -95,7 +101,8 @@ class Trapezoidal:
         dt: float,
     ) -> State:
         """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity
-        of the step."""
+        of the step.
+        """
         mean = (result.x - state.u) / dt
         v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)
         return self._with_force(problem, stepped(step, result, result.x, v))

@@ -26,8 +26,10 @@ from .base import SingleStep, means, position_step, stepped
 
 @dataclass(frozen=True)
 class ZienkiewiczWoodTaylor(SingleStep):
-    """Step by the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is
-    unstable."""
+    """Step by the module's equations.
+
+    ``phi`` in [½, 1]: InputError below ½, where the step is unstable.
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -55,7 +57,8 @@ class ZienkiewiczWoodTaylor(SingleStep):
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
         """Return the step with b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi
-        K u0."""
+        K u0.
+        """
         system, phi = problem.equations, self.phi
         b = self._load(problem, state, dt) / phi
         b += (system.product("M", state.u) + dt * system.product("M", state.v)) / (phi * dt) ** 2

@@ -4,7 +4,8 @@ not.
 Condensing costs one factor of A, once per dt, and a step then one forward and one backward
 substitution; the iterative route costs some tens of products with A every step, and next to nothing
 before. In the plane factors stay sparse, in space they do not; with friction the small dense
-problem grows faster still. What the rule was measured on is in docs/guide/solvers.md."""
+problem grows faster still. What the rule was measured on is in docs/guide/solvers.md.
+"""
 
 import logging
 from collections.abc import Callable
@@ -44,7 +45,8 @@ class Automatic:
     without CHOLMOD), and problems with more contact points (with friction: contact unknowns) than
     4000 in space or 5000 in the plane. ``condensed`` solves all others, and all problems without
     finite elements. The log says which one is used. If ``iterative`` is None, it is Iterative(),
-    which needs PETSc."""
+    which needs PETSc.
+    """
 
     condensed: Solver = field(default_factory=Condensed)
     iterative: Solver | None = None
@@ -119,7 +121,8 @@ def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
 
     Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which
     factorise nothing: these matrices, of mass or of a layer of nodes, are well-conditioned.
-    Volume() for systems that are not symmetric. Collective."""
+    Volume() for systems that are not symmetric. Collective.
+    """
     if not A.algebra.symmetric:
         from .volume import Volume
 

@@ -3,7 +3,8 @@ answer.
 
 An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets
 bodies of very unlike stiffness, is corrected by what it leaves over (``correction``) before it is
-judged."""
+judged.
+"""
 
 from collections.abc import Sequence
 
@@ -32,7 +33,8 @@ ADVICE = "try a smaller dt or another solver, or check the data of this time"
 
 class CertifiedSolver:
     """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing
-    uncertified leaves it."""
+    uncertified leaves it.
+    """
 
     def __init__(
         self,
@@ -73,7 +75,8 @@ class CertifiedSolver:
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
         """Return (result, certificate, escalated) of the first method below tolerance; StepFailure
-        if there is none."""
+        if there is none.
+        """
         refuse_nan(step, lambda: self._problem.equations)
         tried = []
         for rank in range(len(self._solvers)):
@@ -99,7 +102,8 @@ class CertifiedSolver:
 
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
     """Raise InputError for friction without a tangential direction, or of a wrong number of values,
-    and for matrices that are not symmetric unless the owner solves with them. Collective."""
+    and for matrices that are not symmetric unless the owner solves with them. Collective.
+    """
     surface, law = problem.surface, problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(

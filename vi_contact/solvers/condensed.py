@@ -47,7 +47,8 @@ class SmallMethod(Protocol):
         (m,).
 
         What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and
-        ``guess`` (m,)."""
+        ``guess`` (m,).
+        """
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ class Condensed:
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction without a tangential direction, or of a wrong number of
         values, for more contact unknowns than a dense matrix suits, and matrices that are not
-        symmetric unless the methods take them."""
+        symmetric unless the methods take them.
+        """
         surface = problem.surface
         if problem.frictional:
             refuse_dense(
@@ -100,8 +102,10 @@ class Condensed:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedCondensed":
-        """Return what condenses A at its first step, which tells of friction. InputError for too
-        many conditions."""
+        """Return what condenses A at its first step, which tells of friction.
+
+        InputError for too many conditions.
+        """
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 
@@ -169,9 +173,11 @@ class PreparedCondensed:
         )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
-        """Return the answers to the steps that are rows of ``many``; ``own`` makes one. None where
-        this cannot be: on several ranks, without contact unknowns last in the factor, and with
-        other methods than ActiveSet."""
+        """Return the answers to the steps that are rows of ``many``; ``own`` makes one.
+
+        None where this cannot be: on several ranks, without contact unknowns last in the factor,
+        and with other methods than ActiveSet.
+        """
         surface, rubs = self._surface, many.slip0 is not None and self._surface.total > 0
         condensed, small = (self.friction.condensed, None) if rubs else self._normal
         if surface.comm.size > 1 or not isinstance(condensed, Last):

@@ -11,7 +11,8 @@ at every point:
 Its solution is that of the step, exactly, whatever s is, as long as no reaction falls by more than
 its share: q_n >= 0 leaves r_n >= (1 - s) r0_n. But a solver passes through numbers as large as
 A⁻¹Bᵀq, and their round-off is now s times what it was. Where a stiff body rests on a soft one, or
-on nothing but contact, A⁻¹Bᵀr is millions of times x."""
+on nothing but contact, A⁻¹Bᵀr is millions of times x.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -57,7 +58,8 @@ class Share:
 
 def share_of(residual: float) -> float:
     """Return the share of reactions that an answer with this residual gives back, a power of two:
-    it loses no digit."""
+    it loses no digit.
+    """
     return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
 
 
@@ -94,7 +96,8 @@ def added(step: StepProblem, answer: StepResult, found: StepResult, share: float
 
 def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
     """Return 1 - s times the reactions, those outside the cone, or no farther than s from its edge,
-    on its edge: whether they stick or slip, what is missing then lies in the cone of q."""
+    on its edge: whether they stick or slip, what is missing then lies in the cone of q.
+    """
     surface = step.surface
     r_n = np.where(surface.bilateral, answer.r_n, np.maximum(answer.r_n, 0.0))
     if answer.r_t is None or step.slip0 is None:
@@ -116,7 +119,8 @@ def corrected(
     goal: float,
 ) -> tuple[StepResult, Certificate]:
     """Return the result after corrections that brought its certificate to the goal, or as near to
-    it as they got."""
+    it as they got.
+    """
     for _ in range(ROUNDS):
         share = share_of(certificate.worst)
         try:

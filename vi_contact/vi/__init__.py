@@ -7,7 +7,8 @@
 >>> ends = own.dirichletbc(0.0, own.locate_dofs_geometrical(V, lambda x: x[0] % 1.0 == 0.0), V)
 >>> u, v = own.Function(V), ufl.TestFunction(V)
 >>> vi.solve((u.dx(0) * v.dx(0) + 8.0 * v) * ufl.dx, u, lower=-0.5, bcs=[ends]).active  # on the floor, at the ceiling
-(3, 0)"""
+(3, 0)
+"""
 
 from ..core.lazy import lazy
 

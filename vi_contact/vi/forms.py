@@ -1,5 +1,6 @@
 """Read a user's forms, conditions and bounds; evaluate F and its Jacobian on the unknowns that
-nothing clamps."""
+nothing clamps.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -50,7 +51,8 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
 
 def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
     """Return (F, J), the first and second derivative of a functional of u; InputError for
-    others."""
+    others.
+    """
     if not isinstance(energy, ufl.Form) or energy.arguments():
         what = (
             f"a form of rank {len(energy.arguments())}"
@@ -96,7 +98,8 @@ class Problem:
 
     Attributes: constant: whether J is the same at every u, so that the problem is linear. given:
         the values of u before the first step (of a part of the change, see ``aim``), those of
-        ghosts too."""
+        ghosts too.
+    """
 
     def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:
         if energy is None:
@@ -133,12 +136,14 @@ class Problem:
     @property
     def change(self) -> Array:
         """Return the prescribed values less those of the first guess, 0 at free unknowns; ghosts
-        too."""
+        too.
+        """
         return np.where(self._held, self._values - self.given, 0.0)
 
     def put(self, x: Array, left: float = 0.0) -> None:
         """Write the free unknowns into u, and the held ones but for the share ``left`` of their
-        change. Collective."""
+        change. Collective.
+        """
         values = self.u.x.array
         values[self._held] = self._values[self._held]
         if left:
@@ -160,7 +165,8 @@ class Problem:
 
     def places(self) -> Array:
         """Return (n, 4) where the free unknowns are: coordinates as shares of the body's box, and
-        the component as a share of their number. Collective."""
+        the component as a share of their number. Collective.
+        """
         space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
         x = space.tabulate_dof_coordinates()[: self.owned // width]
         low = -self.comm.max(-np.min(x, axis=0, initial=np.inf))
@@ -171,13 +177,15 @@ class Problem:
 
     def put_back(self) -> None:
         """Write the first guess into u, with the held values that it had, as if nothing had been
-        done."""
+        done.
+        """
         self.u.x.array[:] = self.given = self._first
         self._values = self._prescribed
 
     def aim(self, share: float) -> None:
         """Take the present u for the first guess, and as prescribed values those that are so far on
-        the way from the values of the very first guess."""
+        the way from the values of the very first guess.
+        """
         self.given = np.array(self.u.x.array)
         way = self._prescribed - self._first
         self._values = self._prescribed if share == 1.0 else self._first + share * way
@@ -201,7 +209,8 @@ class Problem:
     def linearised(self, left: float) -> tuple[PetscMatrix, Array]:
         """Return (J at u on the free unknowns, what F of these will gain, to first order, by the
         share ``left`` of the change of the held ones); the J that it returned before is freed.
-        Collective."""
+        Collective.
+        """
         gain = np.zeros(np.count_nonzero(self.free))
         if self._jacobian is None or left or not self.constant:
             self.close()
@@ -233,7 +242,8 @@ class Problem:
 
         What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is
         beyond a bound stays as it is, and where lower is above upper the unknown is held at
-        lower."""
+        lower.
+        """
         low, high = self._bound("lower", lower, -np.inf), self._bound("upper", upper, np.inf)
         u, space = (
             np.where(self._held, self._values, self.given)[: self.owned],
@@ -271,7 +281,8 @@ class Problem:
 
     def moves(self, low: Array, high: Array) -> bool:
         """Say whether conditions or bounds change the first guess by more than rounding; after
-        ``bounds``. Collective."""
+        ``bounds``. Collective.
+        """
         x = self.given[: self.owned][self.free]
         most = max(max_abs(self.change), max_abs(x - np.clip(x, low, high)))
         return largest(self.comm, most) > OFF * self.size
@@ -297,5 +308,6 @@ class Problem:
 
 def given_alike(bound: Any) -> Any:
     """Return what of a bound all ranks give alike: numbers and the value of a Constant; of a
-    Function the kind."""
+    Function the kind.
+    """
     return bound.value if isinstance(bound, compat.fem.Constant) else bound

@@ -1,5 +1,6 @@
 """Judge a u: linearise F about it, compute its certificate, and measure by one number how far it is
-from the answer."""
+from the answer.
+"""
 
 import numpy as np
 
@@ -28,7 +29,8 @@ class Judged:
         push: the multipliers (lower, upper), zero where the bound does not act.
         broken: whether something is not a finite number.
         certificate: the relative residuals; all infinite where broken, or while something is
-            ``left``."""
+            ``left``.
+    """
 
     def __init__(self, problem: Problem, lower: Array, upper: Array, left: float = 0.0) -> None:
         self.problem, self.lower, self.upper, self.left = problem, lower, upper, left
@@ -70,7 +72,8 @@ class Judged:
         """Return sum J_ii r², r = x - mid(lower, x - F / J_ii, upper) the natural residual, J_ii
         those of this u.
 
-        It is zero at the answer only. Infinite where F is not a number. Collective."""
+        It is zero at the answer only. Infinite where F is not a number. Collective.
+        """
         with np.errstate(over="ignore", invalid="ignore"):
             r = x - np.clip(x - F / self.diagonal, self.lower, self.upper)
             found = total(self.problem.comm, self.diagonal @ r**2)
@@ -78,7 +81,8 @@ class Judged:
 
     def put(self, x: Array, left: float) -> Array:
         """Write another x into u, and the held unknowns but for ``left``; return the F there, with
-        what it will gain by the rest of their change. Collective."""
+        what it will gain by the rest of their change. Collective.
+        """
         self.problem.put(x, left)
         F = self.problem.residual()
         return F + (left / self.left) * self.gain if left else F

@@ -5,7 +5,8 @@ bounds and |s| not above a radius, in the norm |s|² = sum J_ii s_i². The radiu
 energy falls as the model says and shrinks where it does not, also where the energy at x + s is no
 number. J need not be positive definite: along a direction of negative curvature the step goes to
 the edge of the region. Reference: C.-J. Lin and J. J. Moré, 1999, Newton's method for large
-bound-constrained optimization problems (TRON)."""
+bound-constrained optimization problems (TRON).
+"""
 
 import numpy as np
 
@@ -36,7 +37,8 @@ def minimise(
 ) -> Found:
     """Return where the descent ends: at a point whose certificate is below the tolerance and where
     no direction of negative curvature is found, or with a failure. ``layers``: options of the
-    preconditioner. Collective."""
+    preconditioner. Collective.
+    """
     found = Found(begin(problem, lower, upper), method="trust region")
     while found.best.left and not found.failure:
         carry_conditions(found, layers)
@@ -47,7 +49,8 @@ def minimise(
 
 def carry_conditions(found: Found, layers: OptionLayers) -> None:
     """Take one step that carries Dirichlet conditions and bounds into the body, as far as the
-    energy is a number."""
+    energy is a number.
+    """
     point = found.best
     problem = point.problem
     model = Model(point, layers)

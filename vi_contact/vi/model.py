@@ -4,7 +4,8 @@
 
 First comes the Cauchy step, along the projected direction of steepest descent in the norm above.
 From there conjugate gradients run on the unknowns that are off their bounds, some rounds, as each
-round may bring others onto them."""
+round may bring others onto them.
+"""
 
 from typing import Any
 
@@ -55,12 +56,15 @@ class Model:
 
     def jacobi_step(self) -> float:
         """Return |s| of one step of Jacobi's method between the bounds: a first measure of lengths.
-        Collective."""
+
+        Collective.
+        """
         return self.length(self._projected(-self.F / self.diagonal))
 
     def minimise(self, radius: float) -> tuple[Array, int]:
         """Return (s, iterations of conjugate gradients): q(s) well below that of the Cauchy step.
-        Collective."""
+        Collective.
+        """
         s = self._cauchy(radius)
         residual = self.F + self.J @ s
         first = self._free_size(residual, self._off_bounds(self._projected(0.0 * s)))
@@ -91,7 +95,8 @@ class Model:
         """Return (s, iterations): a step along a direction of negative curvature on the unknowns
         that no bound holds, on the side where the energy is lower; None where conjugate gradients
         find no such direction. Its length is this share of one that, by the curvature, changes the
-        energy by a part of its size. Collective."""
+        energy by a part of its size. Collective.
+        """
         direction, its = self._negative()
         if direction is None:
             return None, its
@@ -115,7 +120,8 @@ class Model:
 
     def curves_down(self) -> bool:
         """Say whether a direction of negative curvature is found on the unknowns that no bound
-        holds. Collective."""
+        holds. Collective.
+        """
         return self._negative()[0] is not None
 
     def _projected(self, s: Array) -> Array:
@@ -133,7 +139,8 @@ class Model:
 
     def _cauchy(self, radius: float) -> Array:
         """A step along the projected direction of steepest descent that brings a part of what the
-        slope promises."""
+        slope promises.
+        """
         start = self._projected(np.zeros_like(self.x))  # zero, unless x lies outside the bounds
         direction = -(self.F + self.J @ start) / self.diagonal
         base = self.value(start)
@@ -151,7 +158,8 @@ class Model:
 
     def _search(self, s: Array, w: Array, residual: Array) -> Array | None:
         """The longest step s + beta w, brought between the bounds, that makes q smaller; None where
-        none does."""
+        none does.
+        """
         base, beta = self.value(s), 1.0
         for _ in range(30):
             trial = self._projected(s + beta * w)
@@ -174,7 +182,8 @@ class Model:
     ) -> tuple[Array, int, bool]:
         """(w, iterations, whether it ended early): w on the free unknowns, J w = -residual or as
         far towards it as the radius allows, counted from x. Directions of negative curvature are
-        followed to the edge (T. Steihaug, 1983)."""
+        followed to the edge (T. Steihaug, 1983).
+        """
         block, precondition = self._block(free)
         dot, D, s0 = self.problem.dot, self.diagonal[free], s[free]
         outside = self.problem.dot(s[~free], self.diagonal[~free] * s[~free])
@@ -211,7 +220,8 @@ class Model:
 
     def _negative(self) -> tuple[Array | None, int]:
         """(A direction of negative curvature of J on the unknowns that no bound holds or None,
-        iterations of conjugate gradients)."""
+        iterations of conjugate gradients).
+        """
         free = (
             self._off_bounds(np.zeros_like(self.x))
             & (self.point.push[0] == 0.0)
@@ -243,7 +253,8 @@ class Model:
 
 class Preconditioner:
     """Apply an approximate inverse of a symmetric matrix, positive definite also where the matrix
-    is not: PETSc's incomplete Cholesky factor, which shifts what would not be."""
+    is not: PETSc's incomplete Cholesky factor, which shifts what would not be.
+    """
 
     def __init__(self, block: PetscMatrix, layers: OptionLayers) -> None:
         self._x, self._y = block.mat.createVecs()
@@ -271,5 +282,6 @@ def _set_up(pc: Any, _layers: OptionLayers) -> None:
 
 def _uneven(places: Array) -> Array:
     """Values between 1/2 and 3/2 at points (n, 4) of the unit box, the last coordinate that of the
-    component: smooth, and of no symmetry."""
+    component: smooth, and of no symmetry.
+    """
     return np.asarray(1.0 + 0.5 * np.sin(1.0 + places @ (GOLDEN * np.array([4.0, 3.0, 2.0, 1.0]))))

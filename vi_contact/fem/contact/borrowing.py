@@ -3,7 +3,8 @@ pictures and fields.
 
 Such a node is held, shared by both sides, or hardly covered: no reaction of its own tells the
 pressure there. The mean of its neighbours on the facets around it is right up to the size of a
-facet, where zero is wrong by all of it."""
+facet, where zero is wrong by all of it.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +18,8 @@ from ...core.algebra import Array, Indices, from_each, largest
 @dataclass(frozen=True, eq=False)
 class Borrowed:
     """Hold nodes of this rank that take the values of others: their numbers (t,), the numbers (q,)
-    of the lenders, of all ranks, and shares (t, q) with rows that sum to one."""
+    of the lenders, of all ranks, and shares (t, q) with rows that sum to one.
+    """
 
     numbers: Indices
     lenders: Indices
@@ -31,7 +33,8 @@ class Borrowed:
 def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
     """Return what nodes ``without`` a pressure of their own borrow of those ``having`` one; None
     where there are none of either. Both are numbers of nodes of any rank, as this rank knows them.
-    Collective."""
+    Collective.
+    """
     # A node has its condition on the rank that owns it: most boundaries end here, and nothing is
     # gathered.
     if not largest(space.comm, len(np.setdiff1d(without, having))):

@@ -13,7 +13,8 @@ first order on facets of second: Puso, Laursen and Solberg, Comput. Methods Appl
 (2008), 555-566). The weights ∫ psi_i = ∫ phi_i are positive, those of first order; a uniform
 pressure p gives r_i = p ∫ phi_i. On a flat facet of area A the integral of psi_i b_k is A / 5 for
 its edges at vertex i and -A / 15 for the other one; on curved ones it is a quadrature on the
-facet."""
+facet.
+"""
 
 from dataclasses import dataclass
 
@@ -41,7 +42,8 @@ OTHERS = np.array(
 class Bubbles(Rows):
     """Hold facets: numbers (k, 3) of their vertices and of the mid-points opposite, and of these
     the unknowns (k, 3, d) of all ranks; outward normals (k, d), ∫ phi_i (k, 3), ∫ psi_i b_k (k, 3,
-    3)."""
+    3).
+    """
 
     vertices: Indices
     middles: Indices
@@ -94,7 +96,8 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
 
 def _integrals(x: Array) -> tuple[Array, Array]:
     """(∫ phi_i (k, 3), ∫ psi_i b_k (k, 3, 3)) of facets with these points of vertices and
-    mid-points (k, 6, 3)."""
+    mid-points (k, 6, 3).
+    """
     place, weight = np.polynomial.legendre.leggauss(POINTS)
     s, t = (one.ravel() for one in np.meshgrid(0.5 + 0.5 * place, 0.5 + 0.5 * place, indexing="ij"))
     weights = (
@@ -125,7 +128,8 @@ def averaged(
     with ``share``, share times c_ik.
 
     Where a node has several conditions each facet belongs to the one with the normal nearest to its
-    own. Collective. InputError for a mid-point that is held while an end of its edge is free."""
+    own. Collective. InputError for a mid-point that is held while an end of its edge is free.
+    """
     if space.hierarchy is None:
         return ()
     found = _bubbles(space, space.hierarchy, facets, share is not None)

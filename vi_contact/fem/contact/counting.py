@@ -1,5 +1,6 @@
 """Count the nodes of a contact boundary by what became of them: the `Census` of a contact
-surface."""
+surface.
+"""
 
 import logging
 from collections.abc import Mapping
@@ -44,7 +45,8 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
 
 def tell(comm: Comm, census: Census) -> None:
     """Log, on rank 0, what became of the nodes of a boundary, where not all are plain contact
-    points."""
+    points.
+    """
     if census.places and comm.rank == 0:
         log.info("contact on '%s': %s", census.name, census.in_words())
 

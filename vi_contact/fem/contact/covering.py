@@ -16,7 +16,8 @@ and on the partly covered facet these nodes get D_k = sum_t E_tk D_t and the fun
 so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a uniform pressure passes
 through exactly, forces and moments of both sides are in balance, and every pressure is one over a
 patch that is covered. Badia, Verdugo and Martín, Comput. Methods Appl. Mech. Engrg. 336 (2018),
-533-553 carry displacements on in the same way."""
+533-553 carry displacements on in the same way.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,7 +40,8 @@ class Covered:
     Attributes: facets: (k, v) their nodes; middles: (k, d) middles of their covered parts. weights,
         full: (k, v) integrals of the functions of their nodes, over the covered part and over all
         of it. inside: (k, v) nodes that are in front of side 2 themselves; parts: (k,) covered
-        shares of the facets. common: (m,) nodes of side 1 that are nodes of side 2 too."""
+        shares of the facets. common: (m,) nodes of side 1 that are nodes of side 2 too.
+    """
 
     facets: Indices
     middles: Array
@@ -58,7 +60,8 @@ class Covered:
     @property
     def share(self) -> Array:
         """Return the covered share (m,) of the facets of each node beyond the edge, 1 for all other
-        nodes."""
+        nodes.
+        """
         full = self.sums(self.full)
         share = self.sums(self.weights) / np.where(full > 0.0, full, 1.0)
         beyond = (full > 0.0) & (self.sums(self.inside.astype(float)) == 0.0)
@@ -68,7 +71,8 @@ class Covered:
 @dataclass(frozen=True, eq=False)
 class Carried:
     """Say which nodes (m,) of side 1 are carried, by the nodes (k, v) of which facet on each
-    covered facet, and which facets (k,) are used at all."""
+    covered facet, and which facets (k,) are used at all.
+    """
 
     nodes: Mask
     by: Indices
@@ -79,7 +83,8 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
     """Return the nodes that are carried of those ``asked`` for (m,), by the facets whose middle is
     the nearest.
 
-    None is where there is no whole facet to carry them, and none of a facet at a weld."""
+    None is where there is no whole facet to carry them, and none of a facet at a weld.
+    """
     facets, common = covered.facets, covered.common
     nodes = asked.copy()
     nodes[facets[common[facets].any(axis=1)]] = False
@@ -103,7 +108,8 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
 
 def extrapolation(corners: Array, points: Array) -> Array:
     """Return E (k, p, v): what each of the corners (k, v, c) of facets counts at points (k, p, c),
-    linearly."""
+    linearly.
+    """
     middle = corners.mean(axis=1, keepdims=True)
     size = np.abs(corners - middle).max(axis=(1, 2))[:, None, None]
     known, wanted = (
@@ -119,7 +125,8 @@ def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
     [m], [m²].
 
     A linear function that is positive at one node of a facet and beyond is negative at the other:
-    where much is carried far this one would be pulled."""
+    where much is carried far this one would be pulled.
+    """
     own = covered.sums(covered.weights)
     light = ~(carried.nodes | covered.common) & (own > 0.0) & (weights < LEAST_WEIGHT * own)
     found = np.zeros(len(own), dtype=bool)
@@ -135,7 +142,8 @@ def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
 class Coupled:
     """Hold D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node,
     the carried nodes (m,), which have no row in either, and the covered share (m,) of the facets of
-    each node."""
+    each node.
+    """
 
     D: Array
     M: sp.csr_matrix
@@ -148,7 +156,8 @@ def coupled(
     covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
 ) -> Coupled:
     """Return the coupling in which whole facets carry the nodes that have little covered, as far as
-    they can."""
+    they can.
+    """
     share = covered.share
     asked = share < LEAST_SHARE
     while True:

@@ -10,7 +10,8 @@ side 2, estimated from how its facets turn, that is
     q(w, X) = sum_i w_i x_i·H x_i - x·H x,   x = sum_i w_i x_i
 
 with the shape functions lambda and mu at a point. Plane sides have H = 0 and sides with the same
-facets delta = 0: they may overlap by round-off only."""
+facets delta = 0: they may overlap by round-off only.
+"""
 
 import numpy as np
 
@@ -35,7 +36,8 @@ def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
     turning only, so that theirs is doubled.
 
     Args: corners: (k, v, d) of the facets; facets: (k, v) their nodes; normals: (k, d) outward unit
-        normals."""
+        normals.
+    """
     nodal, rim = _nodal_normals(facets, normals)
     x = corners - corners.mean(axis=1, keepdims=True)
     n = nodal - nodal.mean(axis=1, keepdims=True)
@@ -48,7 +50,8 @@ def left_out(H: Array, weights: Array, corners: Array) -> Array:
     """Return q (k, p): twice the distance of a curved face from a facet, at points.
 
     Args: H: (k, d, d); weights: (k, p, v) shape functions at the points; corners: (k, v, d) of the
-        facet."""
+        facet.
+    """
     x = corners - corners.mean(axis=1, keepdims=True)
     nodal = np.einsum("kvi,kij,kvj->kv", x, H, x)
     points = weights @ x
@@ -63,14 +66,16 @@ def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) ->
 
     Args: H: (k, d, d) of side 2 at each piece; one, two: shape functions (k, p, v) at the points
         and corners (k, v, d) of
-            the facets of side 1 and side 2."""
+            the facets of side 1 and side 2.
+    """
     delta = 0.5 * (left_out(H, *two) - left_out(H, *one))
     return np.asarray(MARGIN * np.abs(delta).max(axis=1, initial=0.0))
 
 
 def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
     """Normals (k, v, d) of smooth faces at the nodes of their facets, and which facets (k,) are at
-    a rim of a face."""
+    a rim of a face.
+    """
     k, v = facets.shape
     node, facet = facets.ravel(), np.repeat(np.arange(k), v)
     sums, alone = normals[facet].copy(), np.ones(k * v, dtype=bool)
@@ -93,7 +98,8 @@ def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
 
 def _at_border(facets: Indices) -> Mask:
     """Return which facets have a node on the outline of their side: in space, an edge of one facet
-    only."""
+    only.
+    """
     if facets.shape[1] == 2:
         return np.zeros(len(facets), dtype=bool)  # there a node of one facet only, which is alone
     edges = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)

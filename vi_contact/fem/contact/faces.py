@@ -4,7 +4,8 @@ normal a face.
 Facets round a node are one face there as long as each turns by no more than the angle from another
 one of them. A smooth node has one face, a node at an edge two, at a corner in space three. Normal
 and weight of a face at a node are those of the facets of this face. Facets are gathered on every
-rank only round nodes where they may turn so far."""
+rank only round nodes where they may turn so far.
+"""
 
 import logging
 from dataclasses import dataclass, replace
@@ -39,7 +40,8 @@ class Boundary:
 
     Attributes: vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, v,
         d) outward there, unit ones. local: this rank's facets of the group; place: their numbers
-        among the k."""
+        among the k.
+    """
 
     vertices: Indices
     normals: Array
@@ -48,7 +50,8 @@ class Boundary:
 
     def corner_faces(self, angle: float) -> Indices:
         """Number the faces (k, v) that each facet belongs to round each of its nodes, all nodes
-        apart."""
+        apart.
+        """
         node = self.vertices.ravel()
         normals = self.normals.reshape(-1, self.normals.shape[2])
         order = np.argsort(node, kind="stable")
@@ -82,7 +85,8 @@ def checked_angle(owner: str, value: Any) -> float:
 
 def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) -> Boundary:
     """Gather the facets of a group; with the angle ``beyond`` only those round nodes where some may
-    turn by more than it from others: of a smooth boundary none. Collective."""
+    turn by more than it from others: of a smooth boundary none. Collective.
+    """
     mesh, local = space.mesh, np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
     vertices, plane = space.corners_of_facets(local), outward(mesh, local, geometry)
@@ -107,7 +111,8 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
 def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -> Indices:
     """Numbers of the nodes, the same on every rank, whose facets have normals in too large a box
     for all to be within the angle of one another. Of nodes that other ranks own every rank tells
-    the box of those facets that it holds."""
+    the box of those facets that it holds.
+    """
     every = normals.reshape(-1, normals.shape[2])
     numbers, low, high = _boxes(vertices.ravel(), every, every)
     away = ~np.isin(numbers, space.nodes)
@@ -149,7 +154,8 @@ def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
     of their vertices.
 
     At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices
-    around."""
+    around.
+    """
     x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][
         :, :, : space.dimension
     ]
@@ -181,7 +187,8 @@ def _turn(one: Array, other: Array) -> Array:
 
 def integrals(space: FemSpace, indices: Any) -> Array:
     """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets; in a hierarchy those of
-    the vertices, which are of first order. Collective."""
+    the vertices, which are of first order. Collective.
+    """
     mesh, d = space.mesh, space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
     V, blocks = (space.V, slice(None)) if space.hierarchy is None else space.hierarchy.vertices
@@ -201,7 +208,8 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
     """Return (nodes, at corners one for each face with its normal and weight; a facet of the face,
     -1 elsewhere).
 
-    ``nodes``: of this rank or of all, the order is kept. Collective."""
+    ``nodes``: of this rank or of all, the order is kept. Collective.
+    """
     if not len(around.vertices):
         return nodes, np.full(len(nodes.numbers), -1)
     corners, labels = (
@@ -236,7 +244,8 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
     face.
 
     Facets are sorted into classes, in which those at one node are all of one face, and each class
-    is integrated."""
+    is integrated.
+    """
     corners = np.unique(pairs[:, 0])
     classes, row_of = _classes(around.vertices, labels, corners), np.full(int(labels.max()) + 1, -1)
     row_of[pairs[:, 1]] = np.arange(len(pairs))
@@ -253,7 +262,8 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
 
 def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
     """Class (k,) of every facet at a corner, -1 for others; facets of different faces at a node
-    differ in class."""
+    differ in class.
+    """
     classes = np.full(len(vertices), -1, dtype=np.int64)
     at_corner = np.isin(vertices, corners)
     around: dict[int, list[tuple[int, int]]] = {int(node): [] for node in corners}
@@ -279,7 +289,8 @@ def in_symmetry_planes(normals: Array, held: Mask) -> Array:
     by little.
 
     On a symmetry plane the true normal lies in the plane; that of the facets on one side of it
-    leans to that side."""
+    leans to that side.
+    """
     inside = np.where(held, 0.0, normals)
     length = np.linalg.norm(inside, axis=1)[:, None]
     return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))

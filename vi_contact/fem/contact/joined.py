@@ -1,5 +1,6 @@
 """Join several contact surfaces of one system: more than one pair of bodies, pairs and obstacles,
-corners."""
+corners.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -27,7 +28,8 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
 
     Raises: InputError: surfaces of different systems; directions of a node that are parallel (a
         boundary or a pair listed
-            twice) or depend on one another; a node on side 1 of one pair and side 2 of another."""
+            twice) or depend on one another; a node on side 1 of one pair and side 2 of another.
+    """
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if (
         not made
@@ -79,7 +81,8 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
 
 def _slide(made: Sequence[FemSurface]) -> Motion | None:
     """The slides of all conditions, those of nodes with several along the vectors that are left to
-    them."""
+    them.
+    """
     joined = _joined(
         [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made]
     )

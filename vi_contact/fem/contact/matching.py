@@ -1,7 +1,8 @@
 """Find the nodes of side 2 that a contact node of side 1 faces: u_2 at the point opposite node s is
 sum_j P_sj u_j.
 
-The rows of P sum to one, so that a common translation of both bodies opens and closes nothing."""
+The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -31,7 +32,8 @@ class Side:
     of their places.
 
     ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all
-    components, -1 for others. None: there are no such nodes."""
+    components, -1 for others. None: there are no such nodes.
+    """
 
     name: str
     nodes: Nodes
@@ -41,7 +43,8 @@ class Side:
 
 def common_nodes(one: Side, two: Side) -> Indices:
     """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a
-    weld, or tied to one of side 2, which is the same; -1 for others."""
+    weld, or tied to one of side 2, which is the same; -1 for others.
+    """
     places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
     places[own] = others
@@ -58,7 +61,8 @@ class Matched:
         front of side 2, where the node itself is not; 1 for
             all others, and by default.
         carried: rows of further nodes whose shares those of others contain, so that they have no
-            condition."""
+            condition.
+    """
 
     rows: Indices
     P: sp.csr_matrix
@@ -100,7 +104,8 @@ class NodeToNode:
     next node of side 1. Of several nodes at one place, of bodies that meet there, the partner is
     the one whose facets lie in front of all facets of the node. InputError where there is none, as
     for a stone on two stones, for nodes without a partner, two nodes with the same one, and sides
-    that do not face each other."""
+    that do not face each other.
+    """
 
     tolerance: float = BESIDE
 
@@ -190,7 +195,8 @@ def _opposite(
 
     Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the
     normal, infinite for none; whether all that are there face away; where several are about as
-    near)."""
+    near).
+    """
     offset = two.points[places] - one.points[:, None, :]
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
@@ -215,7 +221,8 @@ def _opposite(
 
 def _refuse_several(one: Side, two: Side, row: int) -> None:
     """Raise InputError for a node of side 1 that faces several nodes of side 2, each with a part of
-    what it faces."""
+    what it faces.
+    """
     where = (
         f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of "
         f"'{two.name}' at one place"
@@ -242,7 +249,8 @@ def refuse_same_way(one: str, two: str, point: Array) -> None:
 
 def _spacing(points: Array, size: float) -> Array:
     """Distance of each node to the next one of the same side that is not at its place [m]; the size
-    of the mesh for a single node."""
+    of the mesh for a single node.
+    """
     if len(points) == 1:
         return np.array([size])
     from scipy.spatial import cKDTree

@@ -9,7 +9,8 @@ Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j
 so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0 is the condition,
 friction acts on ǔ_t, and the work of a reaction on ǔ is that of the pair of forces r on side 1 and
 -P_sjᵀ r on side 2: action is reaction. n is the outward normal of side 1, from side 1 to side 2.
-Displacements are small: nobody's partner changes."""
+Displacements are small: nobody's partner changes.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -85,7 +86,8 @@ def contact_pair(
     Raises: InputError: nodes that only glue two bodies together, sides that do not pair or do not
         face each other, bodies
             that overlap, sides of one and the same boundary, contact directions that are partly
-            prescribed, clamped nodes that face free ones."""
+            prescribed, clamped nodes that face free ones.
+    """
     space = contact_space(
         "contact_pair",
         system,
@@ -183,7 +185,9 @@ def contact_pair(
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
     """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers.
-    Collective."""
+
+    Collective.
+    """
     nodes = everywhere(space.comm, nodes_on(space, facets))
     rows = np.concatenate(
         space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices)))
@@ -194,7 +198,8 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
     """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers
-    of those in front of side 2, and of those that are clamped."""
+    of those in front of side 2, and of those that are clamped.
+    """
     numbers = one.nodes.numbers
     return {
         "shared by both sides": shared,
@@ -224,7 +229,9 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
 
 def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
     """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved.
-    Collective."""
+
+    Collective.
+    """
     sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
     moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
@@ -234,7 +241,8 @@ def _watched(
     space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
     """What watches nodes of side 1, given of all ranks, that are held in every component in front
-    of others that are. Collective."""
+    of others that are. Collective.
+    """
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
     nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
@@ -252,7 +260,8 @@ def _borrowed(
     space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
     """What nodes of side 1 without a pressure of their own take of neighbours, not those in front
-    of nothing."""
+    of nothing.
+    """
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
     ]
@@ -261,7 +270,8 @@ def _borrowed(
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
     """Return which nodes of side 1 only glue bodies together; InputError unless they are
-    ``allowed``. Collective."""
+    ``allowed``. Collective.
+    """
     numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
     found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
@@ -278,7 +288,8 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
 def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
     """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all
     components; of several, as where ties meet, the nearest; -1 for others. They cannot part, as the
-    two sides of a weld."""
+    two sides of a weld.
+    """
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
@@ -306,7 +317,8 @@ def _refuse_common(one: Side, two: Side) -> None:
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
     """Return the smooth faces of side 1, with normals and weights of their own, and the nodes' over
-    the whole side."""
+    the whole side.
+    """
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
@@ -339,7 +351,8 @@ def _by_face(
     ``carried`` are numbers of nodes then.
 
     Faces in front of nothing are left out where the matching leaves out parts of sides, unless all
-    are."""
+    are.
+    """
     refusal, found = None, []
     for side, mean in faces:
         try:
@@ -375,7 +388,8 @@ def _by_face(
 def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
     """What a face of side 1 faces: along its own normals or, since across a gap the partner of a
     corner lies on the bisector, along the ``mean`` normals of its nodes; not where a matching
-    leaves out what faces nothing: sides of a block would see the ground beside its base."""
+    leaves out what faces nothing: sides of a block would see the ground beside its base.
+    """
     try:
         return matching.match(side, two, size)
     except InputError:
@@ -390,7 +404,8 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
     """Return what is matched and not clamped; InputError for clamped nodes facing free ones, or
-    with none left."""
+    with none left.
+    """
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
@@ -414,7 +429,8 @@ def _gap(
     space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
     """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of
-    polygons count as 0."""
+    polygons count as 0.
+    """
     gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:

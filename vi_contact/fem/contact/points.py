@@ -1,5 +1,6 @@
 """Make contact conditions of listed nodes: of a user's own matrices, where nothing is known of
-facets."""
+facets.
+"""
 
 from typing import Any
 
@@ -50,7 +51,8 @@ def contact_points(
             gap0 - (u - u_opp)·n.
     Raises: InputError: a system of another kind, nodes that do not exist, normals of no length or
         along components that
-            stand still, gaps below zero, directions of one node that depend on one another."""
+            stand still, gaps below zero, directions of one node that depend on one another.
+    """
     instance(
         OWNER,
         "system",

@@ -3,7 +3,8 @@ plane.
 
 A facet of side 1 is seen along the normal of each of its nodes; where all nodes have its normal, on
 plane sides, they look at once. What a look shares with the facets in front of it is cut out; of
-several layers the nearest counts."""
+several layers the nearest counts.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -30,7 +31,8 @@ PAIRS = 2**18  # of pieces that are cut at once
 @dataclass(frozen=True, eq=False)
 class Facets:
     """Hold the facets of a side: rows of nodes (k, v), corners (k, v, 3), middles, outward normals,
-    and the largest distance of a corner from the middle."""
+    and the largest distance of a corner from the middle.
+    """
 
     nodes: Indices
     corners: Array
@@ -41,7 +43,8 @@ class Facets:
 
 def facets_of(side: Side, sense: int) -> Facets:
     """Return the facets of a side, anticlockwise (sense 1) or clockwise (-1) seen from outside;
-    InputError for slivers and for quadrilaterals that are not convex."""
+    InputError for slivers and for quadrilaterals that are not convex.
+    """
     nodes = np.sort(side.facets, axis=1)
     corners = side.nodes.points[nodes]
     middles = corners.mean(axis=1)
@@ -78,7 +81,8 @@ class Looks(Rows):
         (k, v) each is seen. normals: along which they are seen; frames: two unit vectors (k, 3, 2)
         beside that; slant: its cosine to the
             facet's own normal, the share of the area that is seen.
-        polygons: the facets as they are seen (k, v, 2), from their middles."""
+        polygons: the facets as they are seen (k, v, 2), from their middles.
+    """
 
     nodes: Indices
     middles: Array
@@ -118,7 +122,8 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
 @dataclass(frozen=True, eq=False)
 class Pieces(Rows):
     """Hold what looks share with facets of side 2: numbers of both, polygons (k, m, 2), the facet
-    as it is seen (k, v, 2), and its height h along the look, h_0 + h_1 x + h_2 y."""
+    as it is seen (k, v, 2), and its height h along the look, h_0 + h_1 x + h_2 y.
+    """
 
     look: Indices
     facet: Indices
@@ -143,7 +148,8 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
     """Return what these looks share with these facets of side 2, where they face each other and
-    share something."""
+    share something.
+    """
     offset, normals = theirs.middles[facet] - looks.middles[look], looks.normals[look]
     away = np.linalg.norm(offset - np.sum(offset * normals, axis=1)[:, None] * normals, axis=1)
     slope = np.sum(theirs.normals[facet] * normals, axis=1)
@@ -163,7 +169,8 @@ def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Piece
 
 def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     """Return (what looks share with the facets of side 2 that are nearest in front of them, share
-    of each covered); ``tree``: of the middles of the facets of side 2."""
+    of each covered); ``tree``: of the middles of the facets of side 2.
+    """
     k, size = len(looks.nodes), areas(looks.polygons)
     found, radius = nearby(looks, theirs, tree)
     sure = complete(found, looks, theirs, radius)
@@ -181,7 +188,8 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
 def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     """Return (what looks share with facets of side 2 in a ball around each, the balls' radii [m]):
     large enough for the facets next to the one with the nearest middle; where it holds too many
-    nothing is looked at."""
+    nothing is looked at.
+    """
     radius = (tree.query(looks.middles)[0] + looks.reach + float(theirs.reach.max())) * (
         1.0 + WHOLE
     )
@@ -197,7 +205,8 @@ def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask
 
     Where one layer, at most h away along the normal, covers all of a look, a nearer facet has its
     middle at most h along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 +
-    reach_2)²) of the look's middle."""
+    reach_2)²) of the look's middle.
+    """
     covered, farthest = (
         np.bincount(found.look, areas(found.polygons), len(radius)),
         np.zeros(len(radius)),
@@ -210,7 +219,8 @@ def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask
 
 def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
     """Yield what these rows of looks share with any facet of side 2, without those whose normal
-    misses a ball around all of it."""
+    misses a ball around all of it.
+    """
     middle = 0.5 * (theirs.middles.min(axis=0) + theirs.middles.max(axis=0))
     span = (
         looks.reach
@@ -235,7 +245,8 @@ def beside(looks: Looks, rows: Indices, points: Array) -> Array:
 
 def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
     """Return how many parts without a common node the pieces in front of each look are of: one may
-    hide another."""
+    hide another.
+    """
     nodes = pieces.look[:, None] * (int(theirs.nodes.max()) + 1) + theirs.nodes[pieces.facet]
     nodes = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape)
     links = np.repeat(np.arange(len(nodes)), nodes.shape[1]), len(nodes) + nodes.ravel()

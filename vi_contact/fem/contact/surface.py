@@ -1,5 +1,6 @@
 """Make contact conditions of facets of a mesh: nodal normals, weights, gaps and the rotated
-basis."""
+basis.
+"""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -67,7 +68,8 @@ def contact_surface(
     Raises: InputError: no contact nodes, nodes that only glue two bodies together, a listed point
         that is clamped or not on
             the facets, a contact direction that is partly prescribed, initial penetration, a node
-            with more faces than the body has dimensions."""
+            with more faces than the body has dimensions.
+    """
     space = contact_space(
         "contact_surface",
         system,
@@ -135,7 +137,8 @@ def contact_surface(
 
 def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
     """Return ``motion`` and ``slide`` of this rank's conditions where what they face, or bubbles
-    are measured from, is moved. Collective."""
+    are measured from, is moved. Collective.
+    """
     parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
     moves = bool(parts) and any(condition.moves for condition in space.prescribed)
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
@@ -150,7 +153,8 @@ def moved_by_held(
 ) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function that tells how far nodal displacements (k, d) of held components move the
     obstacles of these conditions towards their nodes, (m,), and along their tangents, (m, d-1).
-    Both are collective."""
+    Both are collective.
+    """
     frames, free = (
         NodalFrames(*given(conditions)),
         ~joined_nodes([one.nodes for one in conditions]).held,
@@ -190,7 +194,8 @@ def _obstacle(
     obstacle: Obstacle | None, size: float, name: str, angle: float, count: int
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
     """What an obstacle answers: directions and initial gaps at points with these normals, of all
-    ``count`` of a boundary or of those of a rank."""
+    ``count`` of a boundary or of those of a rank.
+    """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         if not len(points):  # users' functions need not cope with none
@@ -209,7 +214,8 @@ def _watched(
 ) -> tuple[Watched, ...]:
     """What watches nodes of this rank that are prescribed in every component, at each of their
     faces that looks towards the obstacle. InputError where such a face is in the obstacle at the
-    start. Collective."""
+    start. Collective.
+    """
     slots = slots_of(space.comm, nodes.numbers)
     directions, gap = asked(
         space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals
@@ -222,7 +228,8 @@ def _looking(
     obstacle: Obstacle | None, size: float
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
     """What an obstacle answers at points with these normals, directions of zero where they do not
-    lead out of the body or the obstacle has no answer."""
+    lead out of the body or the obstacle has no answer.
+    """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         directions, gap = np.zeros_like(points), np.zeros(len(points))
@@ -255,7 +262,8 @@ def _rows_of(nodes: Nodes, chosen: Indices) -> Indices:
 
 def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
     """What orders the conditions of all ranks: the numbers of their nodes, or their places in a
-    list of nodes."""
+    list of nodes.
+    """
     if chosen is None:
         return nodes.numbers
     order = np.argsort(chosen)
@@ -268,7 +276,8 @@ def one_per_direction(
     """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights
     added, smaller gap.
 
-    ``whole``: the nodes with the weights of all their faces."""
+    ``whole``: the nodes with the weights of all their faces.
+    """
     if len(nodes.numbers) == len(whole.numbers):
         return nodes, directions, gap
     weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
@@ -297,7 +306,8 @@ def contact_space(
     owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any, **others: Any
 ) -> FemSpace:
     """Return the space of a system; InputError for another kind, groups of another mesh, and a list
-    of no points, and where ranks give other ``groups``, ``points`` or ``others``. Collective."""
+    of no points, and where ranks give other ``groups``, ``points`` or ``others``. Collective.
+    """
     space = space_of(owner, system)
     agree(space.comm, owner, {**groups, "points": points, **others})
     for meaning, group in groups.items():
@@ -352,7 +362,8 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
 
 def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
     """Return the numbers of those nodes, given of all ranks, that are nearest to the listed points,
-    in their order."""
+    in their order.
+    """
     rows = []
     for point in points:
         x = np.asarray(point, dtype=float)
@@ -396,7 +407,8 @@ def merged(
     means with shares by weight.
 
     InputError for a node that is tied in some components only, or to one without such a
-    condition."""
+    condition.
+    """
     leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
     for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
         alike = np.flatnonzero(nodes.numbers == leaders[row])
@@ -431,7 +443,9 @@ def with_ties(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float
 ) -> Any:
     """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``.
-    Collective."""
+
+    Collective.
+    """
     tied = np.isin(nodes.numbers, space.tied_nodes)
     parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
     every, (n, g) = (

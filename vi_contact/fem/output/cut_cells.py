@@ -3,7 +3,8 @@ of their facets.
 
 They are cut as simplices, a quadrilateral as the 2 triangles and a hexahedron as the 6 tetrahedra
 round a diagonal, in which nodal values are taken for linear: exact for linear fields on cells with
-parallel sides."""
+parallel sides.
+"""
 
 from collections.abc import Callable
 from itertools import permutations
@@ -32,7 +33,8 @@ def work_beyond(
 
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not
     positive. ``motion``: points (k, d) -> virtual displacements (motions, k, d), linear in them;
-    ``density``: one for all or one of each local cell. Collective."""
+    ``density``: one for all or one of each local cell. Collective.
+    """
     d = space.dimension
     cells, nodes = _entities(
         space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None
@@ -71,7 +73,8 @@ def work_beyond(
 
 def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
     """(cells, geometry nodes) of the crossed cells of this rank, or the nodes of those outer facets
-    beside them."""
+    beside them.
+    """
     dim, owned = mesh.topology.dim, mesh.topology.index_map
     if facets is None:
         cells = np.flatnonzero(crossed[: owned(dim).size_local])
@@ -85,7 +88,8 @@ def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
 
 def simplices(vertices: int, dimension: int) -> Array:
     """Return (k, n, vertices) shares of the vertices in the corners of the simplices that make up a
-    cell."""
+    cell.
+    """
     paths = [range(vertices)]
     if vertices > dimension + 1:  # from the first vertex to the last along the axes, in every order
         paths = [
@@ -97,7 +101,8 @@ def simplices(vertices: int, dimension: int) -> Array:
 def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
     """Return (shares of the vertices in corners (p, n, v), entity (p,)) of simplices: what of the
     simplices ``whole`` (k, n, v) of each entity lies where the level of its vertices (entities, v),
-    linear in them, is not positive."""
+    linear in them, is not positive.
+    """
     owner = np.repeat(np.arange(len(level)), len(whole))
     corners = np.tile(whole, (len(level), 1, 1))
     corners = np.concatenate(

@@ -6,7 +6,8 @@ ParaView can open it at any moment, also while the run goes on or after it was k
 the files depends on the number of ranks.
 
 What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all
-closed nodes stick."""
+closed nodes stick.
+"""
 
 import logging
 import os
@@ -45,11 +46,13 @@ class VonMises:
     dev(sigma).
 
     Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without
-    viscous stresses."""
+    viscous stresses.
+    """
 
     def __init__(self, forms: Any) -> None:
         """``forms``: the ElasticForms of a system, whose constants carry the thickness as a
-        factor."""
+        factor.
+        """
         import ufl  # late, as compat: frames of own matrices need no DOLFINx
 
         from .. import compat
@@ -95,8 +98,9 @@ _RUBBING = ("contact_traction_t", "slip")
 
 @dataclass(frozen=True)
 class XDMF:
-    """Write a frame every so many steps, and one of the initial state. InputError unless both
-    numbers are >= 1.
+    """Write a frame every so many steps, and one of the initial state.
+
+    InputError unless both numbers are >= 1.
 
     ``frames_per_file``: each time so many frames have files of their own they are put into one:
     some systems want few.
@@ -112,7 +116,9 @@ class XDMF:
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
     ) -> "FrameWriter":
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder.
-        Collective."""
+
+        Collective.
+        """
         space = problem.system.space
         if isinstance(space, MatrixSpace):
             cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
@@ -124,7 +130,8 @@ class XDMF:
 @dataclass(frozen=True)
 class Cells:
     """Hold the cells of a frame: XDMF's name of them, nodes of the owned ones, their numbers, and
-    their stress."""
+    their stress.
+    """
 
     kind: str
     nodes: Indices
@@ -193,7 +200,9 @@ class FrameWriter:
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
         """Write a frame of state, acceleration of its step (both in the rotated basis) and report.
-        Collective."""
+
+        Collective.
+        """
         problem, space = self._problem, self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)
@@ -299,7 +308,8 @@ class FrameWriter:
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
     """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of
     several faces of a node the pressure of the one that is pressed most, and the highest status.
-    Collective."""
+    Collective.
+    """
     space, blocks = cast(NodalSpace, problem.system.space), blocks_of_conditions(problem)
     surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
@@ -319,7 +329,8 @@ def blocks_of_conditions(problem: ContactProblem) -> Indices:
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:
     """Return nodal values (k, c), where conditions are those of vertices only with those of the
     mid-points of contact facets: linear from end to end, zero at ends without a condition, so that
-    ∫ p = sum r_n. Collective."""
+    ∫ p = sum r_n. Collective.
+    """
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:
         return nodal

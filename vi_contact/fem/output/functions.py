@@ -8,7 +8,8 @@ and Q2 one degree higher. The contact pressure r_n / weight is nodal, zero off t
 of several faces of a node it is that of the one which is pressed most. Nodes of the contact
 boundary without a condition (held ones, and those that both sides share) and those that are hardly
 covered take the mean of their neighbours on its facets: there ∫ p is more than the sum of
-reactions."""
+reactions.
+"""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -48,7 +49,8 @@ def as_function(
     ``state``: of simulate, march, static_equilibrium or quasi_static of this problem.
     ``continuous``: the stress projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau.
     Every call makes a Function of its own. Collective. InputError for a state of another problem,
-    and a system without a mesh."""
+    and a system without a mesh.
+    """
     space = _checked("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
@@ -66,7 +68,8 @@ def as_function(
 
 def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
     """Return nodal contact pressures (k, 1) in which the nodes of contact boundaries that have none
-    of their own take the mean of those of their neighbours (``contact.borrowing``). Collective."""
+    of their own take the mean of those of their neighbours (``contact.borrowing``). Collective.
+    """
     space, surface = space_of("contact_pressure", problem.system), problem.surface
     blocks = blocks_of_conditions(problem)
     told = np.zeros(len(space.nodes), dtype=bool)
@@ -96,7 +99,8 @@ def read_function(
 
     ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the
     last. The run may have had any number of ranks. Collective. InputError for a time without a
-    frame, and fields of another mesh."""
+    frame, and fields of another mesh.
+    """
     space = _checked("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
     optional(
@@ -142,7 +146,8 @@ def _function(
     problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False
 ) -> Any:
     """The Function of values at the owned nodes, (k,) or (k, d), at a time; the stress is that of
-    displacements."""
+    displacements.
+    """
     system, space = problem.system, space_of(name, problem.system)
     V = (
         system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
@@ -170,7 +175,8 @@ def _blocks(of: Any, among: Any) -> Indices:
 
 class Stress:
     """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate
-    gradients."""
+    gradients.
+    """
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
         d, degree = (

@@ -21,7 +21,8 @@ class LargestStrain:
     gamma² = 2 dev(eps):dev(eps) of the mean eps of a cell, in the plane of the body or in space: in
     the plane the difference of the principal strains, in simple shear gamma_xy. Strains of the
     start, of gravity say, do not count. InputError for a run that is continued, and for a body on a
-    line."""
+    line.
+    """
 
     values: Array
 

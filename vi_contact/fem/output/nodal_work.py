@@ -4,7 +4,8 @@ the forces.
 The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these
 cells alone, with a the absolute acceleration and f their loads. For a nodal field r, rᵀq is a
 number, and as K, C, M are symmetric it is (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products
-a step, however many cells there are."""
+a step, however many cells there are.
+"""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -52,7 +53,8 @@ class NodalWork:
     Args: owner: what is recorded, for messages. problem: its system is made by ``fem.assemble``;
         InputError otherwise. loads: those given to ``fem.assemble``: what acts on cells of the
         group belongs to their balance. gravity: acceleration (d,) [m/s²] of ``with_weight``, which
-        acts on the mass of the cells."""
+        acts on the mass of the cells.
+    """
 
     def __init__(
         self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None
@@ -103,7 +105,8 @@ class NodalWork:
 
     def _tell_constant_loads(self, owner: str) -> None:
         """Warn when the system has constant loads and none were given: who forgets the weight
-        measures reactions that do not carry it. Collective."""
+        measures reactions that do not carry it. Collective.
+        """
         system, space = self._problem.system, self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
         if (
@@ -173,7 +176,8 @@ class NodalWork:
 
     def at_rest(self, state: State) -> Array:
         """Return the work of a state without acceleration, (count,): a static one, or the start of
-        a run."""
+        a run.
+        """
         problem, space, t = self._problem, self.space, state.t
         motion = [
             space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))
@@ -187,7 +191,8 @@ class NodalWork:
         accelerations, (count,).
 
         Loads, prescribed and ground motion are taken between the ends of the step where the balance
-        has its u."""
+        has its u.
+        """
         problem, space, balance = self._problem, self.space, report.balance
         late, t0, t1 = self._place(report), report.old.t, report.new.t
 
@@ -216,7 +221,8 @@ class NodalWork:
         self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance
     ) -> Array:
         """The numbers for nodal u, v, a (owned, d), less contact forces on held ones; ``at``
-        evaluates functions."""
+        evaluates functions.
+        """
         total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
@@ -254,7 +260,8 @@ class NodalWork:
 
 def rigid_motions(points: Array, centre: Array) -> Array:
     """Return (motions, k, d) unit translations and, but on a line, rotations about a centre of
-    points (k, d)."""
+    points (k, d).
+    """
     d, arms = points.shape[1], points - centre
     shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
     turns = [np.column_stack([-arms[:, 1], arms[:, 0]])] if d == 2 else []

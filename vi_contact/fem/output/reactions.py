@@ -47,7 +47,8 @@ class Reactions:
         straight into the support. gravity: acceleration (d,) [m/s²] of ``with_weight``, (0,
         -9.80665) for example: likewise.
     Raises:
-        InputError: nothing is prescribed on the facets, and they have no dashpots."""
+        InputError: nothing is prescribed on the facets, and they have no dashpots.
+    """
 
     name: str
     facets: Facets
@@ -78,7 +79,9 @@ class Reactions:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Prepare the work of rigid motions of the held nodes; return the row of the state at rest.
-        Collective."""
+
+        Collective.
+        """
         owner = f"reactions '{self.name}'"
         self._work = NodalWork(owner, problem, self.loads, self.gravity)
         space: FemSpace = self._work.space

@@ -1,5 +1,6 @@
 """Record section forces N, V, M of plane cuts through walls, slabs and columns, along element sides
-or through them."""
+or through them.
+"""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -63,7 +64,8 @@ class SectionForces:
         ``with_weight``, if these cells weigh.
     Raises: InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes
         through cells of degree
-            2; corners of no rectangle."""
+            2; corners of no rectangle.
+    """
 
     cuts: Mapping[str, Sequence[Sequence[float]]]
     cells: Cells | None = None
@@ -100,7 +102,8 @@ class SectionForces:
 
     def columns(self) -> Columns:
         """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2,
-        M_3."""
+        M_3.
+        """
         return {
             f"{quantity}_{label}": (unit, f"{text}, section {label}")
             for label, ends in self.cuts.items()
@@ -113,7 +116,9 @@ class SectionForces:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Find the cuts; return the row of the state at rest, of a static stage for example.
-        Collective."""
+
+        Collective.
+        """
         work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
         found = [find_cut(work.space, *item, self.cells) for item in self.cuts.items()]
         work.take([part for part, _ in found])
@@ -129,7 +134,8 @@ class SectionForces:
 
 def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
     """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of
-    a cut (d, d)."""
+    a cut (d, d).
+    """
     size = np.linalg.norm(corners[1:] - corners[0], axis=1)
     if not size.all():
         raise InputError(
@@ -151,7 +157,8 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     that it reaches. Collective.
 
     The nodes on the cut and behind it move, and the cells before them hold them; the other way
-    round where sides of cells lie on the cut behind it only, as at a foot."""
+    round where sides of cells lie on the cut behind it only, as at a foot.
+    """
     corners, mesh = np.asarray(given, dtype=float), space.mesh
     if len(corners) != space.dimension:
         raise InputError(
@@ -224,7 +231,8 @@ class _Trace:
     left, right: cells with vertices before and behind the plane; touches: with a point of the cut;
     beyond: (2 (d - 1), cells) those of them that go on over one of its ends; cover: (3, cells) how
     much [m] of the cut (in space, [m²], of boxes round it) sides of cells on its left, of cells on
-    its right, and cells that it goes through cover."""
+    its right, and cells that it goes through cover.
+    """
 
     def __init__(self, s: Array, d: Array, size: Array, tol: float) -> None:
         self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0

@@ -7,7 +7,8 @@ their name and renamed.
 
 A run takes a folder by writing ``format.json`` into it. Only in a folder with this mark are files
 replaced or deleted that were there before, and of those only the ones with names that runs write.
-All others are left alone."""
+All others are left alone.
+"""
 
 import fcntl
 import json
@@ -103,7 +104,8 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
     """Make the folder, with parents, and try to write into it, before any work is done; InputError
     if not.
 
-    InputError also when files of others have names that a run replaces."""
+    InputError also when files of others have names that a run replaces.
+    """
     folder = Path(path)
     if find_spec("h5py") is None:
         raise InputError(
@@ -130,7 +132,8 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
 
 def is_marked(folder: Path) -> bool:
     """Return whether a run has taken this folder: it has the mark, or a history as only runs write
-    it."""
+    it.
+    """
     if is_own(folder / ABOUT):
         return True
     if not is_own(folder / HISTORY_CSV):
@@ -153,7 +156,8 @@ def refuse_files_of_others(folder: Path) -> None:
 
 def take(folder: Path) -> None:
     """Write the mark of runs into a folder, with its lock; InputError as of
-    ``refuse_files_of_others``."""
+    ``refuse_files_of_others``.
+    """
     refuse_files_of_others(folder)
     about = {"format": FORMAT, "vi_contact": __version__}
     write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
@@ -161,7 +165,8 @@ def take(folder: Path) -> None:
 
 def _written_by_runs(folder: Path) -> list[Path]:
     """What is in a folder under names that runs write, but for the copy of a case, which has a mark
-    of its own."""
+    of its own.
+    """
     fields = inner_folder(folder, FIELDS)
     files = [
         folder / name
@@ -173,7 +178,8 @@ def _written_by_runs(folder: Path) -> list[Path]:
 
 def _is_model(path: Path) -> bool:
     """Whether a file describes a model, as ``vi-contact run --check`` writes it into a folder
-    without a run."""
+    without a run.
+    """
     if not is_own(path):
         return False
     try:
@@ -205,7 +211,8 @@ def check_format(file: Path, found: Any) -> None:
 
 def check_folder_format(folder: Path) -> None:
     """Raise InputError likewise for a run folder; one without a number, of which files were copied,
-    is not asked."""
+    is not asked.
+    """
     if not is_own(folder / ABOUT):
         return
     try:
@@ -228,7 +235,8 @@ def clear(folder: Path) -> None:
     """Remove what an earlier run left in the folder and a new one could be mistaken for; histories
     are overwritten.
 
-    The mark of runs stays. Nothing is removed from a folder without it."""
+    The mark of runs stays. Nothing is removed from a folder without it.
+    """
     if not is_marked(folder):
         return
     for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
@@ -238,8 +246,10 @@ def clear(folder: Path) -> None:
 
 
 def remove_run(folder: Path) -> None:
-    """Remove the files of a run with its reports, and the folder if nothing else is in it. A folder
-    that no run has taken, and all files of others, stay as they are."""
+    """Remove the files of a run with its reports, and the folder if nothing else is in it.
+
+    A folder that no run has taken, and all files of others, stay as they are.
+    """
     if not is_marked(folder):
         return
     fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
@@ -258,7 +268,8 @@ def remove_run(folder: Path) -> None:
 
 def move_run(folder: Path, target: Path) -> None:
     """Move the files of a run, with its fields and stages, into another folder; files of others
-    stay."""
+    stay.
+    """
     fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
     for stage in filter(is_marked, _inside(stages)):
         os.replace(stage, make_inner_folder(target, STAGES) / stage.name)
@@ -286,7 +297,8 @@ def remove_if_empty(folder: Path) -> None:
 
 def remove_litter(folder: Path) -> None:
     """Remove what killed processes left of files they were about to replace; with the folder's lock
-    only."""
+    only.
+    """
     for place in (folder, inner_folder(folder, FIELDS)):
         for name in os.listdir(place) if place.is_dir() else ():
             if _is_temporary(name) or (_TRIAL.fullmatch(name) and place is folder):
@@ -295,7 +307,8 @@ def remove_litter(folder: Path) -> None:
 
 def _is_temporary(name: str) -> bool:
     """Whether this is the name of a file that was to take the place of one of a run:
-    ".NAME.PROCESS.tmp"."""
+    ".NAME.PROCESS.tmp".
+    """
     inside, _, process = name.removesuffix(".tmp").removeprefix(".").rpartition(".")
     return name == f".{inside}.{process}.tmp" and process.isdecimal() and _is_name_of_runs(inside)
 
@@ -314,7 +327,8 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody
     up. Within the same thread it may be taken again. On a file system that knows no locks there is
-    none, which is logged."""
+    none, which is logged.
+    """
     mine = None if folder is None else on_root(comm, lambda: _take(folder, name))
     try:
         yield

@@ -5,7 +5,8 @@ them.
                      a killed run loses no more.
 ``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
                      at checkpoints, every ten seconds if it has grown by a quarter, and at the end.
-``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row)."""
+``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).
+"""
 
 import hashlib
 import os
@@ -50,8 +51,9 @@ GROWTH = 1.25
 
 
 class HistoryFiles:
-    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points. Every method may
-    raise OSError.
+    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points.
+
+    Every method may raise OSError.
 
     ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are
     dropped) or another.
@@ -114,7 +116,8 @@ class HistoryFiles:
 
     def checksum(self, k: int) -> str:
         """Return the checksum of the rows up to step k; later ones are of a base step that is not
-        at its end."""
+        at its end.
+        """
         if k == self._last:
             return self._hash.hexdigest()
         stored = StoredRows(self._folder, self._table, k)
@@ -124,7 +127,8 @@ class HistoryFiles:
 
     def sync(self) -> bool:
         """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown
-        enough; say whether a checkpoint can rely on them even when the power fails."""
+        enough; say whether a checkpoint can rely on them even when the power fails.
+        """
         now = time.monotonic()
         if now - self._pushed < PUSH:
             return False
@@ -138,7 +142,8 @@ class HistoryFiles:
 
     def save(self) -> None:
         """Write history.h5 with all rows, from the memory if they are there; the journal starts
-        anew."""
+        anew.
+        """
         if self._rows == self._table.count and (known := self._table.remembered()) is not None:
             self._replace(
                 iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved
@@ -180,7 +185,8 @@ class HistoryFiles:
 
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the
-        other files."""
+        other files.
+        """
         try:
             push(self._folder / HISTORY_CSV)
             self.save()
@@ -193,7 +199,8 @@ class HistoryFiles:
 
 def _append(*pairs: tuple[Any, bytes]) -> None:
     """Write these bytes to the files that there are; what one has no room for is cut off from all
-    of them."""
+    of them.
+    """
     begun: list[tuple[Any, int]] = []
     try:
         for file, data in pairs:

@@ -4,7 +4,8 @@ release give alike.
 Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw,
 w·f(t), and vᵀCw of two where a matrix may be skew. Such numbers depend neither on the ranks nor on
 their order, and round-off changes them in the last digits only; they are kept with their sizes and
-compared relative to these. Laws and schemes are texts, with numbers compared likewise."""
+compared relative to these. Laws and schemes are texts, with numbers compared likewise.
+"""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -46,7 +47,8 @@ def identity(
     problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float
 ) -> Identity:
     """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end``
-    [s]. Collective."""
+    [s]. Collective.
+    """
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
     pairs = [(w, w) for w in probes] + (
@@ -80,7 +82,8 @@ def identity(
 
 def text_of(value: Any) -> str:
     """Return the repr of a law without addresses, and without what releases of numpy write
-    differently."""
+    differently.
+    """
     return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
 
 
@@ -166,7 +169,8 @@ def _excitation(problem: ContactProblem, times: Array) -> Numbers:
 
 def _numbers_in(value: Any) -> Iterator[float]:
     """All numbers of a value object: every sample of a record, also those between the times that
-    are looked at."""
+    are looked at.
+    """
     if is_dataclass(value):
         for one in fields(value):
             yield from _numbers_in(getattr(value, one.name))

@@ -1,5 +1,6 @@
 """Tell what a run does while it works: ``run.log`` through the logging module, and progress with
-the time left."""
+the time left.
+"""
 
 import logging
 import platform
@@ -23,7 +24,8 @@ SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or t
 
 class _LogFile(logging.Handler):
     """Write lines into a file of the run folder, and keep the error of one that could not be
-    written, for the run to raise on all ranks."""
+    written, for the run to raise on all ranks.
+    """
 
     def __init__(self, path: Path, *, append: bool) -> None:
         super().__init__()
@@ -51,7 +53,8 @@ class RunLog:
     terminal: on rank 0.
 
     While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The
-    root logger is left out: form compilers make it print every line."""
+    root logger is left out: form compilers make it print every line.
+    """
 
     turn: ClassVar[object] = None
     _open: ClassVar[int] = 0
@@ -101,7 +104,8 @@ def turn_of(run: object) -> Iterator[None]:
 
 def versions(*needed: str) -> dict[str, str]:
     """Return the version of everything that computes in this process, and of what else is needed to
-    write."""
+    write.
+    """
     for name in needed:
         with suppress(ModuleNotFoundError):  # nothing is written, else the folder was refused
             import_module(name)
@@ -116,7 +120,8 @@ def versions(*needed: str) -> dict[str, str]:
 
 class Progress:
     """Show the progress: by tqdm on a terminal, and a line in the log every tenth of the run or
-    every 30 s."""
+    every 30 s.
+    """
 
     def __init__(self, total: int, *, shown: bool) -> None:
         self._total, self._done = total, 0

@@ -1,5 +1,6 @@
 """Read what a run left in its folder: histories, units, facts and the geometry of the contact
-points."""
+points.
+"""
 
 import json
 from collections.abc import Callable, Mapping
@@ -62,7 +63,8 @@ class RunFolder:
     Attributes: folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per
         contact point. columns: column -> (unit, meaning). facts: summary.json; empty while a run
         goes on or after it was killed. contact: None when history.h5 is missing, as early in a run,
-        or the problem has no contact points."""
+        or the problem has no contact points.
+    """
 
     folder: Path
     history: Mapping[str, Array]
@@ -73,12 +75,14 @@ class RunFolder:
 
 @checked
 def read_run(folder: str | Path) -> RunFolder:
-    """Read a run folder of ``simulate``. For a run that is still going on or was killed, return
-    what is there.
+    """Read a run folder of ``simulate``.
+
+    For a run that is still going on or was killed, return what is there.
 
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has
     all steps too (it does once the run has ended). InputError when there is no history, or a file
-    is damaged."""
+    is damaged.
+    """
     folder = Path(folder)
     if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
@@ -93,7 +97,8 @@ def read_run(folder: str | Path) -> RunFolder:
 
 def _of(path: Path, read: Callable[[Path], T]) -> T:
     """What is read from a file of a run; InputError that names the file when it is missing or
-    damaged."""
+    damaged.
+    """
     try:
         return read(path)
     except InputError:
@@ -120,7 +125,8 @@ def _short(error: Exception) -> str:
 
 def read_object(path: Path) -> dict[str, Any]:
     """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be
-    printed."""
+    printed.
+    """
     with open_to_read(path) as file:
         data = file.read(BYTES + 1)
     if len(data) > BYTES:
@@ -192,7 +198,8 @@ def _numbers(path: Path) -> dict[str, Array]:
 
 def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, Any]) -> None:
     """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one
-    of the summary."""
+    of the summary.
+    """
     rows, steps = len(history["t"]), facts.get("steps")
     gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
     if len(gaps):
@@ -211,7 +218,8 @@ def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, 
 
 def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
     """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that
-    both have."""
+    both have.
+    """
     for name, own in history.items():
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")

@@ -1,5 +1,6 @@
 """Hold the histories of a run in memory: compact columns, of a run with a folder only so much of
-them; tally them."""
+them; tally them.
+"""
 
 import copy
 import os
@@ -38,7 +39,8 @@ class Table:
         far. numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only
         HDF5 holds, with a sample. file: the history.h5 of a run with a folder, which has the rows
         too: beyond KEPT bytes the memory lets them go. block: how many rows are turned into
-        columns, read or written together."""
+        columns, read or written together.
+    """
 
     def __init__(
         self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None
@@ -66,7 +68,8 @@ class Table:
 
     def check(self, row: Row) -> None:
         """Raise InputError for a row with other columns than its recorder has announced, or not of
-        numbers."""
+        numbers.
+        """
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
         for name in sorted(row.keys() ^ self.columns.keys()):
@@ -99,7 +102,8 @@ class Table:
 
     def restore(self, block: Block) -> None:
         """Add rows of an earlier run, which are those before the one that the table was made
-        with."""
+        with.
+        """
         if self.count == 1 and self._open:
             self._open, self.count = [], 0
         self.count += len(block["k"])
@@ -121,7 +125,8 @@ class Table:
 
     def remembered(self) -> Block | None:
         """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let
-        some go."""
+        some go.
+        """
         self._gather()
         names = [*self.numbers, *self.arrays] if self._kept else []
         return {
@@ -138,7 +143,8 @@ class Table:
     def history(self) -> Mapping[str, Array]:
         """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of
         too many rows for the memory, or points for every rank, as they are in the file.
-        Collective."""
+        Collective.
+        """
         kept = self.remembered() or {}
         shared = [
             name
@@ -164,7 +170,8 @@ class StoredHistory(Mapping[str, Array]):
     """Hold histories that are read column by column from history.h5 when somebody asks, but for
     those that are kept.
 
-    ViContactError when there is no file, or not any more, or it no longer holds these rows."""
+    ViContactError when there is no file, or not any more, or it no longer holds these rows.
+    """
 
     def __init__(self, file: Path | None, kept: Block, names: list[str]) -> None:
         self._file, self._kept, self._names = file, kept, names
@@ -203,8 +210,10 @@ class StoredHistory(Mapping[str, Array]):
 
 
 class Tally:
-    """Step, iterations, worst certificate, contact and energy ledger of a run. Row 0 is the initial
-    state."""
+    """Step, iterations, worst certificate, contact and energy ledger of a run.
+
+    Row 0 is the initial state.
+    """
 
     def __init__(self) -> None:
         self._rows = 0
@@ -269,7 +278,8 @@ class Tally:
 
     def _energy(self) -> dict[str, Any]:
         """The ledger at the end [J], and its largest defect relative to the largest energy or input
-        work of the run."""
+        work of the run.
+        """
         most, last = self._most, self._last
         start = self._first["energy_kinetic"] + self._first["energy_strain"]
         size = max(most["energy"], most["work"])

@@ -1,5 +1,6 @@
 """Write everything a run writes while it works, in one place: histories, fields, checkpoints, log
-and summary."""
+and summary.
+"""
 
 import logging
 import time
@@ -35,8 +36,10 @@ class OpenFields(Protocol):
 
 
 class FieldWriter(Protocol):
-    """Write field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the frames
-    that are there."""
+    """Write field output (fem.XDMF).
+
+    ``open`` is collective; ``kept``: step -> time of the frames that are there.
+    """
 
     @property
     def every(self) -> int: ...
@@ -47,8 +50,9 @@ class FieldWriter(Protocol):
 
 
 class Writer:
-    """Write into the folder of a run, or into none: then nothing is written. Every method but
-    ``rescue`` is collective.
+    """Write into the folder of a run, or into none: then nothing is written.
+
+    Every method but ``rescue`` is collective.
 
     ``stored``: the rows of an earlier run that this one continues. Unless they are in this folder,
     ``open`` clears it.
@@ -114,7 +118,8 @@ class Writer:
 
     def append(self, row: Row) -> None:
         """Take a row of the histories; it is written, with all that wait, when the next one might
-        be late."""
+        be late.
+        """
         if self.folder is None:
             self._table.append(row)
             return
@@ -124,8 +129,10 @@ class Writer:
             self.flush()
 
     def flush(self, *, alone: bool = False) -> None:
-        """Write rows that wait, then put them into the table. Collective, unless others may not
-        come (``alone``)."""
+        """Write rows that wait, then put them into the table.
+
+        Collective, unless others may not come (``alone``).
+        """
         if self._waiting:
             on_root(SerialComm() if alone else self._comm, self._flush)
             for row in self._waiting:
@@ -147,8 +154,10 @@ class Writer:
             self._fields.write(report.new, report.balance.a, report)
 
     def checkpoint(self, place: RestartPoint, of: Callable[[], Mapping[str, Any]]) -> None:
-        """Write a checkpoint of this place, unless there is one already. ``of``: what problem it
-        is."""
+        """Write a checkpoint of this place, unless there is one already.
+
+        ``of``: what problem it is.
+        """
         k = place.state.k
         self.flush()
         if self.folder is None or self._saved == k:
@@ -169,7 +178,8 @@ class Writer:
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
         """Do the same after a failure: not collective, as others might not come; no error hides the
-        first."""
+        first.
+        """
         with suppress(
             Exception
         ):  # of any kind: the first error is told, and this one comes of it or after it

@@ -9,7 +9,8 @@ With the unit vectors E of the normal and F of the tangential unknowns, x_free =
 A law that depends on the slip rate makes this a sequence of such problems: ``slip_rate``.
 
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a
-free spring."""
+free spring.
+"""
 
 from collections.abc import Callable
 
@@ -28,7 +29,8 @@ from .slip_rate import RateIteration
 
 class CondensedFriction:
     """Solve the small problem with friction of one A, condensed onto normal and tangential
-    unknowns."""
+    unknowns.
+    """
 
     def __init__(
         self,
@@ -59,7 +61,8 @@ class CondensedFriction:
     ) -> tuple[FrictionResult, Mask, Array]:
         """Return the reactions for contact unknowns that would be ``free``, and where they are put:
         closed points on a rigid support on their bound, those that stick where they were, which
-        removes round-off only."""
+        removes round-off only.
+        """
         surface = self._surface
         assert step.slip0 is not None
         none = np.zeros(surface.count)
@@ -90,7 +93,8 @@ class CondensedFriction:
         self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
     ) -> Answers:
         """Return the answers to several steps: ``many`` holds their rows, ``own`` makes one of
-        them."""
+        them.
+        """
         free, (m, d) = (
             self.condensed.free(many.b),
             (len(many.bound), 1 + self._surface.tangents.shape[1]),

@@ -11,7 +11,8 @@ with the parts G_nn, G_nt, G_tt of the Delassus operator:
 
 Block Gauss-Seidel: under Tresca's law the exact minimum over one block after the other, which
 converges for every G; under Coulomb's when coupling and friction are moderate, linearly.
-``extrapolation`` acts on r_t."""
+``extrapolation`` acts on r_t.
+"""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,11 +37,13 @@ from .problem import (
 
 @dataclass(frozen=True)
 class GivenForces(Settings):
-    """Hold the settings. ``tolerance``: change of r_t over the largest; ``tangential``: method of
-    tangential problems.
+    """Hold the settings.
+
+    ``tolerance``: change of r_t over the largest; ``tangential``: method of tangential problems.
 
     In the result ``iterations`` counts pairs of problems and ``history`` the relative change in
-    each."""
+    each.
+    """
 
     tolerance: float = 1e-11
     tangential: FrictionMethod = field(default_factory=FrictionNewton)

@@ -31,7 +31,8 @@ class States:
     Masks (m,) ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction. Slip
     reactions are fixed + growth r_n direction, (m, d - 1) with ``growth`` (m,); ``fixed`` (m, d).
     ``turning``: (|y_t| - limit)/limit of nodes that turn. ``exact``: none does, and the linear
-    problem depends on ``key`` only."""
+    problem depends on ``key`` only.
+    """
 
     def __init__(self, step: ScaledProblem, y: Array, before: "States | None") -> None:
         m, d = y.shape
@@ -61,9 +62,11 @@ class States:
 
 
 class LinearProblems:
-    """Solve the linear problems of one run of Newton's method. The way of solution depends on this
-    run alone, not on ``kept``, the factors of the last sets of states of one G: they save time and
-    change no digit of an answer."""
+    """Solve the linear problems of one run of Newton's method.
+
+    The way of solution depends on this run alone, not on ``kept``, the factors of the last sets of
+    states of one G: they save time and change no digit of an answer.
+    """
 
     def __init__(self, delassus: ScaledDelassus, kept: "dict[bytes, Factored]") -> None:
         self._delassus, self._kept = delassus, kept
@@ -92,7 +95,8 @@ class Reduced:
     """Hold R, P and the turns, by places in r.
 
     z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking
-    nodes, turns."""
+    nodes, turns.
+    """
 
     def __init__(self, states: States) -> None:
         m, d = self.shape = states.fixed.shape
@@ -121,7 +125,8 @@ class Reduced:
 
     def matrix(self, G: Array) -> Array:
         """Return K, made as its transpose, whose rows are near each other in memory; G is
-        transposed too."""
+        transposed too.
+        """
         places = np.concatenate([self.plain, self._turned.ravel()])
         part = _block(G, self.plain, places)
         growth = self.growth[self.closed]  # of the first rows of part
@@ -143,8 +148,10 @@ class Reduced:
 
 
 class Factored:
-    """Hold (1) of one set of states, or (2) where that is smaller, with its factor. ``sound``: it
-    is regular."""
+    """Hold (1) of one set of states, or (2) where that is smaller, with its factor.
+
+    ``sound``: it is regular.
+    """
 
     def __init__(self, reduced: Reduced, delassus: ScaledDelassus) -> None:
         self.reduced, self._delassus, self._H = reduced, delassus, None

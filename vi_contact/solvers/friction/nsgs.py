@@ -10,7 +10,8 @@ Given the reactions of all other nodes, a node is open, or it sticks, or it slip
 with S and q' the tangential block and right-hand side after the elimination of r_n. Sources: Moreau
 (Comput. Methods Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is
 coordinate descent of a convex function and converges for every G; under Coulomb's it converges in
-practice, linearly, for friction that is not large."""
+practice, linearly, for friction that is not large.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +26,8 @@ from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, 
 class NSGS(Settings):
     """Hold the settings. ``tolerance``: largest residual, that of r = 0 being 1.
 
-    In the result ``iterations`` counts sweeps and ``history`` the residual after each."""
+    In the result ``iterations`` counts sweeps and ``history`` the residual after each.
+    """
 
     max_iterations: int = 5000
 
@@ -104,7 +106,8 @@ def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
 
     S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| -
     limit is bracketed in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of
-    the eigenvalues give r: a start only."""
+    the eigenvalues give r: a start only.
+    """
     if len(q) == 0 or not q.any():
         return np.zeros(len(q))
     values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)

@@ -18,7 +18,8 @@ of s into themselves continuously, Brouwer), and is unique for small slopes only
 
 Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one number for each node
 (disks stay disks), the mean of G_tt to the same power: reactions and displacements are then both in
-sqrt(J), as in ``normal.lcp``."""
+sqrt(J), as in ``normal.lcp``.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -44,7 +45,8 @@ class FrictionResult:
     ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit;
     ``active`` (m,): r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached,
     under a limit that is not zero; ``residual``: largest |F| of (2) over that of r = 0. Each method
-    tells what ``iterations`` and ``history`` count."""
+    tells what ``iterations`` and ``history`` count.
+    """
 
     r: Array
     active: Mask
@@ -64,13 +66,15 @@ class FrictionMethod(Protocol):
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Check and scale G (m d, m d), ``bilateral`` (m,); return ``PreparedFriction`` or its like
-        for many q."""
+        for many q.
+        """
 
 
 @dataclass(frozen=True)
 class Settings:
     """Hold what all methods here let one choose: ``tolerance``, and ``max_iterations`` that they
-    may take."""
+    may take.
+    """
 
     carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-12
@@ -103,7 +107,8 @@ class ScaledProblem:
 
     def moved(self, r: Array) -> Array:
         """Return G r (m, d), from the rows that carry something when they are few; of the last r it
-        is known."""
+        is known.
+        """
         if not (self._last and np.array_equal(self._last[0], r)):
             self._last[:] = r.copy(), self.delassus.product(r.ravel()).reshape(r.shape)
         return self._last[1]
@@ -134,13 +139,15 @@ class ScaledProblem:
 
     def admissible(self, r: Array) -> Array:
         """Return r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever
-        else is outside."""
+        else is outside.
+        """
         r_n = np.where(self.delassus.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
         """Return reactions to start from: those guessed; or what opens the guessed set row by row,
-        at least energy."""
+        at least energy.
+        """
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:
@@ -158,7 +165,8 @@ class ScaledProblem:
 
     def result(self, method: object, tolerance: float, found: Iterated) -> FrictionResult:
         """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and
-        above rounding."""
+        above rounding.
+        """
         r, iterations, history = found
         r = self.admissible(r)
         w = self.w(r)
@@ -210,7 +218,8 @@ class ScaledDelassus:
     def short(self) -> tuple[Any, ...]:
         """Return G and, in 2D, its inverse H and the inverse of each node's block of H, in single
         precision, for the compiled sweeps; None for what is missing, or is not positive definite to
-        that precision."""
+        that precision.
+        """
         G, d = self.matrix.astype(np.float32), self.dimension
         triangle, info = lapack.spotrf(G, lower=1) if d == 2 else (G, 1)
         if info:
@@ -243,7 +252,8 @@ class ScaledDelassus:
 class PreparedFriction:
     """Solve (1) for one G and many right-hand sides.
 
-    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``."""
+    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``.
+    """
 
     method: object
     tolerance: float
@@ -253,8 +263,11 @@ class PreparedFriction:
     def solve(
         self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None
     ) -> FrictionResult:
-        """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted
-        contact set (m,), or reactions (m, d). StepFailure when the tolerance is not reached."""
+        """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,).
+
+        ``guess``: predicted contact set (m,), or reactions (m, d). StepFailure when the tolerance
+        is not reached.
+        """
         step = self.delassus.problem(q, cohesion, slope)
         found = self.loop(step, step.start(guess if step.unit > 0.0 else None))
         return step.result(self.method, self.tolerance, found)

@@ -10,7 +10,8 @@ falls with mu, so that (1) climbs from rest to the smallest rate that solves the
 rate at all as long as the point can stick. For c |mu'| > 1 there may be other solutions, and
 extrapolation, which begins after four plain steps, might end in one. Friction that grows with the
 rate has one solution, but plain iterations need c mu' < 1; beyond that Anderson's method takes
-over, a secant method for one point."""
+over, a secant method for one point.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -29,11 +30,13 @@ from .extrapolation import Anderson, Extrapolation, accelerated
 
 @dataclass(frozen=True)
 class RateIteration:
-    """Hold the settings. ``tolerance``: change of coefficients over the largest; ``extrapolation``:
-    the next guess.
+    """Hold the settings.
+
+    ``tolerance``: change of coefficients over the largest; ``extrapolation``: the next guess.
 
     ``iterations`` of the result counts those of all inner problems, ``history`` is the change in
-    each iteration."""
+    each iteration.
+    """
 
     tolerance: float = 1e-12
     max_iterations: int = 200
@@ -56,7 +59,8 @@ class RateIteration:
 
         ``solved``: the problem of given coefficients, starting from the last result, None at first;
         ``slip``: that of a result, B_t x - slip0 (m, d - 1) of this rank. StepFailure when the
-        tolerance is not reached. Collective."""
+        tolerance is not reached. Collective.
+        """
         if rest is step.friction:
             return solved(mu, None)
         following, spent, surface = self.extrapolation.start(), 0, step.surface

@@ -4,7 +4,8 @@ them have wrong signs.
 A closed rigid condition holds its unknown on the bound; the residual there is the reaction. A
 closed spring, of stiffness k = scale / compliance, leaves its unknown free and adds k to the
 diagonal and k bound to the load; its reaction is k (x - bound). An infinite bound is never closed.
-Arrays have one entry for each condition of this rank."""
+Arrays have one entry for each condition of this rank.
+"""
 
 import zlib
 
@@ -20,7 +21,8 @@ CLOSING = 1e-12  # penetration, relative to |x|, that closes a condition at the 
 
 class Contact:
     """Hold the closed set of one step. ``rows``: where the normal unknowns stand in the padded
-    vectors of ``size``."""
+    vectors of ``size``.
+    """
 
     def __init__(
         self,
@@ -44,7 +46,8 @@ class Contact:
 
     def begin(self, step: StepProblem) -> None:
         """Take the bounds of a step, and its predicted set with the points that the guess lets
-        penetrate."""
+        penetrate.
+        """
         if step.surface.some(np.isnan(step.bound)):
             raise InputError(
                 "the bound of the contact conditions contains NaN: check the gap and the time "
@@ -84,7 +87,8 @@ class Contact:
         closed springs.
 
         w M⁻¹ w is the preconditioner: sqrt(A_ii / (A_ii + k)) at a spring gives M the diagonal of A
-        + k there, and tends to the mask as the spring becomes rigid."""
+        + k there, and tends to the mask as the spring becomes rigid.
+        """
         w = np.ones(self._size)
         w[self._missing] = 0.0
         w[self.held] = 0.0
@@ -96,7 +100,8 @@ class Contact:
 
     def reactions(self, x: Array, residual: Array) -> Array:
         """Return r_n of the closed conditions, zero of the others; ``residual``: load - (A + K_s)
-        x."""
+        x.
+        """
         return np.where(
             self.soft, self.spring_forces(x), np.where(self.closed, residual[self.rows], 0.0)
         )
@@ -117,7 +122,8 @@ class Contact:
         """Return the conditions whose signs are wrong by more than ``error``, the largest residual.
 
         A closed one pulls: r below -error and -least_force; an open one has penetrated by more than
-        the error moves its unknown, error / A_ii, and by more than round-off."""
+        the error moves its unknown, error / A_ii, and by more than round-off.
+        """
         stiff = np.where(self.soft, self.k / (self.diagonal + self.k), 1.0)
         pulls = self.closed & ~self.bilateral & (r < -np.maximum(least_force, error * stiff))
         inside = x[self.rows] - self.bound > np.maximum(CLOSING * x_ref, error / self.diagonal)
@@ -153,5 +159,6 @@ class Contact:
 
     def fingerprint(self) -> float:
         """Return a number of the closed set of this rank, whose sum over ranks tells sets apart, in
-        all likelihood."""
+        all likelihood.
+        """
         return float(zlib.crc32(np.packbits(self.closed).tobytes()))

@@ -5,7 +5,8 @@ Every Newton step solves the linear problem of the present states (``friction_st
 (``friction_krylov``), to a hundredth of its residual. The first states are those of the reactions
 of the last step, with the slip that the step predicts: A x - b at a predicted x is no contact
 force. In the end every residual is formed afresh; reactions are put on their cone, and tangents
-that stick where they were."""
+that stick where they were.
+"""
 
 import numpy as np
 
@@ -34,7 +35,8 @@ STEPS = 150  # of Newton
 
 class Friction:
     """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer
-    before."""
+    before.
+    """
 
     def __init__(
         self,
@@ -60,7 +62,8 @@ class Friction:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure, on all ranks, with the history of residuals when there is
-        no answer."""
+        no answer.
+        """
         newton = Newton(self, step)
         while not newton.solved():
             newton.advance()
@@ -71,7 +74,8 @@ class Friction:
 
 class Newton:
     """Iterate over one step. ``history``: residuals over the forces; ``steps``: linear problems
-    solved."""
+    solved.
+    """
 
     def __init__(self, of: Friction, step: StepProblem) -> None:
         self.of = of
@@ -89,7 +93,8 @@ class Newton:
 
     def _predicted(self) -> States:
         """The states of the last reactions and the predicted slip; without any, points stick where
-        they touch."""
+        they touch.
+        """
         of, slip = self.of, self._slip()
         if of.last is None:
             none = np.zeros(len(slip))
@@ -120,7 +125,8 @@ class Newton:
     def _take(self, states: States, changed: Mask | None = None) -> None:
         """Take states and the closed set of the contact: hold what they hold, and form the
         residual, a product, unless nothing moved. ``changed``: conditions that closed or opened,
-        None before the first residual."""
+        None before the first residual.
+        """
         of, contact, x = self.of, self.of.contact, self.x.copy()
         self.states = states
         contact.place(x)
@@ -150,7 +156,8 @@ class Newton:
 
     def _rubbed(self) -> Array:
         """The friction (m, d - 1) that the law allows next to r_t: along a slip that is certain, or
-        the projection."""
+        the projection.
+        """
         limit, size = self.limits(self.r_n), np.linalg.norm(self.slip, axis=1)
         y_t = self.r_t + self.of.tangents.c[:, None] * self.slip
         along = self.slip * (limit / np.where(size > 0.0, size, 1.0))[:, None]
@@ -162,7 +169,8 @@ class Newton:
 
     def solved(self) -> bool:
         """Say whether x solves the step. StepFailure when it is not a number, or there were too
-        many steps."""
+        many steps.
+        """
         of = self.of
         error = np.where(of.contact.weights() > 0.0, self.residual, 0.0)
         error[of.tangents.rows] = of.tangents.flat(self.r_t - self._rubbed())

@@ -8,7 +8,8 @@ closed normals and sticking tangents, and in the tangent plane of a point that s
 
 which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g is that of A⁻¹, and tends
 to the mask of a point that cannot turn. About half of the diagonal of A is what its neighbours
-leave a node of stiffness."""
+leave a node of stiffness.
+"""
 
 from typing import Any
 
@@ -65,7 +66,8 @@ class Turned(Masked):
 class Gmres:
     """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips, on
     the matrix of the linear problem, as whose context it serves. ``free``: 1 in rows that are not
-    held, and 0."""
+    held, and 0.
+    """
 
     def __init__(
         self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int
@@ -102,7 +104,8 @@ class Gmres:
 
     def solve(self, residual: Array, share: float, goal: float) -> tuple[Array, float, int]:
         """Return (dx, norm of what is left, PETSc's reason): ``share`` is left, or about ``goal``
-        in a row."""
+        in a row.
+        """
         self._b.array[:] = residual
         self._x.set(0.0)
         spread = min(self._b.norm() / (self._b.norm(PETSc.NormType.INFINITY) or 1.0), SPREAD)

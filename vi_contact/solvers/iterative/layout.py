@@ -4,7 +4,8 @@ two nodes.
 A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric
 matrix serves for all of it (SBAIJ): it takes a third of the time. Prescribed components are no
 unknowns, and a node that keeps others would break the blocks: it gets them back here as unknowns
-that are always held at zero."""
+that are always held at zero.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +24,8 @@ class Layout:
     """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``,
     ``width`` a node.
 
-    ``complete``: on no rank is there a component of a node that is no unknown."""
+    ``complete``: on no rank is there a component of a node that is no unknown.
+    """
 
     width: int
     places: Indices
@@ -32,7 +34,8 @@ class Layout:
 
     def padded(self, x: Array) -> Array:
         """Return the values of all components of the nodes, zero where there is no unknown; a
-        copy."""
+        copy.
+        """
         if self.complete:
             return np.array(x)
         values = np.zeros(self.size)
@@ -51,7 +54,9 @@ class Layout:
 
 def layout_of(A: EffectiveMatrix) -> Layout:
     """Return the layout of the unknowns of A; one unknown a block where nothing is known of nodes.
-    Collective."""
+
+    Collective.
+    """
     n = A.matrix.rows
     if A.space is None or A.space.dimension == 1:
         return Layout(1, np.arange(n), n, complete=True)
@@ -77,7 +82,9 @@ class Nodewise:
 
     def blocks(self) -> Any:
         """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry.
-        Collective."""
+
+        Collective.
+        """
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         stored = getattr(self.A.matrix, "stored", None)
         if d == 1:
@@ -104,7 +111,8 @@ class Nodewise:
         """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an
         earlier one to refill.
 
-        Rows of missing components hold the largest diagonal entry of A."""
+        Rows of missing components hold the largest diagonal entry of A.
+        """
         mat = self.source.PtAP(self._selected, result=result)
         mat.setBlockSize(self.layout.width)
         mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
@@ -117,7 +125,8 @@ class Nodewise:
     @cached_property
     def _selected(self) -> Any:
         """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the
-        blocks."""
+        blocks.
+        """
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         n = len(layout.places)
         first = self.source.comm.tompi4py().scan(layout.size) - layout.size

@@ -11,7 +11,8 @@ or a stiff body on a soft one, are enough. Factors are then made of A with a lar
 
 GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids
 would believe the contact open; the interpolation is kept, Galerkin products are renewed when over a
-tenth of the set has moved since."""
+tenth of the set has moved since.
+"""
 
 from typing import Any
 
@@ -66,7 +67,8 @@ def courant(A: EffectiveMatrix) -> float:
 def chosen(number: float, modes: bool) -> str:
     """Return the preconditioner for a Courant number: Jacobi up to 0.5, ICC up to 30 or where it is
     not known, GAMG beyond. ``modes``: whether rigid motions are known, without which GAMG is no
-    use."""
+    use.
+    """
     if number <= SMALL:
         return JACOBI
     return GAMG if number > LARGE and modes else ICC
@@ -79,7 +81,8 @@ def defaults(kind: str, ranks: int) -> Options:
 
 def shares(inverse: Any, template: Any) -> Array:
     """Return 1/sqrt(k) of every row, k the number of a PETSc preconditioner's subdomains that hold
-    it. Collective."""
+    it. Collective.
+    """
     ones, count = template.duplicate(), template.duplicate()
     ones.set(1.0)
     count.set(1.0)
@@ -97,8 +100,11 @@ def shares(inverse: Any, template: Any) -> Array:
 
 
 class Masked:
-    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc
-    preconditioner, without the shares of its subdomains, which are in w."""
+    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner.
+
+    ``inverse``: M⁻¹ as a PETSc preconditioner, without the shares of its subdomains, which are in
+    w.
+    """
 
     def __init__(self, inverse: Any, template: Any) -> None:
         self._inverse, self._r, self._z = inverse, template.duplicate(), template.duplicate()
@@ -128,7 +134,8 @@ class Masked:
 
 class Inverse:
     """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the
-    contact set; made of the matrix with a diagonal larger by the factor 1 + ``raised``."""
+    contact set; made of the matrix with a diagonal larger by the factor 1 + ``raised``.
+    """
 
     def __init__(self, matrix: Any, layers: OptionLayers, raised: float = 0.0) -> None:
         made_of = matrix
@@ -142,7 +149,8 @@ class Inverse:
 
     def follow(self, held: Indices) -> None:
         """Make M anew for the rows that closed conditions and sticking points hold, if it is time
-        to. Collective."""
+        to. Collective.
+        """
 
 
 class Multigrid(Inverse):
@@ -150,7 +158,8 @@ class Multigrid(Inverse):
     set.
 
     The interpolation is that of the whole A with its rigid modes, in which no set has left a
-    trace."""
+    trace.
+    """
 
     def __init__(
         self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work
@@ -172,7 +181,8 @@ class Multigrid(Inverse):
 
     def follow(self, held: Indices) -> None:
         """Make the Galerkin products anew when more than a tenth of the held rows have changed
-        since."""
+        since.
+        """
         mask = np.zeros_like(self._built)
         mask[held] = True
         moved, size = self._comm.sum(
@@ -196,8 +206,10 @@ class Multigrid(Inverse):
 
 
 def made(matrix: Any, layers: OptionLayers) -> Any:
-    """Return a PETSc preconditioner of a matrix, from the options. InputError when PETSc does not
-    take them."""
+    """Return a PETSc preconditioner of a matrix, from the options.
+
+    InputError when PETSc does not take them.
+    """
     pc = PETSc.PC().create(matrix.comm)
     pc.setOptionsPrefix(layers.prefix)
     pc.setOperators(matrix)
@@ -226,7 +238,8 @@ def rigid_modes(
     A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any
 ) -> list[Any]:
     """Return orthonormal PETSc vectors of the rigid motions, in nodal frames and relative at two
-    bodies."""
+    bodies.
+    """
     space, comm = A.space, A.algebra.comm
     d, points = int(space.dimension), np.asarray(space.coordinates)
     component = np.asarray(space.ids) % d
@@ -245,7 +258,8 @@ def rigid_modes(
 
 def orthonormal(vectors: list[Any]) -> list[Any]:
     """Return the vectors made orthonormal in place (Gram and Schmidt, twice); those that vanish are
-    left out."""
+    left out.
+    """
     kept: list[Any] = []
     for vector in vectors:
         before = vector.norm()

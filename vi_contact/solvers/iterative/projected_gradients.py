@@ -12,7 +12,8 @@ Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <
 bound and lengths and forces compare; on a face the preconditioner of the route is used. The springs
 that are closed are given while the bounds are searched; then they are taken from the answer, and a
 search along the line to it, which makes the energy as small as can be, keeps this Newton iteration
-from cycling."""
+from cycling.
+"""
 
 import numpy as np
 
@@ -64,7 +65,8 @@ class Projected:
 
     def solve(self, x: Array) -> tuple[Array, int]:
         """Return (x, reason) of the search from x; the closed set of ``contact`` is then that of
-        x."""
+        x.
+        """
         of = self.of
         x = of.contact.feasible(x)
         start = np.maximum(-self._root * x, self.lower)
@@ -100,7 +102,8 @@ class Projected:
 
 class Face:
     """Hold the iterate: r, its gradient split into phi and beta, and the conjugate direction on the
-    present face."""
+    present face.
+    """
 
     def __init__(self, problem: Projected, start: Array, gradient: Array, step: float) -> None:
         self._problem, self._step = problem, step
@@ -179,7 +182,8 @@ def projected_gradients(
     of: Search, diagonal: Array, norm: float, x: Array
 ) -> tuple[Array, Array, int]:
     """Return (x, residual formed afresh, reason) of the step from x: SOLVED, or why there is no
-    answer. Collective."""
+    answer. Collective.
+    """
     contact, residual = of.contact, of.load
     for _ in range(ROUNDS):
         try:
@@ -201,7 +205,8 @@ def projected_gradients(
 
 def _length(of: Search, x: Array, d: Array) -> float:
     """The t in (0, 1] at which ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)² is smallest along d: a
-    zero of its slope."""
+    zero of its slope.
+    """
     contact = of.contact
     contact.close_springs(None)
     of.take_set()

@@ -6,7 +6,8 @@ gathered.
 The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not
 end, goes to projected gradients, which decrease the energy in every step and so cannot cycle
 (``projected_gradients``). Steps with friction take semismooth Newton and GMRES instead
-(``friction``)."""
+(``friction``).
+"""
 
 import logging
 from collections.abc import Mapping
@@ -68,7 +69,8 @@ class Iterative:
             are below this.
         changes: number of changes of the contact set in a step without friction; after more, or
             when a set comes twice, projected gradients continue.
-        patience: number of linear iterations within which the residual has to fall tenfold."""
+        patience: number of linear iterations within which the residual has to fall tenfold.
+    """
 
     preconditioner: str = AUTO
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)
@@ -95,20 +97,25 @@ class Iterative:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction without a tangential direction, or of a wrong number of
-        values."""
+        values.
+        """
         check_laws("Iterative()", problem)
 
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedIterative":
-        """Choose and make the preconditioner; collective. InputError for options that cannot
-        work."""
+        """Choose and make the preconditioner; collective.
+
+        InputError for options that cannot
+        work.
+        """
         return PreparedIterative(self, A, surface, scale)
 
 
 class PreparedIterative:
     """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``:
-    PETSc's object."""
+    PETSc's object.
+    """
 
     def __init__(
         self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float
@@ -167,7 +174,8 @@ class PreparedIterative:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure, on all ranks, with the history of residuals when there is
-        no answer."""
+        no answer.
+        """
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:

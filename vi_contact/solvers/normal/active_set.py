@@ -12,7 +12,8 @@ the count of wrong signs has not fallen below its minimum for PATIENCE changes, 
 and Hanson (Solving Least Squares Problems, 1974, ch. 23, there for least squares) takes over: it
 admits one row at a time and keeps r >= 0, so that ½ rᵀG r + qᵀr falls at every set it completes. No
 such set can return: it ends, in practice after about as many changes as there are rows. (Murty's
-single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)"""
+single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
+"""
 
 from ctypes import c_double
 from dataclasses import dataclass
@@ -36,8 +37,9 @@ PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Hold the settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above
-    which it refuses.
+    """Hold the settings.
+
+    ``max_iterations``: set changes allowed; ``tolerance``: residual above which it refuses.
 
     In the result ``iterations`` counts changes of the set (0: the guess was right), ``history`` the
     rows moved in each.
@@ -53,7 +55,8 @@ class ActiveSet:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.
 
         The factors of the last sets are remembered: a step on the same set costs triangular solves
-        only."""
+        only.
+        """
         scaled = scaled_dense(G, bilateral)
         cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
         return PreparedSets(self, scaled, _Sets(self, scaled).search)
@@ -61,7 +64,8 @@ class ActiveSet:
 
 class PreparedSets(PreparedLCP):
     """Solve problem (1) of one G, or several at once, by compiled exchanges first where rows are
-    few."""
+    few.
+    """
 
     @cached_property
     def _compiled(self) -> "Exchanges | None":
@@ -83,7 +87,8 @@ class PreparedSets(PreparedLCP):
         self, q: Array, guess: Mask
     ) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
         """Return r and active of several q, all (k, m), the iterations, and what those raise that
-        have no answer."""
+        have no answer.
+        """
         none = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), None, np.full(len(q), -1), None
         r, active, _, changes, _ = none if self._compiled is None else self._compiled(q, guess)
         counts, failed = changes.tolist(), dict[int, ViContactError]()
@@ -98,7 +103,8 @@ class PreparedSets(PreparedLCP):
 
 class Exchanges:
     """Make the first exchanges of several problems of one G, compiled: those of ``_Sets``, which
-    has the others."""
+    has the others.
+    """
 
     def __init__(self, library: Any, prepared: PreparedLCP) -> None:
         self._library, self._prepared, self._rows = library, prepared, 0
@@ -140,7 +146,8 @@ class Exchanges:
 
     def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
         """Return r, active, residual, iterations (-1: not solved) and rows that each moved; q,
-        guess (k, m) or (m,)."""
+        guess (k, m) or (m,).
+        """
         k = len(q) if q.ndim == 2 else 1
         if k > self._rows:
             self._made(k)
@@ -174,7 +181,8 @@ class _Sets:
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
         """The r and w of the first set without wrong signs; adds to ``history`` how many rows each
-        change moved."""
+        change moved.
+        """
         seen: set[bytes] = set()
         fewest, patience = gap.size + 1, PATIENCE
         while True:
@@ -223,7 +231,8 @@ class _Sets:
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
         """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either
-        side."""
+        side.
+        """
         wrong = np.where(active, r, w) < -self._scaled.rounding(r)
         return wrong if self._scaled.unilateral else wrong & ~self._bilateral
 
@@ -240,7 +249,8 @@ class _Sets:
 
 class _Factor:
     """Cholesky factor of G_aa of one set, and the rows of G that carry its reactions to all
-    gaps."""
+    gaps.
+    """
 
     def __init__(self, active: Mask, matrix: Array) -> None:
         self._index = active.nonzero()[0]
@@ -251,7 +261,8 @@ class _Factor:
         """r (m,) with r = 0 off the set, and w = gap + G r.
 
         No iterative refinement: the residual of Cholesky is at rounding level already (measured
-        gain below a factor 2 for conditions up to 1e10)."""
+        gain below a factor 2 for conditions up to 1e10).
+        """
         r = np.zeros(gap.size)
         if self._lower is None:
             return r, gap.copy()

@@ -13,7 +13,8 @@ Scaling. With d_i = G_ii^(-1/2) the numbers r_i/d_i and w_i d_i are both in sqrt
 its form with d G d in the place of G. There forces and gaps, translations and rotations compare, so
 that every tolerance is a pure number. The unit is the violation of r = 0: the largest -q_i d_i
 (|q_i| d_i in bilateral rows), the contact there is to resolve. Gaps that are far from closing do
-not enter it: a wide gap does not blunt the certificate of a narrow one."""
+not enter it: a wide gap does not blunt the certificate of a narrow one.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -42,7 +43,8 @@ class LCPResult:
     where a grazing row (r = w = 0 but for rounding) may be either; ``residual``: max |min(r_i/d_i,
     w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, over the unit: 1 is what r = 0
     scores, 0 is exact, in all units of G and q; ``method`` the settings that made it. Each method
-    tells what ``iterations`` and ``history`` count."""
+    tells what ``iterations`` and ``history`` count.
+    """
 
     r: Array
     active: Mask
@@ -54,8 +56,10 @@ class LCPResult:
 
 @dataclass(frozen=True)
 class ScaledLCP:
-    """Hold d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or
-    dimensionless."""
+    """Hold d G d with its scale d: what the methods work on.
+
+    Everything here is in sqrt(J) or dimensionless.
+    """
 
     scale: Array
     matrix: Array
@@ -64,7 +68,8 @@ class ScaledLCP:
 
     def reaction(self, guess: Array | Mask | None, q: Array) -> Array:
         """Return a start for iterative methods: the guess itself, one Jacobi step on a guessed set,
-        or zero."""
+        or zero.
+        """
         if guess is None:
             return np.zeros(q.size)
         start = (
@@ -101,19 +106,23 @@ class ScaledLCP:
 
 @dataclass(frozen=True)
 class PreparedLCP:
-    """Solve problem (1) for one G and many q. ``search``: (scaled gap, guess, unit of the residual)
-    -> Found."""
+    """Solve problem (1) for one G and many q.
+
+    ``search``: (scaled gap, guess, unit of the residual) -> Found.
+    """
 
     method: object
     scaled: ScaledLCP
     search: Callable[[Array, Array | Mask | None, float], Found]
 
     def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
-        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their
-        active set.
+        """Solve the problem of q (m,) [m].
+
+        ``guess``: reactions of a similar problem, or their active set.
 
         Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf,
-        or +inf in a bilateral row, and for a guess that has not one entry a row."""
+        or +inf in a bilateral row, and for a guess that has not one entry a row.
+        """
         return self._solved(np.asarray(q, float), guess if guess is None else np.asarray(guess))
 
     def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
@@ -136,7 +145,8 @@ class PreparedLCP:
 
 def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
     """Check and scale a dense G. InputError when it is not finite or, unless ``unsymmetric`` allows
-    it, not symmetric (to 1e-8) of positive diagonal."""
+    it, not symmetric (to 1e-8) of positive diagonal.
+    """
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
     check_operator(G, bilateral)
@@ -146,7 +156,8 @@ def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> Sca
 
 def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
     """Return d G d, exactly symmetric where it is so to 1e-8, and its norm; InputError when it
-    should be and is not."""
+    should be and is not.
+    """
     matrix = np.ascontiguousarray(d[:, None] * G * d)
     if max_abs(matrix - matrix.T) <= 1e-8:
         matrix = 0.5 * (matrix + matrix.T)
@@ -160,8 +171,10 @@ def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arr
 
 
 def energy_scale(G: Array, *, signed: bool = False) -> Array:
-    """Return d = |G_ii|^(-1/2) (m,). InputError where G_ii is not positive, unless it may be: 0 is
-    then as good as the largest entry."""
+    """Return d = |G_ii|^(-1/2) (m,).
+
+    InputError where G_ii is not positive, unless it may be: 0 is then as good as the largest entry.
+    """
     if not np.isfinite(G).all():
         raise InputError(
             "the Delassus operator contains NaN or infinity: check the factorisation it came from"
@@ -180,7 +193,8 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
 
 def cholesky(G: Array) -> Array:
     """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G is not
-    positive definite."""
+    positive definite.
+    """
     if not G.size:  # LAPACK takes no empty matrix
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)

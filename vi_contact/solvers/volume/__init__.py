@@ -1,5 +1,6 @@
 """Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no
-condensation."""
+condensation.
+"""
 
 from ...core.lazy import lazy
 

@@ -31,7 +31,8 @@ class BoundedSystem:
 
     Attributes: soft: (m,) True where the support is a spring. spring, feet: stiffness k of these
         springs, in the unit of A, and the positions in x of their body ends. bounded: (m,) position
-        of the bounded unknown in z. symmetric: whether A is."""
+        of the bounded unknown in z. symmetric: whether A is.
+    """
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self.A, self.surface, self.scale = A, surface, scale
@@ -70,7 +71,8 @@ class BoundedSystem:
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
         """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free,
-        bilateral or not."""
+        bilateral or not.
+        """
         if self.surface.some(np.isnan(step.bound)):
             raise InputError(
                 "the bound of the contact conditions contains NaN: check the gap and the time "
@@ -92,8 +94,10 @@ class BoundedSystem:
         return z
 
     def reactions(self, f: Array) -> Array:
-        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Valid where the
-        bound is active."""
+        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w).
+
+        Valid where the bound is active.
+        """
         return np.asarray(-f[self.bounded])
 
     def norm(self) -> float:
@@ -107,7 +111,8 @@ class BoundedSystem:
 
     def assembled(self) -> Any:
         """Return A with its springs as an AIJ matrix: the given one when it is a PETSc matrix
-        without springs."""
+        without springs.
+        """
         mat = assembled(self.A)
         if not self.surface.some(self.soft):
             return mat
@@ -132,7 +137,9 @@ def assembled(A: EffectiveMatrix) -> Any:
 
 def aij(rows: sp.csr_matrix, comm: Any) -> Any:
     """Return the square AIJ matrix with these rows of this rank, columns numbered over all ranks.
-    Collective."""
+
+    Collective.
+    """
     size, kind = (rows.shape[0], None), PETSc.IntType
     arrays = rows.indptr.astype(kind), rows.indices.astype(kind), rows.data
     return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=comm)
@@ -140,7 +147,8 @@ def aij(rows: sp.csr_matrix, comm: Any) -> Any:
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
     """Return this rank's first global number, global column numbers and total, where ranks' parts
-    grow at their end."""
+    grow at their end.
+    """
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)

@@ -1,7 +1,8 @@
 """Put PETSc's reasons for stopping into words, and make StepFailures of them.
 
 PETSc 3.25 has other names for some reasons and other words for some errors; both are settled
-here."""
+here.
+"""
 
 import re
 import tomllib
@@ -37,7 +38,8 @@ GENERAL_ADVICE = (
 
 def name_of(reasons: type, reason: int) -> str:
     """Return the longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_...,
-    DIVERGED_..."""
+    DIVERGED_...
+    """
     names = [
         name
         for name, value in vars(reasons).items()

@@ -36,7 +36,8 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 @dataclass(frozen=True)
 class Found:
     """Hold the solution of one problem or of a sequence: r_n (m,), slip (L,), 0 where points stick,
-    SNES iterations."""
+    SNES iterations.
+    """
 
     state: FrictionUnknowns
     r_n: Array
@@ -55,7 +56,8 @@ class VolumeFriction:
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason, or when the thresholds do not
-        settle."""
+        settle.
+        """
         surface = self._body.surface
         rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
         cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
@@ -74,7 +76,8 @@ class VolumeFriction:
     ) -> Found:
         """Coulomb's problem with a coefficient (m,) that is given, from the solution of another
         one. The thresholds are those of all conditions: every rank extrapolates and judges them
-        alike."""
+        alike.
+        """
         following, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
         surface = self._body.surface
@@ -107,7 +110,8 @@ class VolumeFriction:
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
         """The guess, sliding as predicted, and no iterations; with disks the solution without
-        friction, whose slip gives the directions that Newton's method needs."""
+        friction, whose slip gives the directions that Newton's method needs.
+        """
         friction, scaled, own = self._friction, self._scaled, limit[self._body.surface.slots]
         state = FrictionUnknowns(
             self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs))
@@ -127,7 +131,8 @@ class VolumeFriction:
 
     def _result(self, step: StepProblem, found: Found) -> StepResult:
         """x, with sticking points put exactly where they were, and r_t within the last digit of its
-        disk."""
+        disk.
+        """
         surface, friction = self._body.surface, self._friction
         law = step.friction_at(friction.by_point(found.slip))
         limit = limit_of(law, found.r_n, surface.weights, step.scale)

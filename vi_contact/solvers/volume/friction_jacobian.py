@@ -1,5 +1,6 @@
 """Build the Jacobian of a step with friction: H = A x_ref/r_ref, B_t, and in 3D what lambda and
-gamma make of it."""
+gamma make of it.
+"""
 
 import weakref
 from typing import Any
@@ -17,7 +18,8 @@ Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 
 class FrictionJacobian:
     """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix, with the names of
-    that function."""
+    that function.
+    """
 
     def __init__(self, scaled: ScaledFrictionStep) -> None:
         self._system: FrictionSystem = scaled.friction
@@ -39,7 +41,8 @@ class FrictionJacobian:
 
     def _entries(self) -> tuple[int, dict[str, Entries]]:
         """How many columns there are on all ranks, and the parts of the matrix; zeros for what
-        changes."""
+        changes.
+        """
         system = self._system
         body, line, pairs = system.body, system.line, system.pairs
         indptr, columns, A = _rows_of(body)

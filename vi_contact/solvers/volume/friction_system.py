@@ -44,7 +44,8 @@ class FrictionSystem:
     Attributes: point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A
         of each lambda. disk: (m,) True for points with two free tangents; ``any_disk``: whether
         some rank has one. pairs: (D, 2) places of their lambdas; line: (L,) True for the other
-        lambdas."""
+        lambdas.
+    """
 
     def __init__(self, body: BoundedSystem) -> None:
         self.body, self.surface = body, body.surface
@@ -86,7 +87,8 @@ class FrictionUnknowns:
 
 class ScaledFrictionStep(ScaledStep):
     """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds, for the step and
-    limits set last."""
+    limits set last.
+    """
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
         super().__init__(friction.body, tolerance)
@@ -165,7 +167,8 @@ class ScaledFrictionStep(ScaledStep):
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
         """Return the errors as without friction; the second counts what is wrong in slips and disks
-        too."""
+        too.
+        """
         friction, s = self.friction, self.disk_limits
         _, reaction, gamma = friction.split(y)
         body, still, room = self._parts(y)
@@ -204,7 +207,8 @@ class ScaledFrictionStep(ScaledStep):
 
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
         """Return the state with reactions in new disks (m,): sliding points on their edge, along
-        their slip (L,)."""
+        their slip (L,).
+        """
         friction, s = self.friction, limit
         way, inside = friction.by_point(slip), project(friction.by_point(state.reaction), s)
         speed = np.linalg.norm(way, axis=1)

@@ -6,7 +6,8 @@ volume route.
 In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO
 know of contact. With friction the tangential reactions become bounded unknowns too (``friction``);
 then there is nothing to minimise, and only SNES can do it. Reference: PETSc manual, chapters SNES
-(variational inequalities) and TAO."""
+(variational inequalities) and TAO.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -33,8 +34,10 @@ __all__ = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 
 
 class Method(Protocol):
-    """Say how the bounded problem is solved: settings that make a driver. One that
-    ``carries_friction`` makes two, as ReducedNewton does."""
+    """Say how the bounded problem is solved: settings that make a driver.
+
+    One that ``carries_friction`` makes two, as ReducedNewton does.
+    """
 
     @property
     def carries_friction(self) -> bool: ...
@@ -54,7 +57,8 @@ class Volume:
             the nearest known.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: the largest relative error that is accepted when a solver stops improving above
-            round-off."""
+            round-off.
+    """
 
     method: Method = field(default_factory=ReducedNewton)
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)
@@ -80,7 +84,8 @@ class Volume:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that the method cannot carry, without a tangent, or of
-        wrong length."""
+        wrong length.
+        """
         if problem.frictional and not self.method.carries_friction:
             raise InputError(
                 f"Volume({self.method}) only enforces bounds on displacements and would ignore "
@@ -94,8 +99,10 @@ class Volume:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedVolume":
-        """Return the solver for one effective matrix; collective. InputError for options that
-        cannot work."""
+        """Return the solver for one effective matrix; collective.
+
+        InputError for options that cannot work.
+        """
         return PreparedVolume(self, A, surface, scale)
 
 
@@ -103,7 +110,8 @@ class PreparedVolume:
     """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is
-    collective."""
+    collective.
+    """
 
     def __init__(
         self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float
@@ -131,7 +139,8 @@ class PreparedVolume:
 
     def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the
-        other one."""
+        other one.
+        """
         if self._friction is None:
             self.close()
             method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
@@ -179,12 +188,14 @@ class PreparedVolume:
 
     def excuse_options(self) -> None:
         """Take options that nothing reads: they are for another method, in whose place this one is
-        tried."""
+        tried.
+        """
         self._all_read = True
 
     def _refuse_unread(self, iterations: int) -> None:
         """Raise InputError for options that nothing has read, once the parts of the solver have
-        been at work."""
+        been at work.
+        """
         if iterations and not self._all_read:
             self._all_read = True
             self._layers.refuse_unread(self._name, self._comm)

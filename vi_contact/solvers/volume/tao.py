@@ -20,7 +20,8 @@ from .snes import AssembledJacobian, weakly, write_bounds
 def check_tao(tao: Any, layers: OptionLayers) -> None:
     """Refuse other types and preconditioners that give wrong answers, also when they come from
     options (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as
-    converged)."""
+    converged).
+    """
     if tao.getType() != "tron":
         refuse(
             f"TAO type {tao.getType()}",
@@ -80,7 +81,8 @@ class TaoDriver:
 
     def _test(self, tao: Any) -> int | None:
         """PETSc's reason to stop: its own, which only the user's tolerances bring, then our
-        verdict; None to go on."""
+        verdict; None to go on.
+        """
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
@@ -106,7 +108,8 @@ class TaoTron:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's; PETSc has no incomplete Cholesky for
-        several ranks."""
+        several ranks.
+        """
         return {**TABLES["tron"], "pc_type": "icc" if ranks == 1 else "bjacobi"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
