@@ -23,8 +23,9 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN. The places are found faster
-    than the values.
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN.
+
+    The places are found faster than the values.
     """
     return float(max(x.item(x.argmax()), -x.item(x.argmin()))) if x.size else 0.0
 
@@ -47,8 +48,9 @@ class Comm(Protocol):
 
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
-    """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one
-    rank says True.
+    """Return the largest of the ranks' values, the same on every rank.
+
+    Of truth values it is 1 where one rank says True.
     """
     return float(value) if comm.size == 1 else float(comm.max(np.array([float(value)]))[0])
 
@@ -64,8 +66,9 @@ def from_each(comm: Comm, value: Any) -> list[Any]:
 
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
-    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers; elsewhere
-    none. Collective.
+    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers.
+
+    Other ranks get none. Collective.
     """
     parts = comm.gather((numbers, rows))
     if parts is None:
@@ -77,8 +80,9 @@ def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
 
 
 class Matrix(Protocol):
-    """Provide products with a square sparse matrix whose rows are distributed like the vectors it
-    multiplies.
+    """Provide products with a square sparse matrix.
+
+    Its rows are distributed like the vectors it multiplies.
     """
 
     @property
@@ -98,15 +102,17 @@ class Factor(Protocol):
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
-        """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row
-        ``owned[k]`` of the owning rank. Returns the owned rows, shape (rows, m), or only those of
-        them that are named: the whole may not fit.
+        """Return the columns A^-1 e_j for m unit vectors.
+
+        e_{slots[k]} has its one in row ``owned[k]`` of the owning rank. Returned are the owned
+        rows, shape (rows, m), or only those of them that are named: the whole may not fit.
         """
 
 
 class Algebra(Protocol):
-    """Make matrices out of matrices: of M, C, K and their combinations, all of them ``symmetric``
-    or not.
+    """Make matrices out of matrices.
+
+    These are M, C, K and their combinations, all of them ``symmetric`` or not.
     """
 
     symmetric: bool
@@ -118,21 +124,21 @@ class Algebra(Protocol):
         """Return Tᵀ K T."""
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of entries between the n unknowns of one rank; those given twice add
-        up.
+        """Return the matrix of entries between the n unknowns of one rank.
+
+        Entries that are given twice add up.
         """
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
-        """Return A with the rows and columns of the masked unknowns replaced by those of the
-        identity.
-        """
+        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
         """Return the rows and columns of A of the masked unknowns, which their ranks own."""
 
     def first(self, n: int) -> int:
-        """Return the number, among those of all ranks, of the first of the n unknowns that this
-        rank owns.
+        """Return the number of the first of the n unknowns that this rank owns.
+
+        It is the number among the unknowns of all ranks.
         """
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
@@ -142,15 +148,17 @@ class Algebra(Protocol):
         """
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        """Return the identity of n owned rows with some of them replaced, columns numbered over all
-        ranks.
+        """Return the identity of n owned rows with some of them replaced.
+
+        Columns are numbered over all ranks.
         """
 
     def factor(self, A: Matrix) -> Factor: ...
     def contact_last(self, A: Matrix, last: Indices) -> Any:
-        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are
-        numbered over all ranks and the same on every rank. None where ``factor`` serves better or
-        there is none. Collective.
+        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``.
+
+        The unknowns are numbered over all ranks and the same on every rank. The answer is None
+        where ``factor`` serves better or there is none. Collective.
         """
 
     def dot(self, x: Array, y: Array) -> float: ...
@@ -183,8 +191,9 @@ class EffectiveMatrix:
         self.desk: dict[Any, tuple[list[Any], list[Any]]] = {}  # where small vectors are read
 
     def contact_last(self, last: Indices) -> Any:
-        """Return the factor with these unknowns last (see ``Algebra``), which is then ``factor``
-        too. Collective.
+        """Return the factor with these unknowns last (see ``Algebra``).
+
+        It is then ``factor`` too. Collective.
         """
         if self._last is None or not np.array_equal(self._last[0], last):
             self._last = last, self.algebra.contact_last(self.matrix, last)
@@ -257,8 +266,9 @@ class SerialMatrix:
 
 
 class SerialFactor:
-    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged
-    where they must.
+    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering.
+
+    Rows are exchanged where they must.
     """
 
     def __init__(self, matrix: SerialMatrix) -> None:
@@ -280,8 +290,9 @@ class SerialFactor:
 
 
 class SerialAlgebra:
-    """Combine matrices of scipy.sparse on one process; solvers that need symmetric ones ask for
-    ``symmetric``.
+    """Combine matrices of scipy.sparse on one process.
+
+    Solvers that need symmetric ones ask for ``symmetric``.
     """
 
     def __init__(self, *, symmetric: bool = True) -> None:
@@ -332,8 +343,9 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
-    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin
-    at ``first``.
+    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows.
+
+    The rows begin at ``first``.
     """
     counts, columns, values = (
         [np.zeros(1, dtype=np.int64)],
@@ -353,8 +365,9 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
 
 
 def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
-    """Return n rows of the identity, whose ones begin in column ``first``, with these rows replaced
-    by the entries.
+    """Return n rows of the identity, with these rows replaced by the entries.
+
+    The ones of the identity begin in column ``first``.
     """
     kept = np.setdiff1d(np.arange(n), rows)
     where = np.concatenate([kept, np.repeat(rows, np.diff(entries.indptr))])

@@ -1,5 +1,6 @@
-"""Check the arguments of public functions against their types, so that a wrong one is a sentence
-and no traceback.
+"""Check the arguments of public functions against their types.
+
+A wrong argument is then a sentence and no traceback.
 
 ``@checked`` is for functions that users call with their own values, and that look at these before
 any other function does. Limits of numbers (positive, finite) are checked by the functions
@@ -28,8 +29,9 @@ R = TypeVar("R")
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with a check of its arguments: InputError for one that is not of its
-    type.
+    """Return the function with a check of its arguments.
+
+    The check raises InputError for an argument that is not of its type.
     """
     name, of = function.__qualname__, signature(function)
 
@@ -48,8 +50,9 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def check_fields(one: Any) -> None:
-    """Raise InputError for the first field of a dataclass that is not of its type: call it in
-    ``__post_init__``.
+    """Raise InputError for the first field of a dataclass that is not of its type.
+
+    Call it in ``__post_init__``.
     """
     kind: Any = type(one)
     hints = _hints(kind)
@@ -65,7 +68,7 @@ def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
 
 @cache
 def _hints(owner: Any) -> dict[str, Any]:
-    """The types of arguments or fields, each once."""
+    """Return the types of arguments or fields, each once."""
     return typing.get_type_hints(owner)
 
 
@@ -177,7 +180,7 @@ def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
 
 
 def _asked(protocol: Any) -> list[str]:
-    """The attributes and methods that a protocol asks for."""
+    """Return the attributes and methods that a protocol asks for."""
     names = {
         name
         for one in protocol.__mro__

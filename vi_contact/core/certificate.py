@@ -9,8 +9,9 @@ from functools import cached_property
 
 @dataclass(frozen=True)
 class Certificate:
-    """Hold the dimensionless residuals of the inequality problem of one step; each is 0 for an
-    exact solution.
+    """Hold the dimensionless residuals of the inequality problem of one step.
+
+    Each is 0 for an exact solution.
 
     equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max, 1e-5 |A_ii|_max |x|_max). The last term matters on
     fine meshes only, where the parts of A x cancel: it keeps the rounding errors of the residual itself (1e-16 |A||x|)

@@ -42,8 +42,9 @@ _OPEN: list[
 
 @contextmanager
 def together(comm: Comm) -> Iterator[None]:
-    """Open a frame: what ``users`` keeps in it, or this rank raises, is raised on all ranks at its
-    end. Collective.
+    """Open a frame at whose end errors are raised on all ranks.
+
+    These are what ``users`` keeps in it, and what this rank raises. Collective.
 
     Where ``users`` kept an error, all ranks raise the first of these. Otherwise a rank raises its
     own error, and those without one raise that of the first rank that has one. What is raised
@@ -67,14 +68,15 @@ def together(comm: Comm) -> Iterator[None]:
 
 
 def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
-    """Open a frame for calls of a scheme, a solver or a law of the user's own, which may raise
-    anywhere.
+    """Open a frame for calls of a scheme, a solver or a law of the user's own.
+
+    These may raise anywhere.
     """
     return nullcontext() if type(value).__module__.startswith("vi_contact.") else together(comm)
 
 
 def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> Exception:
-    """The error that this rank raises when some rank has one. Collective."""
+    """Return the error that this rank raises when some rank has one. Collective."""
     own: Any = kept or broken
     kind = next((number for number, kind in enumerate(KINDS) if isinstance(own, kind)), None)
     every = from_each(comm, None if own is None else (kept is not None, kind, str(own), repr(own)))
@@ -121,8 +123,9 @@ def _input_error(name: str, error: Exception) -> ViContactError:
 
 
 def kept_error(name: str, error: Exception, instead: T) -> T:
-    """Raise what a user's function has raised, or keep it for the end of the frame and return
-    ``instead``.
+    """Raise what a user's function has raised, or keep it for the end of the frame.
+
+    When it is kept, ``instead`` is returned.
     """
     told = _input_error(name, error)
     if not _OPEN:
@@ -150,8 +153,9 @@ def slope_of(law: Any, weights: Any) -> Any:
 
 
 def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
-    """Raise InputError, on all ranks, that names the first argument which is not the same on all of
-    them. Collective.
+    """Raise InputError on all ranks unless arguments are the same on all of them.
+
+    The error names the first argument that is not the same. Collective.
 
     Numbers, texts, arrays, and lists and dataclasses of these are compared; of functions and of
     other objects the type alone. ``Parts`` says of which argument each rank may hold its part:
@@ -190,8 +194,9 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
 
 
 class Parts:
-    """Wrap an argument of which each rank may hold its part: its tuples, lists and arrays are not
-    compared.
+    """Wrap an argument of which each rank may hold its part.
+
+    Its tuples, lists and arrays are not compared.
     """
 
     def __init__(self, value: Any) -> None:
@@ -202,7 +207,7 @@ class Parts:
 
 
 def _described(value: Any, depth: int, parts: bool = False) -> str:
-    """A text that is the same on all ranks where the argument is."""
+    """Return a text that is the same on all ranks where the argument is."""
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
     if isinstance(value, Parts):
         return _described(value.value, depth, parts=True)
@@ -235,7 +240,7 @@ def _described(value: Any, depth: int, parts: bool = False) -> str:
 
 
 def _of_many(value: Any, depth: int) -> str:
-    """A text of the members of a list or array, short where they are many numbers."""
+    """Return a text of the members of a list or array, short where they are many numbers."""
     if (
         isinstance(value, np.ndarray)
         or len(value) > LONG

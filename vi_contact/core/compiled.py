@@ -1,5 +1,7 @@
-"""Compile the C files of this room when they are first needed, and keep them in the user's cache,
-as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact.
+"""Compile the C files of this room when they are first needed.
+
+They are kept in the user's cache, as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder
+vi_contact.
 
 ``loops.c`` needs a C compiler only. ``contact_last.c`` needs CHOLMOD too, and takes none but the
 one that PETSc has brought into the process: another one beside it would share names with it, and
@@ -33,16 +35,18 @@ OF_CHOLMOD = ("order", "factorise", "columns", "release", "substitute")
 
 
 def library(comm: Comm) -> Any:
-    """Return the functions of ``loops.c``, or None, the same on all ranks; the first rank compiles
-    them. Collective.
+    """Return the functions of ``loops.c``, or None, the same on all ranks.
+
+    The first rank compiles them. Collective.
     """
     return _alike(comm, _loops)
 
 
 def cholmod(comm: Comm) -> Any:
-    """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD, or None where PETSc has no
-    CHOLMOD or nothing can be compiled, the same on all ranks; the first rank compiles it.
-    Collective.
+    """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD.
+
+    It is None where PETSc has no CHOLMOD or nothing can be compiled, and the same on all ranks. The
+    first rank compiles it. Collective.
     """
     return _alike(comm, _factoriser)
 
@@ -62,7 +66,10 @@ def _alike(comm: Comm, found: Callable[[], Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _loops() -> Any:
-    """The functions; None, and once a line in the log, where there is no compiler or cache."""
+    """Return the functions, or None where there is no compiler or cache.
+
+    Without one, a line in the log says so once.
+    """
     try:
         found = ctypes.CDLL(str(compiled(LOOPS, [])))
     except (
@@ -80,8 +87,9 @@ def _loops() -> Any:
 
 
 def _factoriser() -> Any:
-    """The functions for the CHOLMOD of this process, which a PETSc may bring later than we are
-    asked first.
+    """Return the functions for the CHOLMOD of this process.
+
+    A PETSc may bring it later than we are asked first.
     """
     try:
         return _with_cholmod(cholmod_of_petsc())
@@ -116,8 +124,10 @@ def _without_cholmod(reason: str) -> None:
 
 
 def cholmod_of_petsc() -> Path:
-    """Return the file of the CHOLMOD that PETSc has brought into this process; OSError, which says
-    why, without one.
+    """Return the file of the CHOLMOD that PETSc has brought into this process.
+
+    Raises:
+        OSError: there is none; the error says why.
     """
     if not packages.petsc_is_here():
         raise OSError("no PETSc is in this process")
@@ -132,8 +142,9 @@ def cholmod_of_petsc() -> Path:
 
 
 def _header(file: Path) -> Path:
-    """The folder of the header that was installed with this library: lib, or lib/x86_64-linux-gnu,
-    beside include.
+    """Return the folder of the header that was installed with this library.
+
+    The library lies in lib, or lib/x86_64-linux-gnu, beside include.
     """
     for parent in file.parents[1:3]:
         for folder in (parent / "include" / "suitesparse", parent / "include"):
@@ -170,7 +181,7 @@ def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
 
 
 def _said(problem: Exception) -> str:
-    """The first line of what a compiler or the system said."""
+    """Return the first line of what a compiler or the system said."""
     return (
         (getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)]
     )[0]

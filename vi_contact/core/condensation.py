@@ -1,5 +1,6 @@
-"""Condense A onto contact unknowns c: their flexibility, their motion without reactions, and the
-answer to reactions.
+"""Condense A onto contact unknowns c.
+
+What comes of it is their flexibility, their motion without reactions, and the answer to reactions.
 
     G = (A⁻¹)_cc,    free: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
 
@@ -67,8 +68,9 @@ class Last:
         return x if self._all else x.T[self.there].T
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
-        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it
-        removes round-off only.
+        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values.
+
+        Holding them removes round-off only.
         """
         if np.count_nonzero(r):
             x = self._factor.free(self._y - self._factor.reduced(self._moving(r)))
@@ -83,8 +85,9 @@ class Last:
 
 
 class _Twice:
-    """Hold the same with any factor of A; ``owned`` contact unknowns of this rank and their
-    ``places`` among all.
+    """Hold the same with any factor of A.
+
+    There are ``owned`` contact unknowns of this rank and they have ``places`` among all.
     """
 
     def __init__(

@@ -29,8 +29,9 @@ def at_right_angles(directions: Array) -> bool:
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
-    """Return (columns, Q): the frame of a node with two or three independent contact directions (k,
-    d).
+    """Return (columns, Q), the frame of a node with several contact directions.
+
+    These are two or three independent directions (k, d).
     """
     d, square = directions.shape[1], at_right_angles(directions)
     columns: list[int] = []
@@ -55,8 +56,9 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
 
 
 def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
-    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,), along which
-    slip and r_t are.
+    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,).
+
+    Slip and r_t are along them.
 
     Of a node with several directions they are the other vectors of its frame. ``nodes``: None for
     one each.
@@ -94,9 +96,10 @@ def refuse_rubbing(surface: ContactSurface) -> None:
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
-    """Return the target normal velocities (m,), NaN for open faces, with those that oblique open
-    faces get from the closed faces of their nodes, whose velocity changes along the normals of
-    these.
+    """Return the target normal velocities (m,), NaN for open faces.
+
+    Among them are those that oblique open faces get from the closed faces of their nodes, whose
+    velocity changes along the normals of these.
     """
     corners = oblique_corners(surface)
     if not corners:
@@ -115,8 +118,9 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
 
 
 def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
-    """Return (rows, columns, values) of the lumped masses ``nodal``: the diagonal, but m G⁻¹ at
-    oblique corners.
+    """Return (rows, columns, values) of the lumped masses ``nodal``.
+
+    The matrix is the diagonal, but m G⁻¹ at oblique corners.
     """
     rows = [np.arange(len(nodal))]
     columns, values = [rows[0]], [nodal.copy()]

@@ -38,8 +38,9 @@ FRAMES = re.compile(r"frames_\d{6,}\.h5")  # a file of several frames
 
 
 def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
-    """Return where the frames of an XDMF series in a run folder are: step -> (HDF5 file, group in
-    it).
+    """Return where the frames of an XDMF series in a run folder are.
+
+    The answer is step -> (HDF5 file, group in it).
 
     InputError where the folder of fields, or a file of frames, is a link.
     """
@@ -55,8 +56,9 @@ def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
 
 
 def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
-    """Return the action's value on rank 0, None elsewhere; what it raises there is raised on every
-    rank.
+    """Return the action's value on rank 0, None elsewhere.
+
+    What it raises there is raised on every rank.
 
     An OSError becomes a ViContactError of one sentence with path and reason. Collective.
     """
@@ -119,8 +121,9 @@ def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
 
 
 def write_output(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file that a user has named, as a whole or not at all; to a stream, such as
-    /dev/stdout, as it is.
+    """Write a file that a user has named, as a whole or not at all.
+
+    To a stream, such as /dev/stdout, it is written as it is.
 
     OSError names the file. A link of this name is replaced, and what it points at stays as it
     is.
@@ -133,8 +136,10 @@ def write_output(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def copy_start(source: Path, target: Path, length: int) -> None:
-    """Copy the first bytes of a file of a run, as a whole or not at all; OSError names the
-    target.
+    """Copy the first bytes of a file of a run, as a whole or not at all.
+
+    Raises:
+        OSError: names the target.
     """
     with open_to_read(source) as old, _whole_or_not_at_all(target) as new:
         left = length
@@ -190,8 +195,10 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
-    """Open an unbuffered file beside ``path`` that takes its place at the end; OSError names
-    ``path``.
+    """Open an unbuffered file beside ``path`` that takes its place at the end.
+
+    Raises:
+        OSError: names ``path``.
     """
     temporary = temporary_of(path)
     try:
@@ -207,8 +214,11 @@ def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
 
 
 def open_hdf5(path: Path) -> StoredFile:
-    """Open an HDF5 file of a run folder to be read; OSError when it is none, InputError when it is
-    a link.
+    """Open an HDF5 file of a run folder to be read.
+
+    Raises:
+        OSError: it is no HDF5 file.
+        InputError: it is a link.
     """
     return StoredFile(path)
 
@@ -226,8 +236,9 @@ def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
 
 
 class _Kept:
-    """A file for HDF5, which does not survive a full disk: the error is kept, and what comes after
-    it is dropped.
+    """Hold a file for HDF5, which does not survive a full disk.
+
+    The error is kept, and what comes after it is dropped.
     """
 
     def __init__(self, file: Any) -> None:

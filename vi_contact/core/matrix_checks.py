@@ -1,5 +1,6 @@
-"""Check matrices that a user brings: finite, symmetric, and masses that are not negative, on any
-number of ranks.
+"""Check matrices that a user brings, on any number of ranks.
+
+They must be finite and symmetric, and masses not negative.
 
 A matrix is seen through its products A w and Aᵀ w with a vector made of the numbers of the
 unknowns, in units in which its diagonal is one: nothing is stored, and the answer depends neither
@@ -24,8 +25,9 @@ def probe(numbers: Any, j: int) -> Array:
 
 
 def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
-    """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them; ``numbers`` (n,) are
-    those of the owned unknowns. Collective.
+    """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them.
+
+    ``numbers`` (n,) are those of the owned unknowns. Collective.
     """
     size = np.sqrt(np.abs(A.diagonal()))
     size = np.where(size > 0.0, size, largest(comm, max_abs(size)) or 1.0)
@@ -39,8 +41,10 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
 
 
 def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix) -> Iterator[str]:
-    """Yield a sentence for each matrix that is not finite, and for M that is not symmetric or has
-    masses below zero. Collective: take all of them on every rank.
+    """Yield a sentence for each matrix that is not as it must be.
+
+    These are matrices that are not finite, and M that is not symmetric or has masses below zero.
+    Collective: take all of them on every rank.
     """
     for name, A in matrices.items():
         found = asymmetry(A, comm, numbers)

@@ -1,5 +1,6 @@
-"""Say where a rigid obstacle lies: contact directions and initial gaps, and what is asked of
-them.
+"""Say where a rigid obstacle lies.
+
+It does so by contact directions and initial gaps; the module also checks what is asked of them.
 """
 
 from collections.abc import Callable
@@ -22,8 +23,9 @@ REMEDY = (
 
 
 class Obstacle(Protocol):
-    """Say where a rigid support lies: the contact direction of each point of a boundary, and its
-    initial gap.
+    """Say where a rigid support lies.
+
+    It gives the contact direction of each point of a boundary, and its initial gap.
     """
 
     def directions(self, points: Array, normals: Array) -> Array:
@@ -55,8 +57,9 @@ class Touching:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Describe a rigid half-space behind the plane through ``point``, whose ``normal`` points
-    towards the body.
+    """Describe a rigid half-space behind the plane through ``point``.
+
+    Its ``normal`` points towards the body.
 
     The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact
     direction is -normal.
@@ -91,9 +94,10 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class AnalyticGap:
-    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's
-    outward normal. It is asked for the points of each rank by themselves: let no gap depend on
-    other points, as on their mean or lowest.
+    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m].
+
+    It is measured along the body's outward normal. It is asked for the points of each rank by
+    themselves: let no gap depend on other points, as on their mean or lowest.
     """
 
     function: Callable[[Array], Array]
@@ -180,8 +184,9 @@ def facing(
 
 
 def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> None:
-    """Raise InputError, once for a whole boundary, for unit directions along it or into the
-    body.
+    """Raise InputError for unit directions along the boundary or into the body.
+
+    It is raised once for a whole boundary.
     """
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
@@ -204,13 +209,15 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
 
 
 def _of(name: str) -> str:
-    """The name of a boundary in a sentence."""
+    """Return the name of a boundary in a sentence."""
     return f" of '{name}'" if name else ""
 
 
 def _turned_smoothly(cosines: Array, angle: float) -> Mask:
-    """Which normals (m,), by their cosines with the direction, are reached from the one that looks
-    towards it most by turns of no more than ``angle`` from one normal to the next.
+    """Return which normals (m,) are reached from the one that looks most in the direction.
+
+    They are judged by their cosines with the direction, and reached by turns of no more than
+    ``angle`` from one normal to the next.
     """
     turns = np.arccos(np.clip(cosines, -1.0, 1.0))
     steps = np.unique(turns)
@@ -219,13 +226,15 @@ def _turned_smoothly(cosines: Array, angle: float) -> Mask:
 
 
 def _unit(vector: Array) -> Array:
-    """The vector with length one, zero as it is, without negative zeros."""
+    """Return the vector with length one, zero as it is, without negative zeros."""
     return np.asarray(vector / (np.linalg.norm(vector) or 1.0) + 0.0)
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:
-    """Return the initial gap without round-off (1e-12 of the body's size); InputError where the
-    body penetrates.
+    """Return the initial gap without round-off (1e-12 of the body's size).
+
+    Raises:
+        InputError: the body penetrates the obstacle.
     """
     if not np.all(np.isfinite(gap)):
         raise InputError(

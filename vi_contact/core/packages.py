@@ -1,5 +1,6 @@
-"""Ask which packages PETSc was built with, without an import of PETSc: rooms that do without it may
-ask too.
+"""Ask which packages PETSc was built with, without an import of PETSc.
+
+Rooms that do without it may ask too.
 
 Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on somebody's machine.
 """
@@ -20,8 +21,9 @@ def petsc_is_here() -> bool:
 
 
 def petsc_has(package: str) -> bool:
-    """Say whether PETSc is in this process, and was built with a package, by its name in PETSc's
-    configuration.
+    """Say whether PETSc is in this process, and was built with a package.
+
+    The package is given by its name in PETSc's configuration.
     """
     if not petsc_is_here():
         return False

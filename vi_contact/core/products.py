@@ -1,5 +1,6 @@
-"""Make nothing twice: several parts of a step ask for products with the same vectors, and for one
-load.
+"""Make no product twice.
+
+Several parts of a step ask for products with the same vectors, and for one load.
 
 Remembered are read-only vectors (``frozen``), each known as the object it is; what is handed out is
 read-only too.

@@ -1,5 +1,6 @@
-"""Make the state a run begins with; check that a state belongs to a problem: its time, its arrays
-on every rank.
+"""Make the state a run begins with; check that a state belongs to a problem.
+
+The check looks at its time and its arrays on every rank.
 """
 
 from collections.abc import Iterator
@@ -61,8 +62,10 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
-    """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is
-    in the obstacle.
+    """Return u0 and v0 of the system in the rotated basis, without reaction.
+
+    Raises:
+        InputError: u0 is in the obstacle.
     """
     system, surface = problem.equations, problem.surface
     gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)

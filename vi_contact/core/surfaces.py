@@ -31,8 +31,9 @@ Motion = Callable[[float], float | Array]
 
 
 class WatchedNodes(Protocol):
-    """Say where nodes of a contact boundary are that move as they are prescribed, and have no
-    condition.
+    """Say where nodes of a contact boundary are that have no condition.
+
+    They move as they are prescribed.
     """
 
     def smallest(self, t: float) -> float:
@@ -166,8 +167,9 @@ class ContactSurface:
 
     @cached_property
     def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
-        """Return (m, d - 1), where compiled functions find these arrays, None where all is plain,
-        and the arrays.
+        """Return (m, d - 1), where compiled functions find the arrays, and the arrays.
+
+        The place of an array is None where all is plain.
         """
         kept = (
             np.ascontiguousarray(self.owned, np.int64),
@@ -177,9 +179,10 @@ class ContactSurface:
         return self.tangents.shape, [None if one is None else at(one) for one in kept], kept
 
     def everywhere(self, values: NDArray[Any]) -> Any:
-        """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on
-        every rank, of one type. Collective; for output, and for small problems that every rank
-        solves.
+        """Return (total, …) the values (m, …) of all conditions, by their numbers.
+
+        They are the same on every rank, and of one type. Collective; for output, and for small
+        problems that every rank solves.
         """
         if self.comm.size == 1:
             return np.asarray(values)
@@ -232,22 +235,25 @@ class ContactSurface:
         return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
     def slip(self, u: Array, t: float) -> Array:
-        """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points
-        too.
+        """Return the tangential displacements on the obstacle (m, d - 1) [m].
+
+        Those of open points are among them.
         """
         there = self.tangential_values(u)
         return there if self.slide is None else there - self.slide(t)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array:
-        """Return B_t u plus what the obstacle slides between two times, (m, d - 1): where the slip
-        is zero.
+        """Return B_t u plus what the obstacle slides between two times, (m, d - 1).
+
+        The slip is zero there.
         """
         origin, sliding = self.tangential_values(u), self.sliding(start, end)
         return origin if sliding is None else origin + sliding
 
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
-        """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns
-        [N].
+        """Return B_nᵀ r_n + B_tᵀ r_t, the contact reaction on the unknowns [N].
+
+        It is the owned part.
         """
         load = np.zeros((*r_n.shape[:-1], rows))
         load.T[self.owned] = r_n.T
@@ -257,8 +263,9 @@ class ContactSurface:
         return load
 
     def gap(self, t: float) -> Array:
-        """Return the gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle
-        has moved.
+        """Return the gap of the undeformed body at time t, (m,) [m].
+
+        It is gap0 less what the obstacle has moved.
         """
         return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
 
@@ -271,23 +278,27 @@ class ContactSurface:
             one.refuse_driven(t)
 
     def advance(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves towards the body between two times, (m,) [m]; None for one
-        at rest.
+        """Return what the obstacle moves towards the body between two times, (m,) [m].
+
+        It is None for one at rest.
         """
         return None if self.motion is None else self.motion(end) - self.motion(start)
 
     def sliding(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None
-        for one at rest.
+        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m].
+
+        It is None for one at rest.
         """
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
     def moving(
         self, towards: Motion | None = None, along: Motion | None = None
     ) -> "ContactSurface":
-        """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the
-        tangents, t [s] -> [m], one value for all points or arrays of shape (m,) and (m, d-1), in
-        the order of ``points``. A moving obstacle is not turned; its points face the same nodes.
+        """Return the surface on an obstacle that moves.
+
+        It moves ``towards`` the body and ``along`` the tangents; both are t [s] -> [m], one value
+        for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving
+        obstacle is not turned; its points face the same nodes.
         """
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
@@ -317,8 +328,9 @@ class ContactSurface:
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 
     def with_frictionless_corners(self) -> "ContactSurface":
-        """Let nodes, beside friction, with several conditions slide freely over their faces; else
-        they are refused.
+        """Let nodes with several conditions slide freely over their faces beside friction.
+
+        Else they are refused.
 
         What such a node could rub on one face is a force across the other, which the conditions,
         each a bound on one unknown, do not hold. In space it still rubs along its edge, with the
@@ -333,8 +345,9 @@ class ContactSurface:
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> "ContactSurface":
-        """Return the surface on a linearly deformable support of foundation modulus ``stiffness``
-        [Pa/m].
+        """Return the surface on a linearly deformable support.
+
+        ``stiffness`` [Pa/m] is its foundation modulus.
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the
         unilateral law.
@@ -346,7 +359,11 @@ class ContactSurface:
 
 
 def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
-    """A value for all points, or one for each; InputError for what are no finite metres."""
+    """Return a value for all points, or one for each.
+
+    Raises:
+        InputError: what are no finite metres.
+    """
     found = np.asarray(value)
     alike = all(
         n in (1, m) for n, m in zip(found.shape[::-1], shape[::-1], strict=False)
@@ -361,8 +378,9 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
 
 
 def same_node(nodes: Indices) -> tuple[Indices, ...]:
-    """Return the places of each number that stands several times in ``nodes`` (m,), in the order of
-    the numbers.
+    """Return the places of each number that stands several times in ``nodes`` (m,).
+
+    They are in the order of the numbers.
     """
     order = np.argsort(nodes, kind="stable")
     _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
@@ -374,8 +392,9 @@ def same_node(nodes: Indices) -> tuple[Indices, ...]:
 
 
 def nodal_frames(directions: Array) -> Array:
-    """Return orthonormal frames (k, d, d) whose first column is the contact direction n, the others
-    tangential.
+    """Return orthonormal frames (k, d, d) of contact directions.
+
+    The first column is the contact direction n, the others are tangential.
 
     2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1.
     """
@@ -394,8 +413,9 @@ def nodal_frames(directions: Array) -> Array:
 
 
 def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
-    """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is
-    the normal one.
+    """Return (c, Q), nodal frames (k, d, d) with the contact direction in column c.
+
+    Component c is the normal one.
 
     c is the direction's largest component. Axes at right angles to the direction keep their own
     columns: these are the components that may be prescribed.
