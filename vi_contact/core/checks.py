@@ -365,7 +365,8 @@ def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
     found, defect, failure = [], "", None
     try:
         found.append(call())
-    except Exception as error:  # of a user's function, which may raise anything: the others must not wait for this one
+    except Exception as error:
+        # A user's function may raise anything, and the others must not wait for this one.
         defect, failure = ended(name, error), error
     try:
         refuse([defect], comm)

@@ -51,10 +51,16 @@ def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix)
         if not np.isfinite(found):
             yield f"{owner}: {name} has NaN or infinite entries; give finite numbers"
         elif found > SYMMETRIC and name == "M":
-            yield f"{owner}: M is not symmetric, M w and Mᵀ w differ by {found:.1g} of their size; give a symmetric one"
+            yield (
+                f"{owner}: M is not symmetric, M w and Mᵀ w differ by {found:.1g} of their size; "
+                "give a symmetric one"
+            )
     M = matrices["M"]
     own = M.diagonal()
     if largest(comm, -np.min(own, initial=0.0)) > 0.0:
         yield f"{owner}: M has a diagonal entry below zero; give masses that are positive, or zero"
     if largest(comm, np.any((own == 0.0) & (M @ probe(numbers, 0) != 0.0))):
-        yield f"{owner}: M has a zero on its diagonal beside other entries; give positive masses, or empty rows"
+        yield (
+            f"{owner}: M has a zero on its diagonal beside other entries; "
+            "give positive masses, or empty rows"
+        )

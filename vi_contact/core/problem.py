@@ -296,7 +296,10 @@ def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:
     for name in ("M", "K", "C"):
         matrix = getattr(system, name)
         if matrix is not None and matrix.rows != n:
-            yield f"the system has {n} unknowns in u0 but {matrix.rows} rows in {name}: give matrices of one system"
+            yield (
+                f"the system has {n} unknowns in u0 but {matrix.rows} rows in {name}: "
+                "give matrices of one system"
+            )
     shapes = {"v0": (n,), "influence": (n, d), "base_mass": (n, d), "massless": (n,), "tied": (n,)}
     values = {name: getattr(system, name) for name in shapes} | {
         "load.constant": system.load.constant
@@ -337,8 +340,14 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int)
                 f"{most - 1}: make the surface for this system, which has another size"
             )
     if np.any(np.diff(surface.slots) <= 0):
-        yield "the contact surface has slots that do not ascend: number its conditions in the order of their rows"
+        yield (
+            "the contact surface has slots that do not ascend: "
+            "number its conditions in the order of their rows"
+        )
     if np.isnan(np.sum(surface.gap0)):
         yield "the contact surface has NaN in gap0: check the obstacle's gap function"
     if not (np.all(surface.weights > 0.0) and np.all(surface.compliance >= 0.0)):
-        yield "the contact surface has weights of zero or less, or a compliance below zero: give lengths or areas"
+        yield (
+            "the contact surface has weights of zero or less, or a compliance below zero: "
+            "give lengths or areas"
+        )

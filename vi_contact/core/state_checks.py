@@ -56,7 +56,10 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
             ("b", "True or False") if name == "active" else ("iuf", "finite real numbers")
         )
         if not isinstance(value, np.ndarray) or value.shape != shape:
-            yield f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: give its own state"
+            yield (
+                f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: "
+                "give its own state"
+            )
         elif value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
             yield f"{name} of the state is {shown(value)}: give {wanted}"
 

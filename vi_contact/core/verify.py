@@ -248,9 +248,14 @@ def energy_balance(
 
     The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``.
     Times the increment du:
-        input = f·du + work of a moving obstacle,  damping = du·C v,
-        contact = r_n·B_n du (work lost to the support, stored or dissipated there),  friction = r_t·B_t du,
-        algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du   (0 for the midpoint rule)
+
+        input = f·du + work of a moving obstacle
+        damping = du·C v
+        contact = r_n·B_n du    (work lost to the support, stored or dissipated there)
+        friction = r_t·B_t du
+        algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
+                      (0 for the midpoint rule)
+
     and change is the difference of the energies themselves, so the defect measures the equation of
     motion. ``before``, ``after``: the energies of both states, when known; one product (two with
     damping) is left then.

@@ -1,7 +1,8 @@
 """Assemble the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (boundary
 method, eqs. 7-10a).
 
-    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
+    K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u =
 P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').

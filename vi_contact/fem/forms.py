@@ -1,6 +1,7 @@
 """State the variational forms of a linear elastic body from its materials.
 
-    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
+    K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C.
 """

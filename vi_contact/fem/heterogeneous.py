@@ -141,4 +141,5 @@ def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
         wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
         if len(wrong):
             place = space.tabulate_dof_coordinates()[wrong[0], : space.mesh.geometry.dim]
-            yield f"Heterogeneous: {words} is {values[name][wrong[0]]:g} at {at(place)}; give {remedy}"
+            found = values[name][wrong[0]]
+            yield f"Heterogeneous: {words} is {found:g} at {at(place)}; give {remedy}"

@@ -44,7 +44,8 @@ class InitialStrain(ActingLoad):
         tell C.
     """
 
-    value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]  # as given
+    # the value as it is given
+    value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]
     history: Callable[[float], float] | None = None
     cells: Cells | None = None
 
@@ -128,9 +129,9 @@ class InitialStrains:
         """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
         d, panel = self._space.dimension, isinstance(self._body.section, PlaneStress)
         free = d != 2 or panel
-        if (
-            d == 1
-        ):  # a bar cannot strain sideways, as its stiffness says: what is held there presses along it
+        if d == 1:
+            # A bar cannot strain sideways, as its stiffness says: what is held there presses along
+            # it.
             lame, shear = self._body.fields["lame"], self._body.fields["shear"]
             sides = eps[1, 1] if panel else eps[1, 1] + eps[2, 2]
             return ufl.as_tensor([[eps[0, 0] + lame / (lame + 2 * shear) * sides]]), 0.0

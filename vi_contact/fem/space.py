@@ -307,7 +307,7 @@ class FemSpace(NodalSpace):
         return np.asarray(np.repeat(self.body_of_node, self.dimension)[self.free])
 
     # Vectors
-    # ---------------------------------------------------------------------------------------------------------
+    # ----------------------------------------------------------------------------------------------
 
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:
         """Return the full owned vector of U(x, t) or its time derivative; zero on free components.

@@ -4,7 +4,8 @@ contact surface.
 A massless unknown i at node c, with direction q_i, gets the velocity of the rigid motion a that
 fits its neighbours J best, weighted with their entries w_J of the mass matrix:
 
-    v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J,   R = (q, q·(e_k x (X - X_c)) for rotations k)
+    v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J
+    R = (q, q·(e_k x (X - X_c)) for rotations k)
 
 so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour.
 """

@@ -290,7 +290,8 @@ class DampingRatio:
     cell. ``assemble`` refuses the law where no material has one, and a ratio of a material without
     this law.
 
-        C = alpha M + beta K,    alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2),    w = 2 pi f
+        C = alpha M + beta K,    w = 2 pi f
+        alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2)
 
     ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies
     the ratio is less than xi between them and more outside, and alpha M also resists rigid rocking

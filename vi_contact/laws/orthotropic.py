@@ -24,7 +24,8 @@ VOIGT = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2)
 class Orthotropic:
     """Describe orthotropic elasticity along material axes 1, 2, 3 at right angles.
 
-        eps_ii = sigma_ii / E_i - sum_j (nu_ij / E_i) sigma_jj,   nu_ji / E_j = nu_ij / E_i,   sigma_ij = 2 G_ij eps_ij
+        eps_ii = sigma_ii / E_i - sum_j (nu_ij / E_i) sigma_jj
+        nu_ji / E_j = nu_ij / E_i,   sigma_ij = 2 G_ij eps_ij
 
     with i != j: nu_ij is the contraction along j under a stress along i alone.
 

@@ -137,4 +137,7 @@ def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
         if blind
         else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}"
     )
-    yield f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, a twentieth of the period"
+    yield (
+        f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, "
+        "a twentieth of the period"
+    )

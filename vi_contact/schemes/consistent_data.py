@@ -4,7 +4,8 @@ without inertia.
 What schemes with accelerations start from, also after an impact, fits a displacement and a
 velocity:
 
-    M a + C v + K u = f(t) - B_nᵀ r_n - B_tᵀ r_t,    0 <= r_n  ⊥  -a_n >= 0    on resting points (gap and v_n zero)
+    M a + C v + K u = f(t) - B_nᵀ r_n - B_tᵀ r_t
+    0 <= r_n  ⊥  -a_n >= 0    on resting points (gap and v_n zero)
     |r_t| <= limit(r_n),    r_t along the slip rate v_t + dt a_t
 
 Points that are open, or that move towards or off the obstacle, carry no normal reaction: the one a

@@ -2,12 +2,14 @@
 forces do not ring.
 
     u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0  (= on bilateral rows)
-    M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t],    gap(u1) >= 0
-    v1 = v0 + 2/dt (u1 - u_p),    0 <= r̄_n  ⊥  gap(u1),    |r̄_t| <= limit(r̄_n) along the slip B_t (u1 - u0)
+    M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t]
+    v1 = v0 + 2/dt (u1 - u_p)
+    gap(u1) >= 0,    0 <= r̄_n  ⊥  gap(u1),    |r̄_t| <= limit(r̄_n) along the slip B_t (u1 - u0)
 
-In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 f,  scale = 2, guess u_p. The impulse
-that projects the predictor moves contact nodes to the obstacle and leaves their velocity alone: r̄ is what the body
-presses with, not what stops the mass of the contact nodes. They keep the velocity of their approach till they open.
+In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 f,  scale = 2,
+guess u_p. The impulse that projects the predictor moves contact nodes to the obstacle and leaves
+their velocity alone: r̄ is what the body presses with, not what stops the mass of the contact nodes.
+They keep the velocity of their approach till they open.
 
 Order 2 without contact (the midpoint rule); unconditionally stable. Energy, q [N s²] the
 projection's multipliers:

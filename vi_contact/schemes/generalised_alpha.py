@@ -5,8 +5,11 @@
     a_m = (1 - alpha_m) a1 + alpha_m a0,    (u, v, r_n, r_t)_f = (1 - alpha_f) (…)1 + alpha_f (…)0
     0 <= r_n1  ⊥  gap0 - B_n u1 >= 0,    |r_t1| <= limit(r_n1) along B_t (u1 - u0)
 
-Divided by 1 - alpha_f, in x = u1:  A = (1 - alpha_m)/((1 - alpha_f) beta dt²) M + gamma/(beta dt) C + K,  scale = 1,
-r the reaction at the end of the step.
+Divided by 1 - alpha_f, in x = u1:
+
+    A = (1 - alpha_m)/((1 - alpha_f) beta dt²) M + gamma/(beta dt) C + K,  scale = 1
+
+with r the reaction at the end of the step.
 
 Order 2 at gamma = ½ - alpha_m + alpha_f, else 1. Unconditionally stable for alpha_m <= alpha_f <=
 ½, gamma >= ½ - alpha_m + alpha_f and beta >= gamma/2, all that is accepted.

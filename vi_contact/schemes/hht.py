@@ -1,8 +1,10 @@
 """Step by the method of Hilber, Hughes and Taylor: Newmark's, with the forces but not the inertia
 before its end.
 
-    M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f,    (…)_f = (1 + alpha) (…)1 - alpha (…)0
-    beta = ¼ (1 - alpha)²,    gamma = ½ - alpha;    contact and friction conditions at the end of the step
+    M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f
+    (…)_f = (1 + alpha) (…)1 - alpha (…)0
+    beta = ¼ (1 - alpha)²,    gamma = ½ - alpha
+    contact and friction conditions at the end of the step
 
 Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy and
 impulses). Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification (1 + alpha)/(1 -

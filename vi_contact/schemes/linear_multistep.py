@@ -7,7 +7,8 @@ as one member.
 Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n -
 B_tᵀ r_t at t_p:
 
-    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1,   |r_t| <= limit(r_n) along B_t du
+    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1
+    |r_t| <= limit(r_n) along B_t du
 
 (The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +.) Start,
 and restart after every velocity jump or change of dt: the past is filled in with constant

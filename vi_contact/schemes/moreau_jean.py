@@ -1,13 +1,15 @@
 """Step by Moreau and Jean's method: contact and impact are impulses on velocities.
 
     v_θ = (1 - theta) v0 + theta v1,    u1 = u0 + dt v_θ
-    M (v1 - v0) + dt C v_θ + dt K ((1 - theta) u0 + theta u1) = dt ((1 - theta) f0 + theta f1) - B_nᵀ P_n - B_tᵀ P_t
+    M (v1 - v0) + dt C v_θ + dt K ((1 - theta) u0 + theta u1)
+        = dt ((1 - theta) f0 + theta f1) - B_nᵀ P_n - B_tᵀ P_t
     0 <= P_n  ⊥  -e B_n v0 - B_n v1 >= 0   where gap(u0 + ½ dt v0) <= 0,    P_n = 0 elsewhere
     |P_t| <= limit(P_n) along the tangential velocity B_t v1;    B_n v1 = 0 on bilateral points
 
-In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed points and +inf elsewhere,  r = P [N s],
-scale = dt; the state keeps the mean reactions P/dt, and its active points are those that carry an impulse. Restitution
-is a law for nodes: on a fine mesh it has no macroscopic effect. Order 2 without contact at theta = ½, else 1.
+In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed points and +inf
+elsewhere,  r = P [N s],  scale = dt; the state keeps the mean reactions P/dt, and its active points
+are those that carry an impulse. Restitution is a law for nodes: on a fine mesh it has no
+macroscopic effect. Order 2 without contact at theta = ½, else 1.
 
 Energy:  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)
 

@@ -1,11 +1,13 @@
 """Step by the trapezoidal rule on redistributed mass: the default for dynamic contact.
 
     (u1 - u0)/dt = ½ (v0 + v1)
-    M (v1 - v0)/dt + C (u1 - u0)/dt + ½ K (u0 + u1) = ½ (f0 + f1) - ½ B_nᵀ(r0 + r1) - ½ B_tᵀ(r0 + r1)
+    M (v1 - v0)/dt + C (u1 - u0)/dt + ½ K (u0 + u1)
+        = ½ (f0 + f1) - ½ B_nᵀ(r0 + r1) - ½ B_tᵀ(r0 + r1)
     0 <= r1_n  ⊥  gap0 - B_n u1 >= 0,    |r1_t| <= limit(r1_n) along B_t (u1 - u0)
 
-In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - K u0 + f0 + f1 - Bᵀr0,  scale = 1, r the
-reaction at the end. M has no inertia at contact nodes (mass.Redistributed): they are in equilibrium at both ends.
+In x = u1:  A = 4/dt² M + 2/dt C + K,
+b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - K u0 + f0 + f1 - Bᵀr0,  scale = 1, r the reaction at the end.
+M has no inertia at contact nodes (mass.Redistributed): they are in equilibrium at both ends.
 
 Order 2 while nothing opens or closes; unconditionally stable. Energy: changes by work of loads and
 damping and by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event:

@@ -4,9 +4,11 @@ independently.
 Linear u and v over the step, weighted residual with weight phi (docs/reference/sources.md [2]):
 
     (u1 - u0)/dt = (1 - phi) v0 + phi v1
-    M (v1 - v0)/dt + C (u1 - u0)/dt + K ((1 - phi) u0 + phi u1) = f(t0 + phi dt) - B_nᵀ r̄_n,    gap(u1) >= 0
+    M (v1 - v0)/dt + C (u1 - u0)/dt + K ((1 - phi) u0 + phi u1) = f(t0 + phi dt) - B_nᵀ r̄_n
+    gap(u1) >= 0
 
-In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi, r_n = r̄_n/phi (phi = ½: as the boundary method has it).
+In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi, r_n = r̄_n/phi (phi = ½: as the
+boundary method has it).
 
 Order 2 at phi = ½, else 1; unconditionally stable for phi >= ½. Energy at phi = ½: it changes only
 by work of loads, damping and contact, and contact with gap >= 0 at the end of the step never

@@ -4,9 +4,11 @@
 With the one factorisation of A and the unit vectors E of the normal unknowns:
 
     x_free = A⁻¹ b                     the unilateral constraints ignored (problem 34)
-    G = EᵀA⁻¹E (+ compliance/scale)    Delassus operator, the flexibility b~ of eq. 39; G⁻¹ is the matrix D~ of eq. 49
+    G = EᵀA⁻¹E (+ compliance/scale)    Delassus operator, the flexibility b~ of eq. 39; G⁻¹ is the
+                                       matrix D~ of eq. 49
     q = bound - Eᵀx_free               gap that is left; z~ = D~ Eᵀx_free in eq. 49
-    0 <= r ⊥ q + G r >= 0              the small problem: eq. 42 in r, eqs. 46, 49 in the displacements
+    0 <= r ⊥ q + G r >= 0              the small problem: eq. 42 in r, eqs. 46, 49 in the
+                                       displacements
     x = A⁻¹ (b - E r)
 
 A step costs one forward and one backward substitution and the small problem, whatever the number of

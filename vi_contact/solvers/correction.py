@@ -5,8 +5,10 @@ The answer (x0, r0) stays, but for a share s of its reactions. The contract of `
 - x0 and q = r - (1 - s) r0 is the contract again, because reactions that obey the laws form a cone
 at every point:
 
-    A d = (b - A x0 - (1 - s) Bᵀr0) - Bᵀq,    |q_t| <= s cohesion + slope q_n, along the slip B_t d - (slip0 - B_t x0)
-    0 <= q_n  ⊥  (bound - B_n x0 + (1 - s) compliance r0_n / scale) - B_n d + compliance q_n / scale >= 0
+    A d = (b - A x0 - (1 - s) Bᵀr0) - Bᵀq
+    |q_t| <= s cohesion + slope q_n, along the slip B_t d - (slip0 - B_t x0)
+    0 <= q_n  ⊥  (bound - B_n x0 + (1 - s) compliance r0_n / scale)
+                 - B_n d + compliance q_n / scale >= 0
 
 Its solution is that of the step, exactly, whatever s is, as long as no reaction falls by more than
 its share: q_n >= 0 leaves r_n >= (1 - s) r0_n. But a solver passes through numbers as large as

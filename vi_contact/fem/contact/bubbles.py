@@ -5,7 +5,8 @@ With the hats phi_i of vertices and the bubbles b_k = 4 phi_a phi_b of the edges
 displacements are sum phi_i v_i + sum b_k e_k (``fem.hierarchical``). The gap of a condition is the
 mean of the gap with the weight psi_i,
 
-    gap_i = gap0_i - n·(v_i + sum_k c_ik e_k),   c_ik = ∫ psi_i b_k / ∫ psi_i,   ∫ psi_i phi_j = delta_ij ∫ phi_i
+    gap_i = gap0_i - n·(v_i + sum_k c_ik e_k)
+    c_ik = ∫ psi_i b_k / ∫ psi_i,   ∫ psi_i phi_j = delta_ij ∫ phi_i
 
 on every facet, so that psi_i is a combination of its three hats and no gap asks for the v of
 another vertex (dual Lagrange multipliers: Wohlmuth, SIAM J. Numer. Anal. 38 (2000), 989-1012; of

@@ -11,7 +11,8 @@ on linearly to t instead:
 
 and on the partly covered facet these nodes get D_k = sum_t E_tk D_t and the functions
 
-    psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k),   b = (1, x) or (1, x, y),   ∫ over its part in front of side 2
+    psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k),   b = (1, x) or (1, x, y)
+    (∫ over its part in front of side 2)
 
 so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a uniform pressure passes
 through exactly, forces and moments of both sides are in balance, and every pressure is one over a

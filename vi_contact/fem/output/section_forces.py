@@ -41,14 +41,17 @@ class SectionForces:
     In the plane e is the unit vector from a to b and n the one to its left, F the force that the
     part on the left exerts through the cut on the part on the right, and c the middle of the cut:
 
-        N = F·n  (tension positive),   V = F·e,   M = (moment of F about c, anticlockwise) = ∫ s sigma_n ds
+        N = F·n    (tension positive)
+        V = F·e
+        M = (moment of F about c, anticlockwise) = ∫ s sigma_n ds
 
     so that M > 0 is tension at b. In space e_2 points from a to b, e_3 from a to c at right angles,
     n = e_2 x e_3, and F is what the part before the cut, where n points, exerts on the one behind
     it. With the moment M of F about the middle of the rectangle, s_2 and s_3 the distances from
     there, the columns are
 
-        N = F·n,  V_2 = F·e_2,  V_3 = F·e_3,  M_t = M·n,  M_2 = M·e_2 = ∫ s_3 sigma_n,  M_3 = M·e_3 = -∫ s_2 sigma_n
+        N = F·n,    V_2 = F·e_2,                   V_3 = F·e_3
+        M_t = M·n,  M_2 = M·e_2 = ∫ s_3 sigma_n,   M_3 = M·e_3 = -∫ s_2 sigma_n
 
     A cut may run along element sides or, of P1 and Q1, through elements, at any inclination. F is
     minus the sum of the nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at

@@ -1,11 +1,13 @@
 """Keep the rows of a run in files from the step they were computed in; the memory need not hold
 them.
 
-``history.csv``      one line per step with all numbers, written at least once a second and before every checkpoint:
-                     a killed run loses no more.
-``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
-                     at checkpoints, every ten seconds if it has grown by a quarter, and at the end.
-``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).
+``history.csv``      one line per step with all numbers, written at least once a second and before
+                     every checkpoint: a killed run loses no more.
+``history.h5``       numbers and arrays with units as attributes, and the contact geometry;
+                     replaced as a whole at checkpoints, every ten seconds if it has grown by a
+                     quarter, and at the end.
+``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the
+                     row).
 """
 
 import hashlib

@@ -2,8 +2,10 @@
 
 With the unit vectors E of the normal and F of the tangential unknowns, x_free = A⁻¹b and D = [E F]:
 
-    G = DᵀA⁻¹D (+ compliance/scale on the normal diagonal),    node by node: r_n, then r_t: ``core.condensation``
-    q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free             gap, and minus the slip, without reactions
+    G = DᵀA⁻¹D (+ compliance/scale on the normal diagonal)
+        node by node: r_n, then r_t: ``core.condensation``
+    q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free
+        gap, and minus the slip, without reactions
     the small problem of ``problem`` gives r;   x = A⁻¹(b - E r_n - F r_t)
 
 A law that depends on the slip rate makes this a sequence of such problems: ``slip_rate``.

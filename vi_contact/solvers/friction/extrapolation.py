@@ -2,7 +2,8 @@
 images g(x).
 
     plain       x <- g(x)
-    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j),    g(x) - x = f = sum_j gamma_j (f_j+1 - f_j) at best
+    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j)
+                g(x) - x = f = sum_j gamma_j (f_j+1 - f_j) at best
 
 Both need one image a step and nothing else. Anderson combines the last ``depth`` differences (J.
 ACM 12, 1965; Walker and Ni, SIAM J. Numer. Anal. 49, 2011), is the secant method for one unknown,

@@ -6,8 +6,10 @@ The boundary method (docs/reference/sources.md [1]) carries tangential forces C_
 over normal reactions. With friction C_T is found by turns (Panagiotopoulos, Ing.-Arch. 44, 1975),
 with the parts G_nn, G_nt, G_tt of the Delassus operator:
 
-    normal        0 <= r_n  perpendicular to  (q_n + G_nt r_t) + G_nn r_n >= 0               r_t = C_T given
-    tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)     r_n given
+    normal        0 <= r_n  perpendicular to  (q_n + G_nt r_t) + G_nn r_n >= 0
+                  r_t = C_T given
+    tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)
+                  r_n given
 
 Block Gauss-Seidel: under Tresca's law the exact minimum over one block after the other, which
 converges for every G; under Coulomb's when coupling and friction are moderate, linearly.

@@ -3,12 +3,12 @@ smaller.
 
 With the rows R that must hold, r = fixed + P z and w = q + G fixed:
 
-    K z = -R w,    K = R G P (+ the turns in 3D)                                                                   (1)
+    K z = -R w,    K = R G P (+ the turns in 3D)                                                (1)
 
 Where most places are in R, the others S are fewer. With H = G⁻¹, made once, and C r = 0 what holds
 there, r_S zero or growing with its normal, K z = v is r = H (v + s) with s at S only:
 
-    (C H)_S s = -C H v                                                                                             (2)
+    (C H)_S s = -C H v                                                                          (2)
 """
 
 from typing import Any

@@ -8,7 +8,8 @@ Newton's step for the natural map (2) of ``problem`` with the limit of the augme
 max(y_n, 0) (Alart and Curnier 1991; Hüeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30, 2008):
 
     open   r_n = 0                        closed   w_n = 0
-    stick  w_t = 0                        slip     r_t = limit(r_n) n + eta t,   t·w_t + (|y_t| - limit)/limit eta = 0
+    stick  w_t = 0                        slip     r_t = limit(r_n) n + eta t
+                                                   t·w_t + (|y_t| - limit)/limit eta = 0
 
 eta is the turn of the slip direction, t perpendicular to n: in 2D there is none, the problem is
 piecewise linear, and the iterate of the right states is exact. linear.py solves these problems.

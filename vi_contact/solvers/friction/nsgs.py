@@ -3,9 +3,11 @@ exactly.
 
 Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
 
-    open   r_n = 0, r_t the minimum over |r_t| <= cohesion, if w_n >= 0 then; otherwise w_n = 0 gives r_n(r_t) and
+    open   r_n = 0, r_t the minimum over |r_t| <= cohesion, if w_n >= 0 then;
+           otherwise w_n = 0 gives r_n(r_t) and
     stick  S r_t = -q'          if |r_t| <= limit(r_n(r_t))
-    slip   (S + lambda) r_t = -q',   |r_t| = limit(r_n(r_t)),   lambda > 0 by a scalar root (closed form in 2D)
+    slip   (S + lambda) r_t = -q',   |r_t| = limit(r_n(r_t))
+           lambda > 0 by a scalar root (closed form in 2D)
 
 with S and q' the tangential block and right-hand side after the elimination of r_n. Sources: Moreau
 (Comput. Methods Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is

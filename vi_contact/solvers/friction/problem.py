@@ -2,7 +2,8 @@
 share.
 
     w = q + G r;    0 <= r_n  perpendicular to  w_n >= 0   (bilateral rows: w_n = 0, r_n free)
-    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0),    r_t = -limit w_t/|w_t| where w_t is not zero          (1)
+    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0)
+    r_t = -limit w_t/|w_t| where w_t is not zero                                                (1)
 
 G (m d, m d) is the Delassus operator of normal and tangential unknowns, node by node (r_n, then the
 d - 1 components of r_t), symmetric positive definite; q_n is the gap and q_t minus the slip that
@@ -14,7 +15,8 @@ of s into themselves continuously, Brouwer), and is unique for small slopes only
 (1) holds where the natural map vanishes (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92,
   1991, with y = r - w):
 
-    F_n = r_n - max(y_n, 0)   (bilateral: w_n),      F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)   (2)
+    F_n = r_n - max(y_n, 0)   (bilateral: w_n)
+    F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)                               (2)
 
 Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one number for each node
 (disks stay disks), the mean of G_tt to the same power: reactions and displacements are then both in

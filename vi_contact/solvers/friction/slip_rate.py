@@ -1,7 +1,8 @@
 """Iterate over friction coefficients that depend on the slip rate of the step itself: ordinary
 problems in turn.
 
-    mu <- mu(|v|),    v = rate_factor w_t(mu),    w_t(mu): slip of the step with the coefficients mu given           (1)
+    mu <- mu(|v|),    v = rate_factor w_t(mu)
+    w_t(mu): slip of the step with the coefficients mu given                                    (1)
 
 It starts from rest, mu(0), and every inner problem from the reactions of the one before. With the
 mass m that a point slips with, (1) contracts with the factor c |mu'(v)|, c = r_n dt/m or, in a

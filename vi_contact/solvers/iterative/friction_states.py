@@ -11,7 +11,8 @@ vanishes at the solution (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92
 step for it is the linear problem of the states (Hüeber, Stadler and Wohlmuth, SIAM J. Sci. Comput.
 30, 2008):
 
-    stick  s = 0        slip  r_t = (cohesion + slope r_n) n + kappa (s - n n·s),  kappa = limit c / (|y| - limit)
+    stick  s = 0
+    slip   r_t = (cohesion + slope r_n) n + kappa (s - n n·s),  kappa = limit c / (|y| - limit)
 
 in which kappa, the friction limit over the slip, is the curvature of the disk; it turns n along the
 slip. Coefficients that depend on the slip rate add their derivative times n n·s. Arrays have one

@@ -1,10 +1,11 @@
 """Solve dense contact problems by the primal-dual active-set method with a finite fallback: the
 default.
 
-Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the wrong sign (r < 0 in
-the set, w < 0 out of it) to the other side, repeat until no sign is wrong: then r solves the problem exactly. This is
-the semismooth Newton method for  r = max(0, r - c w)  of Hintermüller, Ito and Kunisch (SIAM J. Optim. 13, 2002); after
-the first guess r or w is zero in every row, so that c drops out. The same iteration is Newton-min and full exchange.
+Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the
+wrong sign (r < 0 in the set, w < 0 out of it) to the other side, repeat until no sign is wrong:
+then r solves the problem exactly. This is the semismooth Newton method for  r = max(0, r - c w)  of
+Hintermüller, Ito and Kunisch (SIAM J. Optim. 13, 2002); after the first guess r or w is zero in
+every row, so that c drops out. The same iteration is Newton-min and full exchange.
 
 It ends in at most m changes for M-matrices but may cycle for others from m = 3 on (Ben Gharbia and
 Gilbert, Math. Program. 134, 2012), or wander when G is ill-conditioned. When a set comes back, or

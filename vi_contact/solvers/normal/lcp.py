@@ -1,7 +1,8 @@
 """Pose the linear complementarity problem of one contact step: its residual, and the scaling all
 its methods share.
 
-    w = q + G r;    unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free        (1)
+    w = q + G r
+    unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free         (1)
 
 G (m, m) [m/N] symmetric positive definite: the Delassus operator; q = bound - x_free [m]: the gap
 that the step without reactions would leave, +inf where no obstacle is in reach; r [N] reaction, >=

@@ -1,6 +1,6 @@
 """Solve the small problem of a G that is not symmetric: Lemke's complementary pivoting.
 
-    w = q + G r + z d,    0 <= r  perpendicular to  w >= 0,    z >= 0                                               (2)
+    w = q + G r + z d,    0 <= r  perpendicular to  w >= 0,    z >= 0                           (2)
 
 With z as large as the violation of r = 0, that r solves (2). Every pivot takes the complement of
 what left the basis into it, z moves, and when z leaves the basis r solves problem (1) of ``lcp``.

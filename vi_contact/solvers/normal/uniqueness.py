@@ -1,8 +1,9 @@
 """Say whether contact has one solution whatever the loads are: whether G is a P-matrix.
 
-All principal minors of a P-matrix are positive. Exactly then  w = q + G r, 0 <= r ⊥ w >= 0  has one solution for every
-q (Samelson, Thrall and Wesler, Proc. Amer. Math. Soc. 9, 1958), and so has the box l <= r <= u, friction of given
-limits in the plane (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, sections 3.3 and 3.4).
+All principal minors of a P-matrix are positive. Exactly then  w = q + G r, 0 <= r ⊥ w >= 0  has one
+solution for every q (Samelson, Thrall and Wesler, Proc. Amer. Math. Soc. 9, 1958), and so has the
+box l <= r <= u, friction of given limits in the plane (Cottle, Pang and Stone, The Linear
+Complementarity Problem, 1992, sections 3.3 and 3.4).
 """
 
 from dataclasses import dataclass

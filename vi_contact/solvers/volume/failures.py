@@ -17,7 +17,9 @@ NOT_A_NUMBER = (
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
 ADVICE = {
-    "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
+    "DIVERGED_LINEAR_SOLVE": (
+        "check that the body is held or that mass enters A, and that A is positive definite"
+    ),
     **dict.fromkeys(
         (name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS
     ),

@@ -4,12 +4,14 @@ bounds.
 The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that
 has one free tangent (2D) carries
 
-    F_lambda = slip0 - B_t x,     -s <= lambda <= s:     0 where lambda is inside, <= 0 where lambda = s, >= 0 at -s
+    F_lambda = slip0 - B_t x,     -s <= lambda <= s:
+    0 where lambda is inside, <= 0 where lambda = s, >= 0 at -s
 
 which is |r_t| <= s, r_t along the slip. A point with two (3D) carries the disk itself, no polygon:
 with the speed factor gamma >= 0 of the slip, slip = gamma r_t,
 
-    F_lambda = slip0 - B_t x + gamma lambda = 0,     F_gamma = (s² - |lambda|²)/s >= 0  ⊥  gamma >= 0.
+    F_lambda = slip0 - B_t x + gamma lambda = 0
+    F_gamma = (s² - |lambda|²)/s >= 0  ⊥  gamma >= 0.
 
 The equations of the body gain B_tᵀ lambda. Where s = 0 the bounds hold lambda and gamma at zero. In
 2D everything is linear and monotone; 3D has one solution too, the multiplier of a convex problem.
