@@ -78,32 +78,26 @@ def fits(value: Any, kind: Any) -> bool:
     if kind is Any:
         return True
     if origin in (typing.Union, types.UnionType):
-        is_path = any(_is_path(one) for one in inside)
-        return any(
-            _fits_path(value) if is_path and one is str else fits(value, one) for one in inside
-        )
+        return _fits_one_of(value, inside)
     if kind is None or kind is type(None):
         return value is None
     if _is_path(kind):
         return _fits_path(value)
-    if kind is float:
-        return _is_number(value)
-    if kind is int:
-        return _is_number(value) and (
-            isinstance(value, Integral) or real(value) == np.rint(real(value))
-        )
-    if kind is bool:
-        return isinstance(value, bool | np.bool_)
-    if origin is np.ndarray or kind is np.ndarray:
-        return _are_numbers(value)
-    if origin is tuple:
-        return _fits_tuple(value, inside)
-    if origin in (Sequence, Iterable, list):
-        return _is_sequence(value) and all(fits(one, inside[0]) for one in value)
-    if origin in (Mapping, dict):
-        return isinstance(value, Mapping) and all(
-            fits(key, inside[0]) and fits(value[key], inside[1]) for key in value
-        )
+    if kind in _SIMPLE:
+        return _SIMPLE[kind](value)
+    if origin in _MADE_OF:
+        return _MADE_OF[origin](value, inside)
+    return _fits_object(value, kind, origin)
+
+
+def _fits_one_of(value: Any, kinds: tuple[Any, ...]) -> bool:
+    """Return whether a value is of one of several types; a text beside a path is a path."""
+    is_path = any(_is_path(one) for one in kinds)
+    return any(_fits_path(value) if is_path and one is str else fits(value, one) for one in kinds)
+
+
+def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
+    """Return whether a value is a function, satisfies a protocol, or is of a class."""
     if kind is Callable or origin is Callable:
         return callable(value) and not isclass(value)
     if getattr(kind, "_is_protocol", False):
@@ -156,6 +150,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool | np.bool_)
 
 
+def _is_whole(value: Any) -> bool:
+    return _is_number(value) and (
+        isinstance(value, Integral) or real(value) == np.rint(real(value))
+    )
+
+
 def _are_numbers(value: Any) -> bool:
     return (
         not isinstance(value, str | bytes)
@@ -177,6 +177,33 @@ def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
     return len(kinds) == len(value) and all(
         fits(one, kind) for one, kind in zip(value, kinds, strict=True)
     )
+
+
+def _fits_sequence(value: Any, inside: tuple[Any, ...]) -> bool:
+    return _is_sequence(value) and all(fits(one, inside[0]) for one in value)
+
+
+def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
+    return isinstance(value, Mapping) and all(
+        fits(key, inside[0]) and fits(value[key], inside[1]) for key in value
+    )
+
+
+_SIMPLE: dict[Any, Callable[[Any], bool]] = {
+    float: _is_number,
+    int: _is_whole,
+    bool: lambda value: isinstance(value, bool | np.bool_),
+    np.ndarray: _are_numbers,
+}
+_MADE_OF: dict[Any, Callable[[Any, tuple[Any, ...]], bool]] = {
+    np.ndarray: lambda value, _: _are_numbers(value),
+    tuple: _fits_tuple,
+    Sequence: _fits_sequence,
+    Iterable: _fits_sequence,
+    list: _fits_sequence,
+    Mapping: _fits_mapping,
+    dict: _fits_mapping,
+}
 
 
 def _asked(protocol: Any) -> list[str]:

@@ -75,6 +75,29 @@ def check_body(
         Forms,
         "give fem.Forms(stiffness=…, mass=…), or leave them out",
     )
+    _check_material(mesh, material, forms)
+    if section is None:
+        section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
+    damping = NoDamping() if damping is None else damping
+    _check_section(section, mesh.geometry.dim)
+    _check_damping(damping, section, forms)
+    flag(OWNER, "base_inertia", base_inertia)
+    found = (
+        [material]
+        if material is None or isinstance(material, KINDS)
+        else [one for _, one in material]
+    )
+    _check_integration(
+        mesh, found if forms is None else [forms], section, damping, degree, integration
+    )
+    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
+    if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
+        _tell_locking([one for one in found if isinstance(one, LinearElastic)])
+    return section, damping
+
+
+def _check_material(mesh: Any, material: Any, forms: Any) -> None:
+    """Raise InputError unless there are forms, a material, or pairs of cells and materials."""
     if material is None and forms is None:
         raise InputError("assemble: neither a material nor forms are given; give one of them")
     if material is not None and not isinstance(material, KINDS):
@@ -83,9 +106,10 @@ def check_body(
             cells, one = _pair("material", pair, remedy)
             cells_of(OWNER, "the cells of a material", cells, mesh)
             instance(OWNER, "material", one, KINDS, remedy)
-    if section is None:
-        section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
-    damping = NoDamping() if damping is None else damping
+
+
+def _check_section(section: Any, dimension: int) -> None:
+    """Raise InputError unless the section is one of a body of this dimension."""
     provides(
         OWNER,
         "section",
@@ -93,17 +117,21 @@ def check_body(
         ("thickness", "elastic_constants"),
         "give PlaneStrain(), PlaneStress() or None",
     )
-    if mesh.geometry.dim == 3 and isinstance(section, PlaneStrain | PlaneStress):
+    if dimension == 3 and isinstance(section, PlaneStrain | PlaneStress):
         raise InputError(
             f"assemble: {section} is a section of a plane body and this one has three dimensions; "
             "give "
             "Solid(), or leave it out"
         )
-    if mesh.geometry.dim == 2 and isinstance(section, Solid):
+    if dimension == 2 and isinstance(section, Solid):
         raise InputError(
             "assemble: Solid() is for a body in space and this one is plane; give PlaneStrain() or "
             "PlaneStress(thickness)"
         )
+
+
+def _check_damping(damping: Any, section: Any, forms: Any) -> None:
+    """Raise InputError unless the damping is one, and goes with the forms and the section."""
     provides(
         OWNER,
         "damping",
@@ -124,19 +152,6 @@ def check_body(
             "would "
             "need its own motion; give Rayleigh(0, beta), or another section"
         )
-    flag(OWNER, "base_inertia", base_inertia)
-    found = (
-        [material]
-        if material is None or isinstance(material, KINDS)
-        else [one for _, one in material]
-    )
-    _check_integration(
-        mesh, found if forms is None else [forms], section, damping, degree, integration
-    )
-    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
-    if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
-        _tell_locking([one for one in found if isinstance(one, LinearElastic)])
-    return section, damping
 
 
 def check_ratios(body: ElasticForms, of_materials: bool) -> None:

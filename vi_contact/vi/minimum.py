@@ -82,11 +82,19 @@ def carry_conditions(found: Found, layers: OptionLayers) -> None:
 def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) -> None:
     """Go down from the best point until it is a local minimum. Collective."""
     point = found.best
-    problem = point.problem
-    energy = problem.energy()
+    energy = point.problem.energy()
     if point.broken or not np.isfinite(energy):
         found.failure = NOT_A_NUMBER
-        return
+    else:
+        _follow(found, energy, tolerance, limit, layers)
+
+
+def _follow(
+    found: Found, energy: float, tolerance: float, limit: int, layers: OptionLayers
+) -> None:
+    """Take steps with a trust region from the best point, whose energy is given. Collective."""
+    point = found.best
+    problem = point.problem
     model = Model(point, layers)
     radius = first = FIRST_RADIUS * model.jacobi_step()
     # the length of a step along negative curvature, as a share of the first one that is tried
@@ -107,18 +115,9 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
         if found.steps >= limit or radius > UNBOUNDED * first:
             found.failure = TOO_FEW if found.steps >= limit else NO_DESCENT
             break
-        promised, length = -model.value(step), model.length(step)
-
-        problem.put(np.clip(point.x + step, point.lower, point.upper))
-        trial = problem.energy()
-        gained = energy - trial
-        if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
-            gained = -0.5 * problem.dot(point.F + problem.residual(), step)
-        ratio = gained / promised if promised > 0.0 else -np.inf
-        if ratio < POOR:
-            radius = 0.25 * length
-        elif ratio > GOOD and length > 0.9 * radius:
-            radius *= 4.0
+        length = model.length(step)
+        trial, ratio = _try_step(model, point, step, energy)
+        radius = _trust(radius, length, ratio)
 
         if ratio > ACCEPTED:
             next_point = Judged(problem, point.lower, point.upper)
@@ -142,3 +141,26 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
             found.failure = NO_DESCENT
             break
     model.close()
+
+
+def _try_step(model: Model, point: Judged, step: Array, energy: float) -> tuple[float, float]:
+    """Write the point after a step into u.
+
+    Returns:
+        The energy there, and what was gained over what the model promises; -inf where it promises
+        nothing.
+    """
+    problem, promised = point.problem, -model.value(step)
+    problem.put(np.clip(point.x + step, point.lower, point.upper))
+    trial = problem.energy()
+    gained = energy - trial
+    if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
+        gained = -0.5 * problem.dot(point.F + problem.residual(), step)
+    return trial, gained / promised if promised > 0.0 else -np.inf
+
+
+def _trust(radius: float, length: float, ratio: float) -> float:
+    """Return the next radius: smaller after a poor step, larger after a good one at the edge."""
+    if ratio < POOR:
+        return 0.25 * length
+    return 4.0 * radius if ratio > GOOD and length > 0.9 * radius else radius

@@ -88,39 +88,9 @@ def contact_pair(
             that overlap, sides of one and the same boundary, contact directions that are partly
             prescribed, clamped nodes that face free ones.
     """
-    space = contact_space(
-        "contact_pair",
-        system,
-        {"facets1": facets1, "facets2": facets2},
-        points,
-        matching=matching,
-        feature_angle=feature_angle,
-    )
-    optional(
-        provides,
-        "contact_pair",
-        "matching",
-        matching,
-        ("match",),
-        "give NodeToNode() or DualMortar(), or None",
-    )
-    angle = checked_angle("contact_pair", feature_angle)
+    space, angle = _checked_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
-    if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
-        raise InputError(
-            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
-            "both "
-            "sides alike, or use degree=1"
-        )
-    one, two = side_of(space, facets1), side_of(space, facets2)
-    shared = np.isin(one.nodes.numbers, two.nodes.numbers)
-    if shared.all():
-        raise InputError(
-            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
-            "mesh the "
-            "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
-        )
-    _refuse_common(one, two)
+    one, two, shared = _two_sides(space, facets1, facets2)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
     places = _tied_over(space, one, two)
     one = replace(one, tied=places)
@@ -150,10 +120,7 @@ def contact_pair(
     kinds["in front of nothing"] &= ~kinds["tied to the other side"]
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
-        chosen = listed(space, nodes, points, one.name)
-        rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
-        kinds["not listed"] = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
-        nodes, matched = nodes.pick(rows), matched.pick(rows)
+        nodes, matched, kinds["not listed"] = _pick_listed(space, one, nodes, matched, points)
     alone = nodes.numbers
     directions = snapped(nodes.normals)
     gap, P = _gap(space, one.name, two, nodes, directions, matched), matched.P
@@ -181,6 +148,72 @@ def contact_pair(
     if uncovered.any():
         surface = replace(surface, uncovered=uncovered[slots])
     return replace(surface, **prescribed_motion(space, conditions))
+
+
+def _checked_pair(
+    system: SemiDiscreteSystem,
+    facets1: Facets,
+    facets2: Facets,
+    points: Sequence[Sequence[float]] | None,
+    matching: Matching | None,
+    feature_angle: float,
+) -> tuple[FemSpace, float]:
+    """Return the space of the system and the angle [rad]; InputError for wrong arguments."""
+    space = contact_space(
+        "contact_pair",
+        system,
+        {"facets1": facets1, "facets2": facets2},
+        points,
+        matching=matching,
+        feature_angle=feature_angle,
+    )
+    optional(
+        provides,
+        "contact_pair",
+        "matching",
+        matching,
+        ("match",),
+        "give NodeToNode() or DualMortar(), or None",
+    )
+    angle = checked_angle("contact_pair", feature_angle)
+    if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
+        raise InputError(
+            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
+            "both "
+            "sides alike, or use degree=1"
+        )
+    return space, angle
+
+
+def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side, Side, Mask]:
+    """Return both sides, and which nodes of side 1 are shared; InputError unless they can part.
+
+    Collective.
+    """
+    one, two = side_of(space, facets1), side_of(space, facets2)
+    shared = np.isin(one.nodes.numbers, two.nodes.numbers)
+    if shared.all():
+        raise InputError(
+            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
+            "mesh the "
+            "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
+        )
+    _refuse_common(one, two)
+    return one, two, shared
+
+
+def _pick_listed(
+    space: FemSpace,
+    one: Side,
+    nodes: Nodes,
+    matched: Matched,
+    points: Sequence[Sequence[float]],
+) -> tuple[Nodes, Matched, Mask]:
+    """Return the nodes nearest to the points, in their order, and which of side 1 are not."""
+    chosen = listed(space, nodes, points, one.name)
+    rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
+    others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
+    return nodes.pick(rows), matched.pick(rows), others
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
