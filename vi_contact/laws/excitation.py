@@ -46,8 +46,9 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ricker:
-    """Shake with a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker,
-    Geophysics 18, 1953).
+    """Shake with a Ricker wavelet (Ricker, Geophysics 18, 1953).
+
+    a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))².
 
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the
     time of the peak, by default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller
@@ -84,8 +85,10 @@ class Ricker:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Hold what one-sided and two-sided pulses share; amplitude [m/s²] is finite and duration [s] >
-    0 (InputError).
+    """Hold what one-sided and two-sided pulses share.
+
+    Raises:
+        InputError: the amplitude [m/s²] is not finite, or the duration [s] not > 0.
     """
 
     amplitude: float
@@ -96,8 +99,9 @@ class Pulse:
         check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
-        """Return the acceleration [m/s²] inside the pulse, 0 outside; the value at a jump is the
-        one after it.
+        """Return the acceleration [m/s²] inside the pulse, 0 outside.
+
+        The value at a jump is the one after it.
         """
         return self.amplitude * self._shape(t) if 0.0 <= t < self.duration else 0.0
 
@@ -109,8 +113,9 @@ class Pulse:
 
 @dataclass(frozen=True)
 class HalfSine(Pulse):
-    """Shake with a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero
-    elsewhere.
+    """Shake with half a period of a sine.
+
+    a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero elsewhere.
     """
 
     def _shape(self, t: float) -> float:
@@ -119,8 +124,9 @@ class HalfSine(Pulse):
 
 @dataclass(frozen=True)
 class FullSine(Pulse):
-    """Shake with a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity
-    ends at zero.
+    """Shake with a period of a sine.
+
+    a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity ends at zero.
     """
 
     def _shape(self, t: float) -> float:
@@ -134,8 +140,9 @@ class Rectangular(Pulse):
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before
-    and after them.
+    """Shake with accelerations [m/s²] at given times [s].
+
+    There are straight lines between them, and zero before and after them.
 
     times: strictly increasing, at least two; values: as many, kept as tuples. InputError for
     others, NaN, infinity.

@@ -18,8 +18,9 @@ SOFT = 1e-12  # of a diagonal entry: lets unknowns be solved for that nothing ho
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """Hold a body's owned unknowns, its free motions w (rows, k) of size one, and orthonormal in m
-    = diag M; m w.
+    """Hold a body's owned unknowns and its free motions w (rows, k).
+
+    The motions are of size one, and also held orthonormal in m = diag M; m w is held too.
     """
 
     rows: Indices
@@ -94,8 +95,10 @@ def _factor(system: SemiDiscreteSystem, stiffness: Array, other: Mask) -> Factor
 
 
 def _kernel(form: Array, size: Array) -> Array:
-    """Columns whose form is round-off: axes of that kind, so that sums of forces stay apart, and
-    others between the rest. ``size``: the sum of each axis without its signs.
+    """Return the columns whose form is round-off.
+
+    They are axes of that kind, so that sums of forces stay apart, and others between the rest.
+    ``size`` is the sum of each axis without its signs.
     """
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))
     form = form / np.outer(scale, scale)
@@ -107,8 +110,9 @@ def _kernel(form: Array, size: Array) -> Array:
 
 
 def _orthonormal(form: Array) -> Array:
-    """Columns c with cᵀ form c = 1, by Gram and Schmidt; none of motions along a component that is
-    held everywhere.
+    """Return columns c with cᵀ form c = 1, by Gram and Schmidt.
+
+    There are none of motions along a component that is held everywhere.
     """
     columns: list[Array] = []
     for column in np.eye(len(form)):

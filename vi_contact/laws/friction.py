@@ -25,8 +25,9 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class Tresca:
-    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches: limit = threshold ·
-    weight · scale.
+    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches.
+
+    limit = threshold · weight · scale.
 
     ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when
     one is negative or not a finite number, and, when used, for a wrong count.
@@ -73,8 +74,9 @@ class Coulomb:
         object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu · max(r_n, 0), shape (n,): tension, of a held point or on the way to an answer,
-        rubs on nothing.
+        """Return mu · max(r_n, 0), shape (n,).
+
+        Tension, of a held point or on the way to an answer, rubs on nothing.
         """
         return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
@@ -174,8 +176,10 @@ class TwoCoefficients:
 
 @dataclass(frozen=True)
 class ExponentialDecay(TwoCoefficients):
-    """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed
-    v_c [m/s] > 0.
+    """Give a friction coefficient that decays with the slip rate.
+
+    mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c
+    [m/s] > 0.
 
     mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
     """
@@ -191,7 +195,7 @@ class ExponentialDecay(TwoCoefficients):
             )
 
     def __call__(self, speed: Array) -> Array:
-        """mu of each speed."""
+        """Return mu of each speed."""
         static, kinetic = self._nodal(len(speed))
         return np.asarray(kinetic + (static - kinetic) * np.exp(-speed / self.v_c))
 
@@ -213,14 +217,15 @@ class StaticKinetic(TwoCoefficients):
             )
 
     def __call__(self, speed: Array) -> Array:
-        """mu of each speed."""
+        """Return mu of each speed."""
         static, kinetic = self._nodal(len(speed))
         return np.where(speed == 0.0, static, kinetic)
 
 
 def project(r_t: Array, limit: Array) -> Array:
-    """Return the nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|),
-    node by node.
+    """Return the nearest point of the friction disks |r_t| <= limit, node by node.
+
+    It is r_t · min(1, limit / |r_t|).
 
     r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node
     that cannot slip. Returns a new array of the shape of r_t. Raises InputError when the shapes do
@@ -237,7 +242,7 @@ def project(r_t: Array, limit: Array) -> Array:
 
 
 def _checked(law: str, meaning: str, value: Any) -> Any:
-    """The value, or those of a field as a tuple (frozen, comparable)."""
+    """Return the value, or those of a field as a tuple (frozen, comparable)."""
     field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
     for one in value if field else [value]:
         if not 0.0 <= real(one) < math.inf:
@@ -250,7 +255,7 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
 
 
 def _nodal(law: str, name: str, value: Any, count: int) -> Array:
-    """The value as an array that broadcasts over the nodes."""
+    """Return the value as an array that broadcasts over the nodes."""
     if isinstance(value, tuple) and len(value) != count:
         raise InputError(
             f"{law}: {name} has {len(value)} values but there are {count} contact points: give one "

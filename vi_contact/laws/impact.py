@@ -48,8 +48,9 @@ class VelocityUpdate(Protocol):
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they
-        are not NaN.
+        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,).
+
+        They stay where ``target`` is NaN.
         """
 
 
@@ -74,8 +75,9 @@ class ComponentReset:
 
 @dataclass(frozen=True)
 class ImpulseUpdate:
-    """Apply an impulse on the chosen contact unknowns: the M-orthogonal projection onto the wanted
-    velocities.
+    """Apply an impulse on the chosen contact unknowns.
+
+    It is the M-orthogonal projection onto the wanted velocities.
 
     The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it
     decays to round-off within thirty elements; else an impact costs half a substitution
@@ -167,8 +169,9 @@ class Inelastic(ByUpdate):
 
 @dataclass(frozen=True)
 class Newton(ByUpdate):
-    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed
-    are left to the step.
+    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed.
+
+    Points that stay closed are left to the step.
 
     v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed
     at every dt.

@@ -1,5 +1,6 @@
-"""Choose the mass matrix of the equations of motion: consistent, or without inertia at the contact
-nodes.
+"""Choose the mass matrix of the equations of motion.
+
+It is consistent, or without inertia at the contact nodes.
 
 With mass at the contact nodes every closure is an impact of that mass: forces ring and, with
 contact in the acceleration balance, energy grows. Without it the contact unknowns follow the body
@@ -38,8 +39,9 @@ class ConsistentMass:
 
 @dataclass(frozen=True)
 class Redistributed:
-    """Take the mass from the normal unknowns of all contact nodes; with friction also from
-    ``tangential`` ones.
+    """Take the mass from the normal unknowns of all contact nodes.
+
+    With friction it is also taken from ``tangential`` ones.
 
     M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every
     contact node the velocity of the rigid motion that fits its neighbours behind the surface best:
@@ -113,7 +115,7 @@ class Redistributed:
 
 
 def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
-    """The unknowns of every body that has inner ones. Collective."""
+    """Return the unknowns of every body that has inner ones. Collective."""
     comm, numbers = system.algebra.comm, np.asarray(system.space.bodies)
     last = int(largest(comm, np.max(numbers, initial=0)))
     for number in range(last + 1):
@@ -143,8 +145,10 @@ def _contact_unknowns(
 def _inertia_correction(
     system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array
 ) -> Matrix:
-    """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d)
-    matrix of polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R.
+    """Return D of one body.
+
+    D holds the smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d) matrix of
+    polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R.
     """
     comm, d = system.algebra.comm, system.influence.shape[1]
     points = system.space.coordinates
@@ -196,9 +200,10 @@ def _inertia_correction(
 
 
 def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
-    """Columns c such that the polynomials powers @ c are orthonormal with the nodal masses as
-    weights: with them the smallest coefficients are the smallest changes of nodal masses. Dependent
-    polynomials are left out.
+    """Return columns c such that the polynomials powers @ c are orthonormal.
+
+    The weights are the nodal masses. With these columns the smallest coefficients are the smallest
+    changes of nodal masses. Dependent polynomials are left out.
     """
     values, vectors = np.linalg.eigh(comm.sum(powers.T @ (nodal[:, None] * powers)))
     kept = values > 1e-10 * values[-1]
@@ -208,8 +213,9 @@ def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
 def _pairs_of_components(
     system: SemiDiscreteSystem, inner: Mask
 ) -> Iterator[tuple[Indices, Indices]]:
-    """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c
-    <= e.
+    """Return (unknowns of direction c, of direction e) of the inner nodes that have both.
+
+    There is one pair for each c <= e.
     """
     d = system.influence.shape[1]
     mine = np.flatnonzero(inner)

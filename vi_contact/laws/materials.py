@@ -1,5 +1,6 @@
-"""Describe what a body is made of: isotropic elasticity, the section it is cut to, and the damping
-of its motion.
+"""Describe what a body is made of.
+
+It is isotropic elasticity, the section it is cut to, and the damping of its motion.
 
 Everything here is a frozen value checked when it is built; SI units throughout; no finite element
 is needed.
@@ -67,8 +68,9 @@ class LinearElastic:
     def from_wave_speeds(
         cls, c_p: float, c_s: float, rho: float, xi: float = 0.0
     ) -> "LinearElastic":
-        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s], with the
-        damping ratio xi.
+        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
+
+        Its damping ratio is xi.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 +
         nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
@@ -90,15 +92,17 @@ class LinearElastic:
 
     @property
     def shear_modulus(self) -> float:
-        """Return the second Lamé constant E / (2 (1 + nu)) [Pa]; never called mu here, mu is
-        friction.
+        """Return the second Lamé constant E / (2 (1 + nu)) [Pa].
+
+        It is never called mu here: mu is friction.
         """
         return self.E / (2.0 * (1.0 + self.nu))
 
     @property
     def c_p(self) -> float:
-        """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s], also in
-        plane strain.
+        """Return the pressure wave speed [m/s], which is also that in plane strain.
+
+        It is sqrt((lame_lambda + 2 shear_modulus) / rho).
         """
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
@@ -110,8 +114,9 @@ class LinearElastic:
 
 @dataclass(frozen=True)
 class ElasticValues:
-    """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points, (k,) each or one for all;
-    sections and damping take them alike.
+    """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points.
+
+    Each is (k,) or one for all; sections and damping take them alike.
     """
 
     E: Any
@@ -123,23 +128,26 @@ class ElasticValues:
 
 
 class Section(Protocol):
-    """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness`
-    [m] (solids: 1).
+    """Say how the body is cut out of space.
+
+    Integrals over the mesh are multiplied by `thickness` [m] (solids: 1).
     """
 
     @property
     def thickness(self) -> float: ...
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus
-        eps, in plane.
+        """Return (lambda_eff, shear_modulus) [Pa] of the stress in the plane.
+
+        It is sigma = lambda_eff tr(eps) I + 2 shear_modulus eps.
         """
 
 
 @dataclass(frozen=True)
 class PlaneStress:
-    """Cut a panel of this thickness [m], free of stress across it: lambda_eff = 2 lambda mu /
-    (lambda + 2 mu).
+    """Cut a panel of this thickness [m], free of stress across it.
+
+    lambda_eff = 2 lambda mu / (lambda + 2 mu).
     """
 
     thickness: float = 1.0
@@ -148,8 +156,9 @@ class PlaneStress:
         number("PlaneStress", "the thickness [m]", self.thickness, positive=True)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 +
-        nu))).
+        """Return (lambda_eff, shear_modulus) [Pa].
+
+        They equal (E nu / (1 - nu²), E / (2 (1 + nu))).
         """
         lame, shear = material.lame_lambda, material.shear_modulus
         return 2.0 * lame * shear / (lame + 2.0 * shear), shear
@@ -157,7 +166,8 @@ class PlaneStress:
 
 @dataclass(frozen=True)
 class PlaneStrain:
-    """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis:
+    """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis.
+
     lambda_eff = lambda.
     """
 
@@ -186,8 +196,9 @@ class Damping(Protocol):
     """Build viscous damping from the mass and stiffness of one material: C = alpha M + beta K."""
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of
-        `material`.
+        """Return (alpha [1/s], beta [s]) of C = alpha M + beta K.
+
+        They are those on the part of the body made of `material`.
         """
 
 
@@ -202,8 +213,9 @@ class NoDamping:
 
 @dataclass(frozen=True)
 class MassProportional:
-    """Damp by a force c u' per unit volume, rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >=
-    0.
+    """Damp by a force c u' per unit volume.
+
+    rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >= 0.
     """
 
     c: float
@@ -214,16 +226,18 @@ class MassProportional:
         )
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (c / rho, 0): integrating c against the shape functions is c / rho times the
-        consistent mass.
+        """Return (c / rho, 0).
+
+        Integrating c against the shape functions is c / rho times the consistent mass.
         """
         return self.c / material.rho, 0.0
 
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """Damp by C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any
-    contact term.
+    """Damp by C = alpha M + beta K, with alpha [1/s] >= 0 and beta [s] >= 0.
+
+    K is the stiffness without any contact term.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with
     uplift prefer alpha = 0. Raises InputError for a negative or non-finite coefficient.
@@ -238,8 +252,9 @@ class Rayleigh:
 
     @classmethod
     def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> "Rayleigh":
-        """Make the damping of ratio xi1 at f1, xi2 at f2 [Hz]: alpha / (2 w_i) + beta w_i / 2 =
-        xi_i, w_i = 2 pi f_i.
+        """Make the damping of ratio xi1 at f1, xi2 at f2 [Hz].
+
+        alpha / (2 w_i) + beta w_i / 2 = xi_i, w_i = 2 pi f_i.
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²);
         for equal ratios xi alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and
@@ -272,8 +287,9 @@ class Rayleigh:
         return self.alpha, self.beta
 
     def ratio(self, f: float) -> float:
-        """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi
-        [Hz] > 0.
+        """Return the damping ratio of a mode of frequency f = w / 2 pi [Hz] > 0.
+
+        It is alpha / (2 w) + beta w / 2.
 
         Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
         """
@@ -314,8 +330,9 @@ class DampingRatio:
 
 @dataclass(frozen=True)
 class KelvinVoigt:
-    """Damp by sigma_v = bulk tr(eps') I + 2 shear dev(eps'), with the viscosities shear, bulk [Pa
-    s] >= 0.
+    """Damp by sigma_v = bulk tr(eps') I + 2 shear dev(eps').
+
+    The viscosities are shear, bulk [Pa s] >= 0.
 
         C = ∫ sigma_v(v):eps(w) = ∫ (bulk - 2/3 shear) tr(eps(v)) tr(eps(w)) + 2 shear eps(v):eps(w)
 

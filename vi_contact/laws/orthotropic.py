@@ -1,5 +1,6 @@
-"""Describe orthotropic elasticity: nine engineering constants along three material axes at right
-angles.
+"""Describe orthotropic elasticity along three material axes at right angles.
+
+It has nine engineering constants.
 """
 
 from collections.abc import Sequence
@@ -105,8 +106,9 @@ class Orthotropic:
         return np.einsum("ip,jq,kr,ls,pqrs->ijkl", Q, Q, Q, Q, C, optimize=True)
 
     def matrix(self, section: Section, dimension: int) -> Array:
-        """Return the stresses (rows in the order of ``VOIGT``, in the plane then sigma_zz) of unit
-        strains [Pa].
+        """Return the stresses of unit strains [Pa].
+
+        The rows are in the order of ``VOIGT``, in the plane then sigma_zz.
 
         (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and
         on a line.

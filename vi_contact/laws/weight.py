@@ -67,8 +67,9 @@ def with_weight(
 
 
 def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
-    """Raise InputError, on all ranks, for weight that nothing feels, or that the constant loads
-    hold already.
+    """Raise InputError, on all ranks, for weight that is given in vain.
+
+    Nothing feels it, or the constant loads hold it already.
     """
     comm = system.algebra.comm
     size = largest(comm, max_abs(weight))
