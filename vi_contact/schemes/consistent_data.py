@@ -1,5 +1,6 @@
-"""Make initial data consistent: the acceleration that fits them, and equilibrium of unknowns
-without inertia.
+"""Make initial data consistent.
+
+This is the acceleration that fits them, and equilibrium of unknowns without inertia.
 
 What schemes with accelerations start from, also after an impact, fits a displacement and a
 velocity:
@@ -41,8 +42,9 @@ ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and v
 def consistent_acceleration(
     problem: ContactProblem, state: State, dt: float
 ) -> tuple[Array, Array]:
-    """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v, owned unknowns of the
-    rotated basis.
+    """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v.
+
+    They are on the owned unknowns of the rotated basis.
     """
     system = problem.equations
     force = system.load(state.t) - system.K @ state.u
@@ -117,8 +119,9 @@ def rigid_part(surface: ContactSurface) -> ContactSurface:
 
 
 def equilibrated(problem: ContactProblem, state: State) -> State:
-    """Return the state with its massless unknowns, if any, in equilibrium, and with the reactions
-    that belong to it.
+    """Return the state with its massless unknowns, if any, in equilibrium.
+
+    It has the reactions that belong to it.
 
     Only their own block of K is factorised, however large the body is; not even that when it is
     large itself.
@@ -162,8 +165,9 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
 
 
 def massless_take(problem: ContactProblem, given: Array | float, x: Array) -> Array:
-    """Return x with these values on massless unknowns: a mean velocity, without momentum to keep;
-    no acceleration.
+    """Return x with these values on massless unknowns.
+
+    They take a mean velocity, without momentum to keep, and no acceleration.
     """
     massless = problem.equations.massless
     return x if massless is None else np.where(massless, given, x)

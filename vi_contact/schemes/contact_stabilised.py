@@ -1,5 +1,6 @@
-"""Step by contact-stabilised Newmark: the predictor is made admissible first, so that contact
-forces do not ring.
+"""Step by contact-stabilised Newmark.
+
+The predictor is made admissible first, so that contact forces do not ring.
 
     u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0  (= on bilateral rows)
     M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t]
@@ -106,8 +107,9 @@ class ContactStabilisedNewmark(SingleStep):
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
-    """Return (u_p, the points that stopped it) for a predicted displacement ``u`` of the step of dt
-    after ``state``.
+    """Return (u_p, the points that stopped it) for a predicted displacement ``u``.
+
+    The step is that of dt after ``state``.
 
         M w = -B_nᵀ q,    0 <= q  ⊥  gap0 - B_n u - B_n w >= 0,    u_p = u + w
 

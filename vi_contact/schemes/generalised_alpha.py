@@ -57,16 +57,18 @@ class AlphaStep(BalanceStep, ABC):
     @property
     @abstractmethod
     def weights(self) -> "GeneralisedAlpha":
-        """Return the member of generalised-alpha that it is, with alpha_m, alpha_f, beta and
-        gamma.
+        """Return the member of generalised-alpha that it is.
+
+        It tells alpha_m, alpha_f, beta and gamma.
         """
 
     def _mark(self, t: float) -> Array:
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with massless nodes in equilibrium and its acceleration; not on restarts
-        or a new dt.
+        """Return the state with massless nodes in equilibrium and its acceleration.
+
+        This is not done on restarts or a new dt.
         """
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
@@ -95,8 +97,9 @@ class AlphaStep(BalanceStep, ABC):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 -
-        alpha_f) at u1 = 0.
+        """Return the step with b of the equation at u1 = 0.
+
+        b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f).
         """
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
@@ -120,8 +123,9 @@ class AlphaStep(BalanceStep, ABC):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with a1 and v1 from u1; massless unknowns get none and the mean velocity
-        of the step.
+        """Return the state with a1 and v1 from u1.
+
+        Massless unknowns get no acceleration and the mean velocity of the step.
         """
         w = self.weights
         v, a = self._known(state, dt)
@@ -144,8 +148,9 @@ class AlphaStep(BalanceStep, ABC):
 def weighted(
     problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = ""
 ) -> Balance:
-    """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else; ``level``: of
-    names in memory.
+    """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else.
+
+    ``level`` is that of names in memory.
     """
     load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
@@ -194,8 +199,9 @@ class GeneralisedAlpha(AlphaStep):
 
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> "GeneralisedAlpha":
-        """Return the member of order 2 with this amplification at infinite frequency, 0 (all
-        damped) to 1 (none).
+        """Return the member of order 2 with this amplification at infinite frequency.
+
+        It goes from 0 (all damped) to 1 (none).
         """
         remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
         between("rho_inf", rho_inf, 0.0, 1.0, remedy)

@@ -1,5 +1,6 @@
-"""Step by the method of Hilber, Hughes and Taylor: Newmark's, with the forces but not the inertia
-before its end.
+"""Step by the method of Hilber, Hughes and Taylor.
+
+It is Newmark's, with the forces but not the inertia before its end.
 
     M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f
     (…)_f = (1 + alpha) (…)1 - alpha (…)0

@@ -1,5 +1,6 @@
-"""Step with the general linear multistep operators of the boundary method, eqs. 11a,b, with Newmark
-as one member.
+"""Step with the general linear multistep operators of the boundary method.
+
+They are eqs. 11a,b, with Newmark as one member.
 
     sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
     sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
@@ -42,8 +43,9 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 @dataclass(frozen=True)
 class LinearMultistep(BalanceStep):
-    """Step with the coefficients of a linear multistep method, newest level first, all of one
-    length q + 1 >= 2.
+    """Step with the coefficients of a linear multistep method.
+
+    The newest level is first; all are of one length q + 1 >= 2.
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u =
     1, t and t²).
@@ -97,8 +99,10 @@ class LinearMultistep(BalanceStep):
             )
 
     def spectral_radius(self) -> float:
-        """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over
-        FREQUENCIES w dt and DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z).
+        """Return the largest |z| of the solutions u(p) = z^p over FREQUENCIES and DAMPING.
+
+        The solutions are those of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and DAMPING xi:
+        roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z).
         """
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         polynomials = [b] + [
@@ -125,8 +129,9 @@ class LinearMultistep(BalanceStep):
         return self.a[0] / (dt * self.b[0]), self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with a past, unless it has one for this dt; massless nodes come into
-        equilibrium, once.
+        """Return the state with a past, unless it has one for this dt.
+
+        Massless nodes come into equilibrium, once.
         """
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
@@ -193,8 +198,9 @@ class LinearMultistep(BalanceStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one
-        down.
+        """Return the state with velocity and acceleration from eqs. 11c,d.
+
+        The levels move one down.
         """
         levels = self._levels(state)
         (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
@@ -212,7 +218,8 @@ class LinearMultistep(BalanceStep):
         )
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the mean of the equations of motion at both ends of the step, the old end after
-        its impact.
+        """Return the mean of the equations of motion at both ends of the step.
+
+        The old end is that after its impact.
         """
         return weighted(problem, old, new, 0.5, 0.5, "_0")

@@ -80,8 +80,9 @@ class MoreauJean(SingleStep):
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point
-        with a gap.
+        """Raise InputError for what does not suit the scheme.
+
+        This is massless contact nodes, springs, an impact law, or a bilateral point with a gap.
         """
         super().check(problem)
         surface = problem.surface
@@ -114,8 +115,9 @@ class MoreauJean(SingleStep):
         return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
 
     def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Largest normal velocity after the step of a closed point; all refer to the velocity of
-        the obstacle.
+        """Return the largest normal velocity after the step of a closed point.
+
+        All refer to the velocity of the obstacle.
         """
         surface, advance = problem.surface, problem.surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt
@@ -128,8 +130,9 @@ class MoreauJean(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta)
-        C v0).
+        """Return the step in x = v1.
+
+        b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0).
         """
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.product("K", state.u)

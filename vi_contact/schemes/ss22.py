@@ -1,5 +1,6 @@
-"""Step by SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two weights theta1,
-theta2.
+"""Step by SS22, a form of the Zienkiewicz-Wood-Taylor method.
+
+It is the single-step form with two weights theta1, theta2.
 
     u(tau) = u0 + v0 tau + ½ alpha tau²
     weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):

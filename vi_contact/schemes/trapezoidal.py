@@ -47,8 +47,10 @@ class Trapezoidal:
         provides("Trapezoidal", "mass", self.mass, ("apply",), remedy, lacks=("target",))
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes, and a mass of its own
-        beside that of the problem; warn when contact nodes have mass.
+        """Raise InputError for an impact law on massless contact nodes.
+
+        So it does for a mass of its own beside that of the problem. Warn when contact nodes have
+        mass.
         """
         if self.mass not in (Redistributed(), problem.mass):
             raise InputError(
@@ -59,8 +61,9 @@ class Trapezoidal:
         check_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with massless nodes in equilibrium; once, not on restarts and changes of
-        dt.
+        """Return the state with massless nodes in equilibrium.
+
+        This is done once, not on restarts and changes of dt.
         """
         if "force" in state.memory:
             return state
@@ -102,8 +105,9 @@ class Trapezoidal:
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity
-        of the step.
+        """Return the state with v1 = 2 (u1 - u0)/dt - v0.
+
+        Massless unknowns get the mean velocity of the step.
         """
         mean = (result.x - state.u) / dt
         v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)

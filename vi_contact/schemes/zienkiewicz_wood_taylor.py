@@ -1,5 +1,6 @@
-"""Step as Zienkiewicz, Wood and Taylor do: displacement and velocity are interpolated
-independently.
+"""Step as Zienkiewicz, Wood and Taylor do.
+
+Displacement and velocity are interpolated independently.
 
 Linear u and v over the step, weighted residual with weight phi (docs/reference/sources.md [2]):
 
@@ -58,8 +59,9 @@ class ZienkiewiczWoodTaylor(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi
-        K u0.
+        """Return the step in x = u1.
+
+        b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0.
         """
         system, phi = problem.equations, self.phi
         b = self._load(problem, state, dt) / phi
