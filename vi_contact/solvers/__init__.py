@@ -1,5 +1,4 @@
-"""Solve the contact problem of one step: condensed to the contact points, or in the volume with
-PETSc.
+"""Solve the contact problem of one step, condensed to the contact points or in the volume (PETSc).
 
 Take ``Condensed()``; ``Volume()`` and ``Iterative()`` are for large bodies. The other names are
 their methods, without friction (``normal/``) and with it (``friction/``): docs/guide/solvers.md.

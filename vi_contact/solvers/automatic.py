@@ -1,5 +1,6 @@
-"""Choose the route by the size of the problem: condensed where it is faster, iterative where it is
-not.
+"""Choose the route by the size of the problem.
+
+It is condensed where that is faster, iterative where it is not.
 
 Condensing costs one factor of A, once per dt, and a step then one forward and one backward
 substitution; the iterative route costs some tens of products with A every step, and next to nothing
@@ -38,8 +39,9 @@ TOLERANCE = (
 
 @dataclass(frozen=True)
 class Automatic:
-    """Solve by ``condensed`` or by ``iterative``: the one that is faster for the size of the
-    problem.
+    """Solve by ``condensed`` or by ``iterative``.
+
+    It is the one that is faster for the size of the problem.
 
     ``iterative`` solves problems in space from 50 000 unknowns on (20 000 on several ranks, or
     without CHOLMOD), and problems with more contact points (with friction: contact unknowns) than
@@ -116,8 +118,9 @@ class Chosen:
 
 
 def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
-    """Return what solves the contact problems that schemes pose beside the steps, at the start or
-    of a predictor.
+    """Return what solves the contact problems that schemes pose beside the steps.
+
+    These are posed at the start or of a predictor.
 
     Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which
     factorise nothing: these matrices, of mass or of a layer of nodes, are well-conditioned.

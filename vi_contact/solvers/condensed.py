@@ -1,5 +1,6 @@
-"""Eliminate everything but the contact unknowns: the condensed route (docs/reference/sources.md
-[1], sections 3, 4).
+"""Eliminate everything but the contact unknowns.
+
+This is the condensed route (docs/reference/sources.md [1], sections 3, 4).
 
 With the one factorisation of A and the unit vectors E of the normal unknowns:
 
@@ -45,8 +46,9 @@ class SmallMethod(Protocol):
     """Solve the small problem without friction: ActiveSet, Hildreth or Lemke."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
-        """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral``
-        (m,).
+        """Check G (m, m) and factor or scale it, once for many right-hand sides.
+
+        ``bilateral`` (m,) says which rows are bilateral.
 
         What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and
         ``guess`` (m,).
@@ -55,8 +57,9 @@ class SmallMethod(Protocol):
 
 @dataclass(frozen=True)
 class Condensed:
-    """Condense each step onto its contact unknowns and solve this smaller problem, on any number of
-    ranks.
+    """Condense each step onto its contact unknowns and solve this smaller problem.
+
+    It does so on any number of ranks.
 
     ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves
     it with friction: FrictionNewton, NSGS, FixedPoint or GivenForces. ``rates`` is the iteration
@@ -82,9 +85,11 @@ class Condensed:
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of
-        values, for more contact unknowns than a dense matrix suits, and matrices that are not
-        symmetric unless the methods take them.
+        """Raise InputError for what the route cannot treat.
+
+        This is friction without a tangential direction, or of a wrong number of values, more
+        contact unknowns than a dense matrix suits, and matrices that are not symmetric unless the
+        methods take them.
         """
         surface = problem.surface
         if problem.frictional:
@@ -135,7 +140,7 @@ class PreparedCondensed:
 
     @stage("condensing")
     def _condensed(self, *, frictional: bool) -> Condensation:
-        """A condensed, with the compliance of the support in its flexibility."""
+        """Return A condensed, with the compliance of the support in its flexibility."""
         made, surface = condense(self._A, self._surface, frictional=frictional), self._surface
         extra = surface.everywhere(surface.compliance) / self._scale
         normal = np.arange(surface.total) * (len(made.there) // max(surface.total, 1))

@@ -1,5 +1,6 @@
-"""Correct residuals: what an answer leaves over is a step of its own, small, and solved by the same
-solver.
+"""Correct residuals.
+
+What an answer leaves over is a step of its own, small, and solved by the same solver.
 
 The answer (x0, r0) stays, but for a share s of its reactions. The contract of ``step.py`` for d = x
 - x0 and q = r - (1 - s) r0 is the contract again, because reactions that obey the laws form a cone
@@ -59,8 +60,9 @@ class Share:
 
 
 def share_of(residual: float) -> float:
-    """Return the share of reactions that an answer with this residual gives back, a power of two:
-    it loses no digit.
+    """Return the share of reactions that an answer with this residual gives back.
+
+    It is a power of two, so that no digit is lost.
     """
     return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
 
@@ -97,8 +99,10 @@ def added(step: StepProblem, answer: StepResult, found: StepResult, share: float
 
 
 def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
-    """Return 1 - s times the reactions, those outside the cone, or no farther than s from its edge,
-    on its edge: whether they stick or slip, what is missing then lies in the cone of q.
+    """Return 1 - s times the reactions, which corrections keep.
+
+    Those outside the cone, or no farther than s from its edge, are put on its edge: whether they
+    stick or slip, what is missing then lies in the cone of q.
     """
     surface = step.surface
     r_n = np.where(surface.bilateral, answer.r_n, np.maximum(answer.r_n, 0.0))
@@ -120,8 +124,9 @@ def corrected(
     solve: Callable[[StepProblem], StepResult],
     goal: float,
 ) -> tuple[StepResult, Certificate]:
-    """Return the result after corrections that brought its certificate to the goal, or as near to
-    it as they got.
+    """Return the result after corrections that brought its certificate to the goal.
+
+    Or they brought it as near to it as they got.
     """
     for _ in range(ROUNDS):
         share = share_of(certificate.worst)

@@ -1,5 +1,6 @@
-"""Refuse numbers that are none at the door of a step, before any solver works on them: NaN spreads
-without a word.
+"""Refuse numbers that are none at the door of a step, before any solver works on them.
+
+NaN spreads without a word.
 
 What is asked of every step is three inner products; what is wrong, and where, is looked for only
 when something is.
@@ -26,9 +27,10 @@ Source = Callable[[], SemiDiscreteSystem]
 
 
 def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
-    """Raise StepFailure for NaN or infinite loads, NaN in gaps, guesses or slips, with time and
-    place; asked of all ranks, so that all stop. ``source``: makes the system whose histories may be
-    named. Collective.
+    """Raise StepFailure for NaN or infinite loads, and NaN in gaps, guesses or slips.
+
+    It tells time and place. It is asked of all ranks, so that all stop. ``source``: makes the
+    system whose histories may be named. Collective.
     """
     bound, slip0 = step.bound, step.slip0
     fine = isfinite(
@@ -84,8 +86,9 @@ def _place(comm: Any, wrong: Mask, points: Array | None) -> str:
 
 
 def _histories(step: StepProblem, system: SemiDiscreteSystem) -> Iterator[str]:
-    """Name the first history of a load or excitation that is no number, and the time it was asked
-    for. Collective.
+    """Name the first history of a load or excitation that is no number.
+
+    The time it was asked for is named too. Collective.
     """
     for t in dict.fromkeys([*system.times, step.t]):
         for _, history in system.load.separable:

@@ -30,8 +30,9 @@ from .slip_rate import RateIteration
 
 
 class CondensedFriction:
-    """Solve the small problem with friction of one A, condensed onto normal and tangential
-    unknowns.
+    """Solve the small problem with friction of one A.
+
+    It is condensed onto normal and tangential unknowns.
     """
 
     def __init__(
@@ -61,9 +62,10 @@ class CondensedFriction:
     def reactions(
         self, step: StepProblem, free: Array, rigid: Mask
     ) -> tuple[FrictionResult, Mask, Array]:
-        """Return the reactions for contact unknowns that would be ``free``, and where they are put:
-        closed points on a rigid support on their bound, those that stick where they were, which
-        removes round-off only.
+        """Return the reactions for contact unknowns that would be ``free``, and where they are put.
+
+        Closed points on a rigid support are put on their bound, those that stick where they were,
+        which removes round-off only.
         """
         surface = self._surface
         assert step.slip0 is not None
@@ -94,8 +96,9 @@ class CondensedFriction:
     def solve_many(
         self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
     ) -> Answers:
-        """Return the answers to several steps: ``many`` holds their rows, ``own`` makes one of
-        them.
+        """Return the answers to several steps.
+
+        ``many`` holds their rows, ``own`` makes one of them.
         """
         free, (m, d) = (
             self.condensed.free(many.b),

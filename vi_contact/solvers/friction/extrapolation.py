@@ -1,5 +1,6 @@
-"""Extrapolate fixed-point iterations: the next point x from the points tried so far and their
-images g(x).
+"""Extrapolate fixed-point iterations.
+
+The next point x is found from the points tried so far and their images g(x).
 
     plain       x <- g(x)
     Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j)

@@ -1,5 +1,6 @@
-"""Solve Coulomb's law as a sequence of Tresca problems: s <- limit(r_n(s)), the classical fixed
-point.
+"""Solve Coulomb's law as a sequence of Tresca problems.
+
+It is s <- limit(r_n(s)), the classical fixed point.
 
 Every problem with the threshold s given is convex and has one solution; the map is a contraction
 for small friction (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980; Haslinger,

@@ -1,5 +1,6 @@
-"""Alternate with given forces: the normal problem with r_t given, then the tangential problem with
-r_n given.
+"""Alternate between normal and tangential problems with given forces.
+
+First comes the normal problem with r_t given, then the tangential problem with r_n given.
 
 The boundary method (docs/reference/sources.md [1]) carries tangential forces C_T that are given
 (eq. 6); they enter the right-hand side, gamma of eq. 40, and what is left is the minimum of eq. 42

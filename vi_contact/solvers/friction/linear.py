@@ -1,5 +1,6 @@
-"""Solve the linear problems of semismooth Newton with friction, by whichever of two matrices is the
-smaller.
+"""Solve the linear problems of semismooth Newton with friction.
+
+It is done by whichever of two matrices is the smaller.
 
 With the rows R that must hold, r = fixed + P z and w = q + G fixed:
 
@@ -124,8 +125,9 @@ class Reduced:
         return r
 
     def matrix(self, G: Array) -> Array:
-        """Return K, made as its transpose, whose rows are near each other in memory; G is
-        transposed too.
+        """Return K, made as its transpose.
+
+        The rows of the transpose are near each other in memory; G is transposed too.
         """
         places = np.concatenate([self.plain, self._turned.ravel()])
         part = _block(G, self.plain, places)
@@ -167,7 +169,7 @@ class Factored:
             self._lu, self.sound = (lu, pivots), info == 0
 
     def _rest(self, H: Array) -> Array:
-        """The matrix of (2)."""
+        """Return the matrix of (2)."""
         growth, left = np.zeros(self.reduced.shape), np.ones(len(H), dtype=bool)
         growth[:, 1:], left[self.reduced.plain] = self.reduced.growth, False
         self._others = others = np.flatnonzero(left)
@@ -188,7 +190,7 @@ class Factored:
         return np.asarray(r[self.reduced.plain])
 
     def _whole(self, H: Array, v: Array) -> Array:
-        """r of (2)."""
+        """Return r of (2)."""
         full = np.zeros(len(H))
         full[self.reduced.plain] = v
         r = H @ full

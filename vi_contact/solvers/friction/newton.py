@@ -98,7 +98,10 @@ class FrictionNewton(Settings):
     def _newton(
         self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]
     ) -> tuple[Array, bool]:
-        """The best iterate r, and whether it solves the problem to rounding or to the tolerance."""
+        """Return the best iterate r, and whether it solves the problem.
+
+        It does so to rounding or to the tolerance.
+        """
         best, smallest = np.zeros_like(y), step.unit
         linear = LinearProblems(step.delassus, kept)
         states: States | None = None
@@ -119,8 +122,9 @@ class FrictionNewton(Settings):
 
 
 def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array, float]:
-    """Return r, w = q + G r and the residual after compiled sweeps; in 2D, where they are a start
-    only, w as the sweeps left it.
+    """Return r, w = q + G r and the residual after compiled sweeps.
+
+    In 2D, where they are a start only, w is as the sweeps left it.
     """
     of, r, w = step.delassus, np.array(r, order="C"), np.array(step.w(r), order="C")
     room = np.empty(r.size + len(r), dtype=np.float32)

@@ -1,5 +1,6 @@
-"""Solve contact with friction by nonsmooth Gauss-Seidel: one node after another, each solved
-exactly.
+"""Solve contact with friction by nonsmooth Gauss-Seidel.
+
+One node is solved after another, each exactly.
 
 Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
 
@@ -83,7 +84,7 @@ class _Node:
         self.bilateral = bool(step.delassus.bilateral[i])
 
     def solve(self, q: Array) -> Array:
-        """The reactions of the node when all others give it q."""
+        """Return the reactions of the node when all others give it q."""
         q_n, q_t = float(q[0]), q[1:]
         if not self.bilateral:
             r_t = on_disk(self.tangential, q_t, lambda r_t: self.cohesion)
@@ -103,8 +104,9 @@ class _Node:
 
 
 def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
-    """Return r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r),
-    lambda > 0.
+    """Return r with S r = -q when |r| <= limit(r), and else r on the disk.
+
+    There, (S + lambda) r = -q on |r| = limit(r), lambda > 0.
 
     S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| -
     limit is bracketed in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of

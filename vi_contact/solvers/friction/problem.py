@@ -1,5 +1,6 @@
-"""Pose the small problem of a step with friction: its residual, and the scaling all its methods
-share.
+"""Pose the small problem of a step with friction.
+
+Its residual, and the scaling all its methods share, are here.
 
     w = q + G r;    0 <= r_n  perpendicular to  w_n >= 0   (bilateral rows: w_n = 0, r_n free)
     |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0)
@@ -67,15 +68,17 @@ class FrictionMethod(Protocol):
         """Say True: that tells such a method from those for the problem without friction."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
-        """Check and scale G (m d, m d), ``bilateral`` (m,); return ``PreparedFriction`` or its like
-        for many q.
+        """Check and scale G (m d, m d) and return ``PreparedFriction`` or its like for many q.
+
+        ``bilateral`` (m,) says which rows are bilateral.
         """
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Hold what all methods here let one choose: ``tolerance``, and ``max_iterations`` that they
-    may take.
+    """Hold what all methods here let one choose.
+
+    This is ``tolerance``, and ``max_iterations`` that they may take.
     """
 
     carries_friction: ClassVar[bool] = True
@@ -108,8 +111,9 @@ class ScaledProblem:
         return len(self.cohesion)
 
     def moved(self, r: Array) -> Array:
-        """Return G r (m, d), from the rows that carry something when they are few; of the last r it
-        is known.
+        """Return G r (m, d), from the rows that carry something when they are few.
+
+        Of the last r it is known.
         """
         if not (self._last and np.array_equal(self._last[0], r)):
             self._last[:] = r.copy(), self.delassus.product(r.ravel()).reshape(r.shape)
@@ -140,15 +144,17 @@ class ScaledProblem:
         return 16.0 * EPS * self.delassus.norm * max_abs(r)
 
     def admissible(self, r: Array) -> Array:
-        """Return r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever
-        else is outside.
+        """Return r with r_n >= 0 and r_t within its disk.
+
+        This removes rounding errors, and whatever else is outside.
         """
         r_n = np.where(self.delassus.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Return reactions to start from: those guessed; or what opens the guessed set row by row,
-        at least energy.
+        """Return reactions to start from.
+
+        They are those guessed, or what opens the guessed set row by row, at least energy.
         """
         if guess is None:
             return np.zeros_like(self.q)
@@ -166,8 +172,10 @@ class ScaledProblem:
         return r
 
     def result(self, method: object, tolerance: float, found: Iterated) -> FrictionResult:
-        """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and
-        above rounding.
+        """Return the result in newtons.
+
+        Raises:
+            StepFailure: the residual is above ``tolerance`` and above rounding.
         """
         r, iterations, history = found
         r = self.admissible(r)
@@ -218,9 +226,10 @@ class ScaledDelassus:
 
     @cached_property
     def short(self) -> tuple[Any, ...]:
-        """Return G and, in 2D, its inverse H and the inverse of each node's block of H, in single
-        precision, for the compiled sweeps; None for what is missing, or is not positive definite to
-        that precision.
+        """Return G in single precision for the compiled sweeps and, in 2D, inverses.
+
+        These are its inverse H and the inverse of each node's block of H, in single precision too.
+        There is None for what is missing, or is not positive definite to that precision.
         """
         G, d = self.matrix.astype(np.float32), self.dimension
         triangle, info = lapack.spotrf(G, lower=1) if d == 2 else (G, 1)

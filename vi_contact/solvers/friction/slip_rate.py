@@ -1,5 +1,6 @@
-"""Iterate over friction coefficients that depend on the slip rate of the step itself: ordinary
-problems in turn.
+"""Iterate over friction coefficients that depend on the slip rate.
+
+The rate is that of the step itself; ordinary problems are solved in turn.
 
     mu <- mu(|v|),    v = rate_factor w_t(mu)
     w_t(mu): slip of the step with the coefficients mu given                                    (1)
@@ -55,8 +56,9 @@ class RateIteration:
         solved: Callable[[Array, Any], Any],
         slip: Callable[[Any], Array],
     ) -> Any:
-        """Iterate from mu, the coefficients of all conditions under the law at ``rest``; once for
-        one without rates.
+        """Iterate from mu, the coefficients under the law at ``rest``.
+
+        They are those of all conditions. A law without rates is solved for once.
 
         ``solved``: the problem of given coefficients, starting from the last result, None at first;
         ``slip``: that of a result, B_t x - slip0 (m, d - 1) of this rank. StepFailure when the

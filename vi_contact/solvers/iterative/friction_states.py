@@ -1,5 +1,6 @@
-"""Hold which contact points are open, stick and slip, and the linear problem of these states on the
-full-size vectors.
+"""Hold which contact points are open, stick and slip.
+
+The linear problem of these states on the full-size vectors is here too.
 
 With the force r_t = (b - A x)_t on the tangents, the slip s = x_t - slip0, a stiffness c of each
 point (the diagonal of A) and y = r_t + c s, a point sticks where |y| <= limit(r_n) and else slips
@@ -61,8 +62,9 @@ class Tangents:
 
 @dataclass(frozen=True)
 class Limits:
-    """Hold the friction limit cohesion + slope r_n of every point, its ``rise`` [A] with the slip,
-    and that at rest.
+    """Hold the friction limit cohesion + slope r_n of every point.
+
+    Its ``rise`` [A] with the slip, and the limit at rest, are held too.
     """
 
     cohesion: Array
@@ -75,8 +77,9 @@ class Limits:
         return self.cohesion + self.slope * np.maximum(r_n, 0.0)
 
     def sticking(self, r_n: Array) -> Array:
-        """Return the limit (m,) below which a point sticks: of a slip that is slower under the law,
-        or of rest.
+        """Return the limit (m,) below which a point sticks.
+
+        It is that of a slip that is slower under the law, or of rest.
         """
         return self(r_n) if self.rest is None else np.minimum(self(r_n), self.rest(r_n))
 
@@ -147,8 +150,9 @@ class States:
         )
 
     def apply(self, contact: Contact, p: Array, y: Array) -> None:
-        """Turn y = A p into the product of p with the matrix of the linear problem, in the rows of
-        the tangents.
+        """Turn y = A p into the product of p with the matrix of the linear problem.
+
+        It changes the rows of the tangents.
         """
         tangents = self._tangents
         rise = np.where(contact.soft, contact.k * p[contact.rows], -y[contact.rows])
@@ -156,17 +160,19 @@ class States:
         y[tangents.rows] += tangents.flat(extra)
 
     def residual(self, r_n: Array, r_t: Array, slip: Array) -> Array:
-        """Return the residual (m, d - 1) of the linear problem, of all points as if they did not
-        stick.
+        """Return the residual (m, d - 1) of the linear problem.
+
+        It is that of all points as if they did not stick.
         """
         limit = self._cohesion + self._growth * r_n - self._rise * self._base
         return np.asarray(r_t - limit[:, None] * self.direction - self.turned(slip))
 
 
 class LawOfStep:
-    """Evaluate the friction law of a step: limits that are affine in r_n, with coefficients that
-    may depend on the slip rate. ``settled``: its coefficients are constant, or follow the slip by
-    now.
+    """Evaluate the friction law of a step.
+
+    Its limits are affine in r_n, with coefficients that may depend on the slip rate. ``settled``:
+    the coefficients are constant, or follow the slip by now.
 
     A law with rates may have several solutions where it weakens. As in ``friction.slip_rate`` the
     step begins with the coefficients of rest and takes those of the slip found in a few rounds;
@@ -191,8 +197,9 @@ class LawOfStep:
         return self._left == 0 and self._tresca == 0
 
     def advance(self, slip: Array, r_n: Array) -> None:
-        """Take the coefficients of this slip (m, d - 1), or the limits of r_n; after some rounds
-        they follow.
+        """Take the coefficients of this slip (m, d - 1), or the limits of r_n.
+
+        After some rounds they follow.
         """
         if self._tresca:
             self._tresca -= 1
@@ -202,8 +209,9 @@ class LawOfStep:
             self._left -= 1
 
     def give(self, rounds: int, slip: Array, r_n: Array) -> None:
-        """Begin rounds of given coefficients, those of rest, or of given limits where coefficients
-        are constant.
+        """Begin rounds of given coefficients, those of rest.
+
+        Where coefficients are constant, the rounds are of given limits.
         """
         if self._constant:
             self._limit, self._tresca = self._at(slip)(r_n), rounds

@@ -1,5 +1,6 @@
-"""Number the unknowns in whole nodes, so that matrices can be stored in blocks of the components of
-two nodes.
+"""Number the unknowns in whole nodes.
+
+Matrices can then be stored in blocks of the components of two nodes.
 
 A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric
 matrix serves for all of it (SBAIJ): it takes a third of the time. Prescribed components are no
@@ -21,8 +22,9 @@ from ..volume.bounded_system import assembled
 
 @dataclass(frozen=True)
 class Layout:
-    """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``,
-    ``width`` a node.
+    """Say where this rank's unknowns stand among those of whole nodes.
+
+    They stand in ``places`` (n,) of ``size``, ``width`` a node.
 
     ``complete``: on no rank is there a component of a node that is no unknown.
     """
@@ -33,8 +35,9 @@ class Layout:
     complete: bool
 
     def padded(self, x: Array) -> Array:
-        """Return the values of all components of the nodes, zero where there is no unknown; a
-        copy.
+        """Return the values of all components of the nodes, a copy.
+
+        They are zero where there is no unknown.
         """
         if self.complete:
             return np.array(x)
@@ -108,8 +111,9 @@ class Nodewise:
         return made
 
     def entries(self, result: Any = None) -> Any:
-        """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an
-        earlier one to refill.
+        """Return A as an AIJ matrix of whole nodes, each block stored in full.
+
+        ``result`` is an earlier one to refill.
 
         Rows of missing components hold the largest diagonal entry of A.
         """
@@ -124,8 +128,9 @@ class Nodewise:
 
     @cached_property
     def _selected(self) -> Any:
-        """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the
-        blocks.
+        """Return P of A -> PᵀAP, with zeros stored for the other components of a node.
+
+        They fill the blocks.
         """
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         n = len(layout.places)

@@ -1,5 +1,6 @@
-"""Apply A, and the springs of closed points, to what PETSc hands over, and count what the solver
-has done.
+"""Apply A, and the springs of closed points, to what PETSc hands over.
+
+What the solver has done is counted.
 """
 
 from dataclasses import dataclass
@@ -58,8 +59,9 @@ class Operator:
         return np.array(self._y.array_r)
 
     def shell(self) -> Any:
-        """Return a PETSc matrix that applies this operator, which must outlive it: to hold it is
-        not PETSc's, whose clean-up loses whatever only its contexts kept alive.
+        """Return a PETSc matrix that applies this operator, which must outlive it.
+
+        To hold it is not PETSc's, whose clean-up loses whatever only its contexts kept alive.
         """
         mat = PETSc.Mat().createPython(self.blocks.getSizes(), Lent(self), comm=self.blocks.comm)
         mat.setUp()

@@ -1,5 +1,6 @@
-"""Solve the step on all unknowns by conjugate gradients: nothing is factorised, condensed or
-gathered.
+"""Solve the step on all unknowns by conjugate gradients.
+
+Nothing is factorised, condensed or gathered.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
@@ -54,8 +55,9 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Iterative:
-    """Solve each step on all unknowns by conjugate gradients, on any number of ranks, and hold the
-    settings for it.
+    """Solve each step on all unknowns by conjugate gradients, and hold the settings for it.
+
+    It does so on any number of ranks.
 
     Attributes: preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank),
         "gamg" (algebraic multigrid
@@ -96,8 +98,9 @@ class Iterative:
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of
-        values.
+        """Raise InputError for friction that does not fit.
+
+        It has no tangential direction, or a wrong number of values.
         """
         check_laws("Iterative()", problem)
 
@@ -113,8 +116,9 @@ class Iterative:
 
 
 class PreparedIterative:
-    """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``:
-    PETSc's object.
+    """Solve steps of one A.
+
+    ``work``: what it has done; ``kind``: its preconditioner; ``ksp``: PETSc's object.
     """
 
     def __init__(
@@ -147,7 +151,7 @@ class PreparedIterative:
         self._surface, self._worth = surface, Worth(surface.comm, 2, settings.tolerance)
 
     def _chosen(self, A: EffectiveMatrix) -> str:
-        """The preconditioner, said in the log."""
+        """Return the preconditioner, said in the log."""
         number, asked = courant(A), self._settings.preconditioner
         kind = chosen(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
@@ -173,8 +177,10 @@ class PreparedIterative:
         return self._cg.ksp
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure, on all ranks, with the history of residuals when there is
-        no answer.
+        """Return the step.
+
+        Raises:
+            StepFailure: on all ranks, with the history of residuals, when there is no answer.
         """
         if self.kind != ICC or self._raised:
             return self._attempt(step)
@@ -194,7 +200,7 @@ class PreparedIterative:
         return self._attempt(step)
 
     def _attempt(self, step: StepProblem) -> StepResult:
-        """The step with the preconditioner that there is."""
+        """Return the step with the preconditioner that there is."""
         try:
             return self._solve(step) if step.slip0 is None else self._friction.solve(step)
         except PETSc.Error as error:

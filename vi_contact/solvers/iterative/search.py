@@ -98,8 +98,9 @@ class Search:
         self.history.append(norm / self.scales.force if self.scales.force > 0.0 else norm)
 
     def wrong(self, x: Array, residual: Array, error: float) -> Mask:
-        """Return the conditions of this rank whose signs are wrong by more than the error, the
-        largest residual.
+        """Return the conditions of this rank whose signs are wrong by more than the error.
+
+        The error is the largest residual.
         """
         r = self.contact.reactions(x, residual)
         least = 0.5 * self.tolerance * self.scales.reaction
@@ -118,9 +119,10 @@ class Search:
         return norm <= self.tolerance * self.scales.force
 
     def change(self, wrong: Mask, x: Array, residual: Array) -> tuple[Array, Array, bool]:
-        """Change the set, and return (x, residual, whether the set is a new one): a product where a
-        rigid support closes. One that opens leaves the residual as it is, and springs change it in
-        their rows alone.
+        """Change the set, and return (x, residual, whether the set is a new one).
+
+        It takes a product where a rigid support closes. One that opens leaves the residual as it
+        is, and springs change it in their rows alone.
         """
         contact = self.contact
         moves = largest(self.comm, np.any(wrong & ~contact.closed & ~contact.soft))

@@ -1,5 +1,6 @@
-"""Solve dense contact problems by the primal-dual active-set method with a finite fallback: the
-default.
+"""Solve dense contact problems by the primal-dual active-set method.
+
+It has a finite fallback, and is the default.
 
 Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the
 wrong sign (r < 0 in the set, w < 0 out of it) to the other side, repeat until no sign is wrong:
@@ -64,8 +65,9 @@ class ActiveSet:
 
 
 class PreparedSets(PreparedLCP):
-    """Solve problem (1) of one G, or several at once, by compiled exchanges first where rows are
-    few.
+    """Solve problem (1) of one G, or several at once.
+
+    Compiled exchanges come first where rows are few.
     """
 
     @cached_property
@@ -87,8 +89,9 @@ class PreparedSets(PreparedLCP):
     def solve_many(
         self, q: Array, guess: Mask
     ) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
-        """Return r and active of several q, all (k, m), the iterations, and what those raise that
-        have no answer.
+        """Return r and active of several q, all (k, m), the iterations, and the errors.
+
+        The errors are what those raise that have no answer.
         """
         none = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), None, np.full(len(q), -1), None
         r, active, _, changes, _ = none if self._compiled is None else self._compiled(q, guess)
@@ -103,8 +106,9 @@ class PreparedSets(PreparedLCP):
 
 
 class Exchanges:
-    """Make the first exchanges of several problems of one G, compiled: those of ``_Sets``, which
-    has the others.
+    """Make the first exchanges of several problems of one G, compiled.
+
+    They are those of ``_Sets``, which has the others.
     """
 
     def __init__(self, library: Any, prepared: PreparedLCP) -> None:
@@ -146,8 +150,9 @@ class Exchanges:
         )
 
     def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
-        """Return r, active, residual, iterations (-1: not solved) and rows that each moved; q,
-        guess (k, m) or (m,).
+        """Return r, active, residual, iterations (-1: not solved) and rows that each moved.
+
+        q and guess are (k, m) or (m,).
         """
         k = len(q) if q.ndim == 2 else 1
         if k > self._rows:
@@ -181,8 +186,9 @@ class _Sets:
         raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
-        """The r and w of the first set without wrong signs; adds to ``history`` how many rows each
-        change moved.
+        """Return the r and w of the first set without wrong signs.
+
+        How many rows each change moved is added to ``history``.
         """
         seen: set[bytes] = set()
         fewest, patience = gap.size + 1, PATIENCE
@@ -231,8 +237,9 @@ class _Sets:
         return factor.solve(gap)
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
-        """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either
-        side.
+        """Return the rows whose sign is wrong by more than rounding.
+
+        Grazing rows (r = w = 0) fit either side.
         """
         wrong = np.where(active, r, w) < -self._scaled.rounding(r)
         return wrong if self._scaled.unilateral else wrong & ~self._bilateral
@@ -249,8 +256,9 @@ class _Sets:
 
 
 class _Factor:
-    """Cholesky factor of G_aa of one set, and the rows of G that carry its reactions to all
-    gaps.
+    """Hold the Cholesky factor of G_aa of one set.
+
+    The rows of G that carry its reactions to all gaps are held too.
     """
 
     def __init__(self, active: Mask, matrix: Array) -> None:
@@ -259,7 +267,7 @@ class _Factor:
         self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
 
     def solve(self, gap: Array) -> tuple[Array, Array]:
-        """r (m,) with r = 0 off the set, and w = gap + G r.
+        """Return r (m,) with r = 0 off the set, and w = gap + G r.
 
         No iterative refinement: the residual of Cholesky is at rounding level already (measured
         gain below a factor 2 for conditions up to 1e10).

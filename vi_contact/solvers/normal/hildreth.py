@@ -48,8 +48,9 @@ class Hildreth:
 
 
 class _Sweeps:
-    """Sweeps for one G: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s
-    or x = r.
+    """Hold the sweeps for one G.
+
+    They solve min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r.
     """
 
     def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
@@ -107,8 +108,9 @@ class _Sweeps:
         return image if self.method.primal else gap + image
 
     def _reaction(self, x: Array, lower: Array, gradient: Array) -> Array:
-        """Scaled r: x itself, or r = D s where s is at its bound (elsewhere r = 0 by
-        complementarity).
+        """Return the scaled r.
+
+        It is x itself, or r = D s where s is at its bound (elsewhere r = 0 by complementarity).
         """
         if not self.method.primal:
             return x
@@ -123,8 +125,9 @@ class _Sweeps:
         return 0.5 * float(at @ (self._H @ at)) + linear
 
     def _rounding(self, x: list[float], r: Array) -> float:
-        """Gaps that the form in use cannot tell from zero: w = q + G D s has passed through both G
-        and D.
+        """Return the gaps that the form in use cannot tell from zero.
+
+        w = q + G D s has passed through both G and D.
         """
         if not self.method.primal:
             return self._scaled.rounding(r)
@@ -135,8 +138,9 @@ class _Sweeps:
 def sweep(
     rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array
 ) -> float:
-    """Sweep once over ``rows`` (index, row of H with unit diagonal), in place; return the largest
-    |change|.
+    """Sweep once over ``rows`` (index, row of H with unit diagonal), in place.
+
+    Returned is the largest |change|.
 
     Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison.
     """

@@ -1,5 +1,6 @@
-"""Pose the linear complementarity problem of one contact step: its residual, and the scaling all
-its methods share.
+"""Pose the linear complementarity problem of one contact step.
+
+Its residual, and the scaling all its methods share, are here.
 
     w = q + G r
     unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free         (1)
@@ -37,8 +38,9 @@ Found = tuple[
 
 @dataclass(frozen=True)
 class LCPResult:
-    """Answer problem (1), within the tolerance of the method or the limit that rounding sets (else
-    StepFailure).
+    """Answer problem (1), within the tolerance of the method.
+
+    The limit that rounding sets serves too; else there is a StepFailure.
 
     ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral,
     where a grazing row (r = w = 0 but for rounding) may be either; ``residual``: max |min(r_i/d_i,
@@ -68,8 +70,9 @@ class ScaledLCP:
     bilateral: Mask
 
     def reaction(self, guess: Array | Mask | None, q: Array) -> Array:
-        """Return a start for iterative methods: the guess itself, one Jacobi step on a guessed set,
-        or zero.
+        """Return a start for iterative methods.
+
+        It is the guess itself, one Jacobi step on a guessed set, or zero.
         """
         if guess is None:
             return np.zeros(q.size)
@@ -145,8 +148,11 @@ class PreparedLCP:
 
 
 def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
-    """Check and scale a dense G. InputError when it is not finite or, unless ``unsymmetric`` allows
-    it, not symmetric (to 1e-8) of positive diagonal.
+    """Check and scale a dense G.
+
+    Raises:
+        InputError: G is not finite or, unless ``unsymmetric`` allows it, not symmetric (to 1e-8) of
+            positive diagonal.
     """
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
@@ -156,8 +162,10 @@ def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> Sca
 
 
 def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
-    """Return d G d, exactly symmetric where it is so to 1e-8, and its norm; InputError when it
-    should be and is not.
+    """Return d G d, exactly symmetric where it is so to 1e-8, and its norm.
+
+    Raises:
+        InputError: G should be symmetric and is not.
     """
     matrix = np.ascontiguousarray(d[:, None] * G * d)
     if max_abs(matrix - matrix.T) <= 1e-8:
@@ -193,8 +201,10 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
 
 
 def cholesky(G: Array) -> Array:
-    """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G is not
-    positive definite.
+    """Return the lower Cholesky factor (LAPACK dpotrf).
+
+    Raises:
+        InputError: G is not positive definite; it tells the row.
     """
     if not G.size:  # LAPACK takes no empty matrix
         return G

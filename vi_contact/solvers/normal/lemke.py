@@ -59,8 +59,9 @@ class Lemke:
 
 
 class _Pivots:
-    """The pivots of one G: its unilateral rows with bilateral ones eliminated, and what carries the
-    q of those.
+    """Hold the pivots of one G.
+
+    These are its unilateral rows with bilateral ones eliminated, and what carries the q of those.
     """
 
     def __init__(self, method: Lemke, scaled: ScaledLCP) -> None:
@@ -91,8 +92,9 @@ class _Pivots:
         return r, residual / unit, len(history), history
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
-        """r >= 0 with w = 0 on the set and bilateral rows, and its residual: infinite where that
-        has no one answer.
+        """Return r >= 0 with w = 0 on the set and bilateral rows, and its residual.
+
+        The residual is infinite where that has no one answer.
         """
         G, bilateral, r = self._scaled.matrix, self._scaled.bilateral, np.zeros(gap.size)
         closed = np.flatnonzero((active & (gap < np.inf)) | bilateral)
@@ -104,7 +106,7 @@ class _Pivots:
         return r, self._scaled.complementarity(r, gap + G @ r)
 
     def _closed(self, gap: Array, unit: float, history: list[float]) -> Mask:
-        """The set of a solution, by pivots; adds z after each to ``history``."""
+        """Return the set of a solution, by pivots; add z after each to ``history``."""
         bilateral, closed = self._scaled.bilateral, np.zeros(gap.size, dtype=bool)
         rows = np.flatnonzero(~bilateral & (gap < np.inf))
         m, q = len(rows), (gap[rows] - self._carry[rows] @ gap[bilateral]) / unit
@@ -137,8 +139,9 @@ class _Pivots:
 
 
 def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
-    """The row that is first at zero when a variable enters: z, or of tied rows the lexicographic
-    minimum.
+    """Return the row that is first at zero when a variable enters.
+
+    It is that of z, or of tied rows the lexicographic minimum.
     """
     m, column = len(tableau), tableau[:, entering]
     rows = np.flatnonzero(column > TINY * max_abs(column))

@@ -20,8 +20,9 @@ NONE = "is no P-matrix, a principal minor is not positive: contact may have no s
 
 @dataclass(frozen=True)
 class PMatrix:
-    """Hold whether a matrix is a P-matrix (``holds``; None where that is not known), and the reason
-    (``sentence``).
+    """Hold whether a matrix is a P-matrix, and the reason (``sentence``).
+
+    ``holds`` is None where that is not known.
     """
 
     holds: bool | None
@@ -72,8 +73,9 @@ def p_matrix(G: Array) -> PMatrix:
 
 @np.errstate(all="ignore")  # entries that overflow decide nothing
 def _complements(parts: Array, errors: Array) -> tuple[Array, Array]:
-    """Schur complements of the first entries of many matrices, and what their entries may be wrong
-    by.
+    """Return the Schur complements of the first entries of many matrices.
+
+    What their entries may be wrong by is returned too.
     """
     pivots, column, row = parts[:, :1, :1], parts[:, 1:, :1], parts[:, :1, 1:]
     within, below, beside = errors[:, :1, :1], errors[:, 1:, :1], errors[:, :1, 1:]

@@ -26,8 +26,9 @@ from ..petsc import PETSc
 
 
 class BoundedSystem:
-    """Hold A, the contact surface and its springs as one system of ``size`` unknowns here,
-    ``bounded`` of them bounded.
+    """Hold A, the contact surface and its springs as one system.
+
+    It has ``size`` unknowns here, ``bounded`` of them bounded.
 
     Attributes: soft: (m,) True where the support is a spring. spring, feet: stiffness k of these
         springs, in the unit of A, and the positions in x of their body ends. bounded: (m,) position
@@ -70,8 +71,9 @@ class BoundedSystem:
         return np.concatenate([b, np.zeros(self.size - self.rows)])
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
-        """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free,
-        bilateral or not.
+        """Return (lower, upper) of the owned unknowns.
+
+        An infinite bound leaves its point free, bilateral or not.
         """
         if self.surface.some(np.isnan(step.bound)):
             raise InputError(
@@ -110,8 +112,9 @@ class BoundedSystem:
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assembled(self) -> Any:
-        """Return A with its springs as an AIJ matrix: the given one when it is a PETSc matrix
-        without springs.
+        """Return A with its springs as an AIJ matrix.
+
+        It is the given one when that is a PETSc matrix without springs.
         """
         mat = assembled(self.A)
         if not self.surface.some(self.soft):
@@ -146,8 +149,9 @@ def aij(rows: sp.csr_matrix, comm: Any) -> Any:
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
-    """Return this rank's first global number, global column numbers and total, where ranks' parts
-    grow at their end.
+    """Return this rank's first global number, global column numbers and total.
+
+    Ranks' parts grow at their end.
     """
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size

@@ -39,8 +39,9 @@ GENERAL_ADVICE = (
 
 
 def name_of(reasons: type, reason: int) -> str:
-    """Return the longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_...,
-    DIVERGED_...
+    """Return the longest name of a reason in one of petsc4py's classes of reasons.
+
+    Such names are CONVERGED_..., DIVERGED_...
     """
     names = [
         name

@@ -1,5 +1,6 @@
-"""Write a step with Tresca's thresholds s given as a mixed complementarity problem in simple
-bounds.
+"""Write a step as a mixed complementarity problem in simple bounds.
+
+Tresca's thresholds s are given.
 
 The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that
 has one free tangent (2D) carries
@@ -40,8 +41,9 @@ from .scaled_step import ScaledStep, fraction
 
 
 class FrictionSystem:
-    """Number the unknowns of a rank: z of ``body``, then lambda of the free tangents, point by
-    point, then gamma.
+    """Number the unknowns of a rank.
+
+    First comes z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
     Attributes: point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A
         of each lambda. disk: (m,) True for points with two free tangents; ``any_disk``: whether
@@ -88,8 +90,9 @@ class FrictionUnknowns:
 
 
 class ScaledFrictionStep(ScaledStep):
-    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds, for the step and
-    limits set last.
+    """Evaluate F(y), with bounds, for the step and limits set last.
+
+    y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref).
     """
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
@@ -168,8 +171,9 @@ class ScaledFrictionStep(ScaledStep):
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the errors as without friction; the second counts what is wrong in slips and disks
-        too.
+        """Return the errors as without friction.
+
+        The second counts what is wrong in slips and disks too.
         """
         friction, s = self.friction, self.disk_limits
         _, reaction, gamma = friction.split(y)
@@ -208,8 +212,9 @@ class ScaledFrictionStep(ScaledStep):
         return np.where(sliding[friction.point], moved, 0.0)
 
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
-        """Return the state with reactions in new disks (m,): sliding points on their edge, along
-        their slip (L,).
+        """Return the state with reactions in new disks (m,).
+
+        Sliding points are on their edge, along their slip (L,).
         """
         friction, s = self.friction, limit
         way, inside = friction.by_point(slip), project(friction.by_point(state.reaction), s)

@@ -1,5 +1,6 @@
-"""Solve the step on all unknowns, by PETSc's solvers for variational inequalities and bounds: the
-volume route.
+"""Solve the step on all unknowns, by PETSc's solvers for inequalities and bounds.
+
+This is the volume route; the inequalities are variational.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
@@ -83,8 +84,9 @@ class Volume:
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction that the method cannot carry, without a tangent, or of
-        wrong length.
+        """Raise InputError for friction that the method cannot carry.
+
+        So it does for friction without a tangent, or of wrong length.
         """
         if problem.frictional and not self.method.carries_friction:
             raise InputError(
@@ -138,8 +140,9 @@ class PreparedVolume:
         )
 
     def _friction_method(self) -> VolumeFriction:
-        """The problem with friction, made at the first step that has some, in the place of the
-        other one.
+        """Return the problem with friction, in the place of the other one.
+
+        It is made at the first step that has some.
         """
         if self._friction is None:
             self.close()
@@ -187,21 +190,23 @@ class PreparedVolume:
         return found
 
     def excuse_options(self) -> None:
-        """Take options that nothing reads: they are for another method, in whose place this one is
-        tried.
+        """Take options that nothing reads.
+
+        They are for another method, in whose place this one is tried.
         """
         self._all_read = True
 
     def _refuse_unread(self, iterations: int) -> None:
-        """Raise InputError for options that nothing has read, once the parts of the solver have
-        been at work.
+        """Raise InputError for options that nothing has read.
+
+        It is asked once the parts of the solver have been at work.
         """
         if iterations and not self._all_read:
             self._all_read = True
             self._layers.refuse_unread(self._name, self._comm)
 
     def _solve(self, step: StepProblem) -> StepResult:
-        """The step without friction."""
+        """Solve the step without friction."""
         system, scaled = self._system, self._scaled
         if self._driver is None or self._friction is not None:
             self.close()

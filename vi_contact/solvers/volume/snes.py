@@ -71,8 +71,9 @@ class SnesDriver:
         return y, F, snes.getConvergedReason(), snes.getIterationNumber()
 
     def _test(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
-        """PETSc's reason to stop: our verdict, or the user's tolerance, which counts relative to
-        |b|; 0 to go on.
+        """Return PETSc's reason to stop; 0 to go on.
+
+        It is our verdict, or the user's tolerance, which counts relative to |b|.
         """
         reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
         if reason:
@@ -109,8 +110,9 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Lent:
-    """Pass an object to PETSc as context without giving it away, as ``weakly`` does with a
-    method.
+    """Pass an object to PETSc as context without giving it away.
+
+    ``weakly`` does so with a method.
     """
 
     def __init__(self, lent: Any) -> None:
@@ -121,16 +123,18 @@ class Lent:
 
 
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
-    """Write the bounds of a step into PETSc's vectors; only PETSc's own infinities mean no
-    bound.
+    """Write the bounds of a step into PETSc's vectors.
+
+    Only PETSc's own infinities mean no bound.
     """
     lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)
     upper.array[:] = np.minimum(scaled.upper, PETSc.INFINITY)
 
 
 class AssembledJacobian:
-    """Assemble H = A x_ref / r_ref as an AIJ matrix, positive definite, and symmetric where A
-    is.
+    """Assemble H = A x_ref / r_ref as an AIJ matrix.
+
+    It is positive definite, and symmetric where A is.
     """
 
     def __init__(self, system: BoundedSystem) -> None:
@@ -161,8 +165,9 @@ class AssembledJacobian:
 
 
 class SemismoothJacobian(AssembledJacobian):
-    """Assemble H anew for every iteration: VINEWTONSSLS overwrites it by D_a + D_b H, which is not
-    symmetric.
+    """Assemble H anew for every iteration.
+
+    VINEWTONSSLS overwrites it by D_a + D_b H, which is not symmetric.
     """
 
     def rescale(self, ratio: float) -> None:
@@ -177,8 +182,9 @@ class SemismoothJacobian(AssembledJacobian):
 
 @dataclass(frozen=True)
 class ReducedNewton:
-    """Solve by an active set method of PETSc, SNES VINEWTONRSLS, with a factor by MUMPS in every
-    iteration.
+    """Solve by an active set method of PETSc, SNES VINEWTONRSLS.
+
+    It makes a factor by MUMPS in every iteration.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg
     and fieldsplit are refused, they do not survive the reduction. With friction, and where A is not
@@ -213,8 +219,9 @@ class ReducedNewton:
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS, with LU by MUMPS: a
-    diagnostic.
+    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS.
+
+    It takes LU by MUMPS, and is a diagnostic.
 
     Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer than the body its line
     search may fail.
