@@ -1,5 +1,6 @@
-"""Find u between bounds: F(u; v - u) >= 0 for all v with lower <= v <= upper, at the points of a
-Function's space.
+"""Find u between bounds with F(u; v - u) >= 0 for all v with lower <= v <= upper.
+
+The bounds hold at the points of a Function's space.
 
 Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F
 (``solve_linear``) and goes towards the answer as far as makes the natural residual u - mid(lower, u
@@ -87,8 +88,9 @@ def solve(
     tolerance: float = 1e-9,
     iterations: int | None = None,
 ) -> Result:
-    """Solve F(u; v - u) >= 0 for all v between the bounds, or find a local minimum of an energy
-    between them; u holds the first guess, and the answer.
+    """Solve F(u; v - u) >= 0 for all v between bounds, or minimise an energy between them.
+
+    The minimum is a local one. u holds the first guess, and the answer.
 
     ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v).
     ``energy``: in its place a functional Pi(u), whose derivative is F; F need not be monotone then.
@@ -180,8 +182,9 @@ def solve(
 
 
 def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
-    """Raise InputError unless there is a form or an energy, and not both, nor what an energy has no
-    use for.
+    """Raise InputError unless there is a form or an energy, and not both.
+
+    What an energy has no use for is refused too.
     """
     if form is None and energy is None:
         raise refused(
@@ -228,8 +231,9 @@ def curves_down(found: Found, layers: OptionLayers) -> bool:
 
 
 def failed(problem: Problem, found: Found, sentence: str) -> StepFailure:
-    """Write the best values into u, or the first guess where conditions were never met, and return
-    the error. Collective.
+    """Write the best values into u and return the error. Collective.
+
+    It is the first guess where conditions were never met.
     """
     if found.best.left:
         problem.put_back()

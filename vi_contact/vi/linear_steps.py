@@ -1,5 +1,6 @@
-"""Solve a linear problem between bounds, lower <= x <= upper with A x - b, by the methods of the
-volume route.
+"""Solve a linear problem A x - b between bounds, lower <= x <= upper.
+
+The methods are those of the volume route.
 """
 
 from collections.abc import Sequence
@@ -53,8 +54,12 @@ class LinearSteps:
     def solve(
         self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array
     ) -> tuple[Array, int, str]:
-        """Return (x, iterations, name of the method) of the first method that finds x; StepFailure
-        with what all said. Every unknown is the one of a contact condition. Collective.
+        """Return (x, iterations, name of the method) of the first method that finds x.
+
+        Every unknown is the one of a contact condition. Collective.
+
+        Raises:
+            StepFailure: no method finds x; it tells what all said.
         """
         numbers, comm = np.arange(A.rows), self.comm
         symmetric = is_symmetric(A, comm)

@@ -35,9 +35,10 @@ NO_DESCENT = (
 def minimise(
     problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
 ) -> Found:
-    """Return where the descent ends: at a point whose certificate is below the tolerance and where
-    no direction of negative curvature is found, or with a failure. ``layers``: options of the
-    preconditioner. Collective.
+    """Return where the descent ends: at a point that is found, or with a failure.
+
+    Such a point has a certificate below the tolerance, and no direction of negative curvature is
+    found there. ``layers``: options of the preconditioner. Collective.
     """
     found = Found(begin(problem, lower, upper), method="trust region")
     while found.best.left and not found.failure:
@@ -48,8 +49,9 @@ def minimise(
 
 
 def carry_conditions(found: Found, layers: OptionLayers) -> None:
-    """Take one step that carries Dirichlet conditions and bounds into the body, as far as the
-    energy is a number.
+    """Take one step that carries Dirichlet conditions and bounds into the body.
+
+    It goes as far as the energy is a number.
     """
     point = found.best
     problem = point.problem

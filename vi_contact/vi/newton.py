@@ -46,9 +46,10 @@ UNHELD = (
 
 @dataclass
 class Found:
-    """Hold where a method stopped: the best u, whether all conditions were met from the start, how
-    many steps it took, with which inner method, what failed, and whether a method for
-    positive Jacobians did.
+    """Hold where a method stopped.
+
+    This is the best u, whether all conditions were met from the start, how many steps it took, with
+    which inner method, what failed, and whether a method for positive Jacobians did.
     """
 
     best: Judged
@@ -158,10 +159,11 @@ def newton(
 
 
 def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
-    """Take one step from a point, in u: towards the answer of the linear problem between the bounds
-    or, where this one is not found or leads nowhere, a reduced step. Return the share of the change
-    of held unknowns that is then left; None, and the reason in ``found``, where neither helps.
-    Collective.
+    """Take one step from a point, in u, and return what is then left.
+
+    It goes towards the answer of the linear problem between the bounds or, where this one is not
+    found or leads nowhere, is a reduced step. Returned is the share of the change of held unknowns
+    that is then left; it is None, and the reason in ``found``, where neither helps. Collective.
     """
     # Where all methods have failed before, the tangents are not positive: a reduced step costs one
     # factor.
@@ -207,8 +209,10 @@ def reduced(found: Found, point: Judged, steps: LinearSteps) -> float | None:
 
 
 def advance(point: Judged, target: Array) -> float | None:
-    """Go from a point towards the target as far as is an improvement, in u; return the share of the
-    change of held unknowns that is then left, None where no length helps. Collective.
+    """Go from a point towards the target as far as is an improvement, in u.
+
+    Returned is the share of the change of held unknowns that is then left, None where no length
+    helps. Collective.
     """
     problem = point.problem
     if problem.constant:

@@ -16,8 +16,9 @@ FAR = 1e4
 
 
 def size_of_field(values: Array, lower: Array, upper: Array, comm: Comm) -> float:
-    """Return the largest finite number among the values of a field and its bounds, the same on all
-    ranks.
+    """Return the largest finite number among the values of a field and its bounds.
+
+    It is the same on all ranks.
 
     Users write 1e7 or 1e20 where there is no bound. Such walls say nothing of the size of the
     field: the largest numbers are left out for as long as they lie on the far side of zero (lower <
