@@ -98,7 +98,7 @@ class March:
                 yield report.new, report
 
     def _restarted(self, dt: float) -> State:
-        """The state, with a past for this dt."""
+        """Return the state, with a past for this dt."""
         if dt == self.dt:
             return self.state
         method = self.method
@@ -106,7 +106,9 @@ class March:
             return method.scheme.start(method.problem, self.state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
-        """A step of dt; None when it closes a point and is to be halved: nothing has happened then.
+        """Return a step of dt; None when it closes a point and is to be halved.
+
+        Nothing has happened then.
 
         Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked
         once, at its end.
@@ -143,8 +145,9 @@ class March:
 def after_impact(
     problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float
 ) -> State:
-    """Return the state with the impact law applied; points on massless supports (springs) do not
-    collide.
+    """Return the state with the impact law applied.
+
+    Points on massless supports (springs) do not collide.
     """
     law, surface = problem.impact, problem.surface
     if law is None:

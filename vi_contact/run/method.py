@@ -1,5 +1,6 @@
-"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it
-starts from.
+"""Choose and check how a problem is marched.
+
+This is scheme, solvers, tolerance, time steps, and the state it starts from.
 """
 
 from collections.abc import Sequence
@@ -28,8 +29,9 @@ SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state 
 
 @dataclass(frozen=True)
 class Method:
-    """Hold how a problem is marched: scheme, solver and its escalation, time steps [s] as asked
-    for, tolerance.
+    """Hold how a problem is marched.
+
+    This is scheme, solver and its escalation, time steps [s] as asked for, and tolerance.
     """
 
     problem: ContactProblem
@@ -39,8 +41,9 @@ class Method:
     tolerance: float
 
     def bind(self) -> None:
-        """Hand scheme and time steps to the motions that are marched beside the run, unless they
-        have them.
+        """Hand scheme and time steps to the motions that are marched beside the run.
+
+        Those that have them already are left out.
         """
         for companion in (*self.problem.system.companions, *self.problem.surface.companions):
             companion.bind(self.scheme, self.dt)
@@ -58,8 +61,9 @@ def checked_method(
     state: State | None,
     tolerance: float,
 ) -> Method:
-    """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and
-    the escalation.
+    """Return the method with its defaults.
+
+    ``solvers``: the first one, None for Automatic(), and the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the
     obstacle. Collective.
@@ -139,8 +143,9 @@ def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
 
 
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
-    """Raise InputError unless these are a solver or None, a list of solvers, and a tolerance
-    between 0 and 1.
+    """Raise InputError unless these are solvers and a tolerance.
+
+    They are a solver or None, a list of solvers, and a tolerance between 0 and 1.
     """
     if solver is not None:
         check_solver(owner, solver)
@@ -156,8 +161,9 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
 def check_state(
     owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a state of another problem, or one that penetrates the
-    obstacle. Collective.
+    """Raise InputError, on all ranks, for a state of another problem. Collective.
+
+    So it does for one that penetrates the obstacle.
 
     A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its
     own runs (k > 0).

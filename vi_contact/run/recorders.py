@@ -36,8 +36,9 @@ def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
 
 
 def refuse_overflow(row: Row) -> None:
-    """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy
-    ledger.
+    """Raise StepFailure for a number beyond those of the machine.
+
+    It is infinite, or NaN in the energy ledger.
     """
     for name, value in row.items():
         if not isinstance(value, float) or isfinite(value):
@@ -50,14 +51,15 @@ def refuse_overflow(row: Row) -> None:
 
 
 class Steps:
-    """Record the columns of every run: time, step, iterations, certificate, escalation and ground
-    acceleration.
+    """Record the columns of every run.
+
+    They are time, step, iterations, certificate, escalation and ground acceleration.
     """
 
     _axes = AXES  # those of the problem, once it is started
 
     def columns(self) -> Columns:
-        """Name t, k, iterations, certificate, escalated, a_g_x, …"""
+        """Name t, k, iterations, certificate, escalated, a_g_x, and so on."""
         return _named(_COLUMNS["steps"], self._axes)
 
     def _row(
@@ -108,8 +110,9 @@ class Energy:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the initial energies; works and losses are zero, or those of the run that is
-        continued.
+        """Return the initial energies.
+
+        Works and losses are zero, or those of the run that is continued.
         """
         self._problem = problem
         self._now, self._stored = (
@@ -127,7 +130,7 @@ class Energy:
         }
 
     def _of_strains(self, state: State) -> float:
-        """What initial strains add to ½ uᵀKu [J]."""
+        """Return what initial strains add to ½ uᵀKu [J]."""
         initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
         return (
             0.0
@@ -169,8 +172,9 @@ class Energy:
 
 
 def told_pressures(surface: ContactSurface) -> Mask | None:
-    """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all
-    of them.
+    """Return the conditions (m,) of this rank whose pressure counts among the largest.
+
+    It is None for all of them.
 
     Where all on all ranks are ``uncovered`` all count. Collective.
     """
@@ -273,7 +277,7 @@ class Contact:
         return row
 
     def _whole(self, *each: Any) -> Sequence[Any]:
-        """The arrays of all conditions on rank 0, by one message of each rank."""
+        """Return the arrays of all conditions on rank 0, by one message of each rank."""
         if self._problem.surface.comm.size == 1:
             return each
         found = self._problem.surface.on_first(np.column_stack(each))
@@ -281,7 +285,7 @@ class Contact:
         return [part.copy() for part in (found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing)]
 
     def _largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
-        """The largest depth, pressure and slip of all conditions; nan without any."""
+        """Return the largest depth, pressure and slip of all conditions; nan without any."""
         if not self._problem.surface.total:
             return [np.nan] * (2 + len(slip))
         some = len(gap) > 0
@@ -347,7 +351,7 @@ class Probe:
             )
 
     def columns(self) -> Columns:
-        """Name u_x_<label>, …"""
+        """Name u_x_<label> and the like."""
         quantities = {"u": ("m", "displacement")}
         if self.velocity:
             quantities["v"] = ("m/s", "velocity after the impact law")

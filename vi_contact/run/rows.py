@@ -1,5 +1,6 @@
-"""Hold what several runs have in one step as rows, and make that of one run when somebody asks for
-it.
+"""Hold what several runs have in one step as rows.
+
+That of one run is made when somebody asks for it.
 
 A step of a small system costs as much as the objects that tell of it: those that nobody reads are
 not made. What was made stays as it is, whatever the runs do later: every step has arrays of its
@@ -45,8 +46,9 @@ class RowReport(Report):
 
 
 def joined(states: Sequence[State]) -> State:
-    """Return the state of all runs, read-only; of a memory's arrays only the vectors differ from
-    run to run.
+    """Return the state of all runs, read-only.
+
+    Of a memory's arrays only the vectors differ from run to run.
     """
     first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
     u, v, r_n, active = (
@@ -66,8 +68,9 @@ def joined(states: Sequence[State]) -> State:
 
 
 def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
-    """Return the states of runs whose rows are those of ``problem``, and let theirs know the
-    products of the rows.
+    """Return the states of runs whose rows are those of ``problem``.
+
+    Their problems get to know the products of the rows.
     """
     viscous = () if problem.equations.C is None else ("C",)
 
@@ -113,8 +116,9 @@ class Loads(Load):
 
 
 def loads_of(problems: Sequence[ContactProblem]) -> Loads:
-    """Return the loads of problems on one system: they differ in what shakes them, by few vectors
-    times histories.
+    """Return the loads of problems on one system.
+
+    They differ in what shakes them, by few vectors times histories.
     """
     body = problems[0].unshaken.load
     shaken = [

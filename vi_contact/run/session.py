@@ -1,5 +1,6 @@
-"""Run the loop over certified steps, with everything that has to happen when it ends, well or
-badly.
+"""Run the loop over certified steps.
+
+Everything that has to happen when it ends, well or badly, is done here.
 """
 
 import logging
@@ -55,8 +56,9 @@ class Comparison(Protocol):
 
 @dataclass
 class Session:
-    """Hold a run under way: what of the arguments of ``simulate`` holds for all of it, and where it
-    is.
+    """Hold a run under way.
+
+    This is what of the arguments of ``simulate`` holds for all of it, and where it is.
 
     Attributes: recorders: the user's, after those of every run. wall_time: when the process has to
         have ended. table: the rows so far. step_plan: the base steps. place: the end of the last
@@ -201,8 +203,9 @@ class Session:
                 begin = time.perf_counter()
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
-        """Interrupted on all ranks, with a checkpoint, by a signal to one, or by the end of the
-        time. Collective.
+        """Raise Interrupted on all ranks, with a checkpoint, when asked to stop. Collective.
+
+        A signal to one rank asks for it, or the end of the time.
         """
         number, late = signals.asked(self._comm, self.wall_time.over())
         if not (number or late):
@@ -327,7 +330,7 @@ class Session:
             )
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
-        """The content of summary.json."""
+        """Return the content of summary.json."""
         return {
             "status": status,
             "reason": reason,
@@ -347,8 +350,9 @@ class Session:
         }
 
     def _seconds_per_linear_step(self) -> float:
-        """Median time of right-hand side, one back-substitution and update with the same A, from
-        the last state [s].
+        """Return the median time [s] of a linear step from the last state.
+
+        It takes a right-hand side, one back-substitution and an update with the same A.
         """
         if (
             self.last is None or not self.last.step.A.factorised
@@ -374,8 +378,9 @@ class Session:
 
 
 def _locked(value: T) -> T:
-    """The value with read-only views of its arrays: some of them, such as the gap at rest, belong
-    to the problem.
+    """Return the value with read-only views of its arrays.
+
+    Some of them, such as the gap at rest, belong to the problem.
     """
     own: Any = value
     views = {

@@ -1,5 +1,6 @@
-"""Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot
-spoil.
+"""Simulate: march, listen with recorders, and keep everything in a folder.
+
+A crash cannot spoil the folder.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -235,8 +236,9 @@ def _check_outputs(
     fields: Any,
     cross_check: Any,
 ) -> None:
-    """InputError for what is no recorder, folder, number of steps, writer of fields or
-    cross-check.
+    """Raise InputError for outputs that are none.
+
+    This is what is no recorder, folder, number of steps, writer of fields or cross-check.
     """
     owner = "simulate"
     for one in (
@@ -271,7 +273,7 @@ def _check_outputs(
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
-    """The folder of the run to continue."""
+    """Return the folder of the run to continue."""
     if isinstance(restart, bool):
         if restart and folder is None:
             raise InputError("restart=True needs the folder of the run: give out")
@@ -312,8 +314,10 @@ def _started(
 
 
 def _kinds(record: Any) -> Any:
-    """What is compared over ranks of recorders: kinds, and settings of those of the package, as
-    each rank may hold its part of what is recorded.
+    """Return what is compared over ranks of recorders.
+
+    This is kinds, and settings of those of the package, as each rank may hold its part of what is
+    recorded.
     """
     if not isinstance(record, list | tuple):
         return record

@@ -51,8 +51,9 @@ class Solution:
         frame: int | None = None,
         continuous: bool = False,
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function,
-        ``fem.as_function`` of the end state.
+        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function.
+
+        It is ``fem.as_function`` of the end state.
 
         With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``.
         Collective. InputError for a system without a mesh, and without such a frame.
@@ -85,8 +86,9 @@ class Solution:
     __repr__ = summary
 
     def plot(self) -> Any:
-        """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger,
-        certificates.
+        """Return a matplotlib Figure of what was recorded.
+
+        It shows probes, contact force, energy ledger and certificates.
         """
         return import_module("vi_contact.plots").plot_overview(
             self
@@ -110,8 +112,9 @@ class Solution:
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
-    """Return a sentence when the run had more energy than was put in, by more than CREATED of the
-    largest energy.
+    """Return a sentence when the run had more energy than was put in.
+
+    It is so when the excess is more than CREATED of the largest energy.
     """
     if facts.get("energy_created", 0.0) <= CREATED:
         return None

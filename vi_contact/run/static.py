@@ -1,5 +1,6 @@
-"""Find equilibria with contact: the static (gravity) stage where a run starts, and load histories
-without inertia.
+"""Find equilibria with contact.
+
+These are the static (gravity) stage where a run starts, and load histories without inertia.
 
 In a history one stage follows another, as friction makes the equilibrium depend on the way to it.
 Each stage solves the static problem with slips counted from the stage before (slip rate times time
@@ -46,8 +47,9 @@ def static_equilibrium(
     t: float = 0.0,
     tolerance: float = TOLERANCE,
 ) -> State:
-    """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without
-    excitation.
+    """Return the gravity stage, without excitation.
+
+    It is K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active.
 
     The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic
     stage starts. A body that no prescribed displacement holds is brought to rest on its contacts.
@@ -71,8 +73,9 @@ def static_equilibrium(
 
 
 def _warn_if_open(problem: ContactProblem, state: State) -> None:
-    """Warn, on rank 0, where much of a contact that touches at the start, and is pressed, is open
-    at rest. Collective.
+    """Warn, on rank 0, where much of a contact is open at rest. Collective.
+
+    It is a contact that touches at the start, and is pressed.
 
     The place is that of the open point with the lowest number.
     """
@@ -121,8 +124,9 @@ class Equilibria:
             self._solve = lambda step: certified.solve(step)[0]
 
     def after(self, old: State, t: float) -> State:
-        """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was;
-        its number too.
+        """Return the equilibrium at time t of a body that rubs and slides, and its number.
+
+        It slides from where ``old`` was.
         """
         problem = self._problem
         with together(
@@ -204,7 +208,7 @@ def quasi_static(
 
 
 def _checked(times: Iterable[float], start: float) -> list[float]:
-    """The times as a list."""
+    """Return the times as a list."""
     if not isinstance(times, Iterable) or isinstance(times, str | bytes):
         raise InputError(f"load steps at {shown(times)}: give times in seconds")
     order = [real(t) for t in times]

@@ -1,5 +1,6 @@
-"""Note signals that ask a run to end when they come; act on them between two steps, on all ranks
-together.
+"""Note signals that ask a run to end when they come.
+
+They are acted on between two steps, on all ranks together.
 
 Ctrl-C (SIGINT), a scheduler's or container's end of time (SIGTERM), a closed terminal (SIGHUP).
 PETSc has handlers of its own for some of them, which print pages and stop; those of the run come
@@ -49,8 +50,9 @@ class StopSignals:
             signal.signal(number, signal.SIG_DFL)
 
     def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
-        """Return the number of a signal that a rank has got, or 0, and whether time is over for
-        one. Collective.
+        """Return the number of a signal that a rank has got, or 0. Collective.
+
+        Whether time is over for a rank is returned too.
         """
         over = over or self._late
         number, late = (

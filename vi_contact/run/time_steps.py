@@ -1,5 +1,6 @@
-"""Plan how long the steps of a run are: a constant dt [s], a ``Schedule``, or steps halved where
-contact closes.
+"""Plan how long the steps of a run are.
+
+This is a constant dt [s], a ``Schedule``, or steps halved where contact closes.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it
 from them (``start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*:
@@ -26,8 +27,9 @@ LONGEST = (
 
 @dataclass(frozen=True)
 class Schedule:
-    """Plan pieces (dt [s], until [s]) with steps of dt until that time; the last piece is usually
-    (dt, math.inf).
+    """Plan pieces (dt [s], until [s]) with steps of dt until that time.
+
+    The last piece is usually (dt, math.inf).
 
     A piece ends with the first step that reaches its time, even if the piece is not a whole number
     of steps long. InputError if there are no pieces, if a dt is not positive, or if the times do
@@ -59,8 +61,9 @@ class Schedule:
 
 @dataclass(frozen=True)
 class HalvedAtImpact:
-    """Plan steps of ``dt`` [s], or of a Schedule; a step that closes an open contact point is
-    computed again in halves.
+    """Plan steps of ``dt`` [s], or of a Schedule, halved at impacts.
+
+    A step that closes an open contact point is computed again in halves.
 
     The halves may be halved again, down to dt/2**halvings, which resolves the time of an impact.
     Every accepted part is a certified step like any other. At most one matrix is factorised for
@@ -90,8 +93,10 @@ def described(plan: TimeSteps) -> float | str:
 
 
 def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
-    """Return the pieces (dt, until) of a plan, endless for a constant dt [s]; InputError for no
-    dt.
+    """Return the pieces (dt, until) of a plan, endless for a constant dt [s].
+
+    Raises:
+        InputError: there is no dt.
     """
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
     return dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
@@ -99,8 +104,9 @@ def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
 
 @dataclass(frozen=True)
 class StepPlan:
-    """Hold the base steps of one run: parts (dt, number of steps), and how often each may be
-    halved.
+    """Hold the base steps of one run.
+
+    These are parts (dt, number of steps), and how often each may be halved.
     """
 
     parts: tuple[tuple[float, int], ...]
@@ -126,8 +132,9 @@ class StepPlan:
 
 
 def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> StepPlan:
-    """Return the base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make
-    no sense.
+    """Return the base steps from t0 to t_end, or so many.
+
+    There is an InputError when plan, steps or t_end make no sense.
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a
     restart, which builds it from the same t0, has the same steps. A step shorter than a millionth
@@ -206,7 +213,11 @@ def _positive(dt: Any) -> float:
 
 
 def _read(check: Callable[..., Any], value: Any, remedy: str, **limits: Any) -> Any:
-    """What the check makes of the value; InputError of this sentence when it refuses."""
+    """Return what the check makes of the value.
+
+    Raises:
+        InputError: says this sentence when the check refuses.
+    """
     try:
         return check("", "", value, **limits)
     except InputError:

@@ -1,5 +1,6 @@
-"""End a run before its time is over: read a wall time as Slurm does, and say when what is left of
-it gets short.
+"""End a run before its time is over.
+
+A wall time is read as Slurm does, and it is said when what is left of it gets short.
 """
 
 import math
@@ -42,8 +43,9 @@ def seconds_of(wall_time: object) -> float:
 
 
 def age() -> float:
-    """Return the seconds since this process began; where the system does not tell, since this
-    module was imported.
+    """Return the seconds since this process began.
+
+    Where the system does not tell, it is since this module was imported.
     """
     return time.monotonic() - _born()
 
@@ -59,8 +61,9 @@ def _born() -> float:
 
 
 class WallTime:
-    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time; None:
-    there is no end.
+    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time.
+
+    None: there is no end.
     """
 
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:

@@ -1,5 +1,6 @@
-"""Write and read checkpoints: the state of a run in numbers that do not depend on the ranks that go
-on with it.
+"""Write and read checkpoints.
+
+They hold the state of a run in numbers that do not depend on the ranks that go on with it.
 
 ``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the
 order of ``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps
@@ -160,8 +161,9 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
 def read_checkpoint(
     folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
 ) -> tuple[RestartPoint, str]:
-    """Return (where a run was left, with the state on the ranks of this one; checksum of its
-    histories). Collective.
+    """Return (where a run was left, checksum of its histories). Collective.
+
+    The state is that on the ranks of this run.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem,
     dt (or plan of them) or scheme; unless ``changed`` allows the latter: another dt counts steps
@@ -215,7 +217,9 @@ def _compare(
     about: Mapping[str, Any],
     changed: bool,
 ) -> list[str]:
-    """The names of what is another problem's; InputError unless that was allowed, or can be.
+    """Return the names of what is another problem's.
+
+    InputError is raised unless that was allowed, or can be.
 
     Collective.
     """
@@ -242,7 +246,7 @@ def _damaged(file: Path, why: Any) -> InputError:
 
 
 def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
-    """Description and whole arrays of a checkpoint that fits the problem in its sizes."""
+    """Return description and whole arrays of a checkpoint that fits the problem in its sizes."""
     if not is_own(file):
         raise InputError(
             f"there is no checkpoint '{file}' to restart from: give the folder of a run"
@@ -286,8 +290,9 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
 
 
 def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
-    """ValueError for an array that announces more numbers than the archive holds of it, before
-    memory is taken.
+    """Raise ValueError for an array that announces more numbers than the archive holds of it.
+
+    This is done before memory is taken.
     """
     with archive.open(one) as file:
         version = npy.read_magic(file)
@@ -300,8 +305,9 @@ def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
 
 
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
-    """InputError or KeyError for missing, misshapen or senseless values; of another problem nothing
-    need fit.
+    """Raise InputError or KeyError for missing, misshapen or senseless values.
+
+    Of another problem nothing need fit.
     """
     n, m, d = (
         problem.system.space.unknowns,

@@ -1,5 +1,6 @@
-"""Keep the rows of a run in files from the step they were computed in; the memory need not hold
-them.
+"""Keep the rows of a run in files from the step they were computed in.
+
+The memory need not hold them.
 
 ``history.csv``      one line per step with all numbers, written at least once a second and before
                      every checkpoint: a killed run loses no more.
@@ -117,8 +118,9 @@ class HistoryFiles:
         self._rows, self._last = self._rows + len(rows), int(rows[-1]["k"])
 
     def checksum(self, k: int) -> str:
-        """Return the checksum of the rows up to step k; later ones are of a base step that is not
-        at its end.
+        """Return the checksum of the rows up to step k.
+
+        Later ones are of a base step that is not at its end.
         """
         if k == self._last:
             return self._hash.hexdigest()
@@ -128,8 +130,10 @@ class HistoryFiles:
         return stored.hash.hexdigest()
 
     def sync(self) -> bool:
-        """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown
-        enough; say whether a checkpoint can rely on them even when the power fails.
+        """Push rows onto the medium unless that was done a moment ago.
+
+        history.h5 is pushed when it has grown enough. The answer says whether a checkpoint can rely
+        on them even when the power fails.
         """
         now = time.monotonic()
         if now - self._pushed < PUSH:
@@ -143,8 +147,9 @@ class HistoryFiles:
         return True
 
     def save(self) -> None:
-        """Write history.h5 with all rows, from the memory if they are there; the journal starts
-        anew.
+        """Write history.h5 with all rows, from the memory if they are there.
+
+        The journal starts anew.
         """
         if self._rows == self._table.count and (known := self._table.remembered()) is not None:
             self._replace(
@@ -186,8 +191,9 @@ class HistoryFiles:
             file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
 
     def close(self) -> None:
-        """Write all rows into history.h5 and leave no journal; what cannot be written stays in the
-        other files.
+        """Write all rows into history.h5 and leave no journal.
+
+        What cannot be written stays in the other files.
         """
         try:
             push(self._folder / HISTORY_CSV)
@@ -200,8 +206,9 @@ class HistoryFiles:
 
 
 def _append(*pairs: tuple[Any, bytes]) -> None:
-    """Write these bytes to the files that there are; what one has no room for is cut off from all
-    of them.
+    """Write these bytes to the files that there are.
+
+    What one has no room for is cut off from all of them.
     """
     begun: list[tuple[Any, int]] = []
     try:

@@ -1,5 +1,6 @@
-"""Read what a run left in its folder: histories, units, facts and the geometry of the contact
-points.
+"""Read what a run left in its folder.
+
+This is histories, units, facts and the geometry of the contact points.
 """
 
 import json
@@ -96,8 +97,10 @@ def read_run(folder: str | Path) -> RunFolder:
 
 
 def _of(path: Path, read: Callable[[Path], T]) -> T:
-    """What is read from a file of a run; InputError that names the file when it is missing or
-    damaged.
+    """Return what is read from a file of a run.
+
+    Raises:
+        InputError: names the file when it is missing or damaged.
     """
     try:
         return read(path)
@@ -119,13 +122,15 @@ def _of(path: Path, read: Callable[[Path], T]) -> T:
 
 
 def _short(error: Exception) -> str:
-    """The reason on one line; that of a damaged table may be as long as the table."""
+    """Return the reason on one line; that of a damaged table may be as long as the table."""
     return shorten(" ".join(part[:SHOWN] for part in str(error).split()), 200, placeholder=" …")
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be
-    printed.
+    """Return the JSON object of a file.
+
+    Raises:
+        ValueError: anything else, NaN, and texts that cannot be printed.
     """
     with open_to_read(path) as file:
         data = file.read(BYTES + 1)
@@ -153,7 +158,7 @@ def _columns(described: dict[str, Any], history: Mapping[str, Array]) -> dict[st
 
 
 def _facts(facts: dict[str, Any]) -> dict[str, Any]:
-    """The summary, its entries of the kinds that ``Solution`` writes."""
+    """Return the summary, its entries of the kinds that ``Solution`` writes."""
     for name, kinds in _KINDS.items():
         value = facts.get(name)
         if value is not None and not _fits(value, kinds):
@@ -197,8 +202,9 @@ def _numbers(path: Path) -> dict[str, Array]:
 
 
 def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, Any]) -> None:
-    """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one
-    of the summary.
+    """Raise InputError when history.csv has lost rows.
+
+    Numbers of steps follow each other, up to the one of the summary.
     """
     rows, steps = len(history["t"]), facts.get("steps")
     gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
@@ -217,8 +223,9 @@ def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, 
 
 
 def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
-    """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that
-    both have.
+    """Raise InputError when history.csv and history.h5 differ in a row that both have.
+
+    They hold the same numbers.
     """
     for name, own in history.items():
         if name not in file or file[name].ndim != 1:

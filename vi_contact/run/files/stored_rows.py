@@ -1,5 +1,6 @@
-"""Read the rows that an earlier run left in its folder, block by block: what a restart goes on
-from.
+"""Read the rows that an earlier run left in its folder, block by block.
+
+They are what a restart goes on from.
 
 Numbers are in history.csv, arrays in history.h5, of later steps in history.journal; the checkpoint
 has their checksum.
@@ -25,8 +26,9 @@ from .table import Block, Table
 
 
 def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
-    """Return lines of history.csv: whole numbers stay whole, all others are floats that read back
-    to the last bit.
+    """Return lines of history.csv.
+
+    Whole numbers stay whole, all others are floats that read back to the last bit.
     """
     values = [
         [v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)]
@@ -36,8 +38,9 @@ def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
 
 
 def records_of(table: Table, block: Block) -> list[bytes]:
-    """Return the arrays of rows as the journal has them: float64, k first; empty ones when there
-    are none.
+    """Return the arrays of rows as the journal has them.
+
+    They are float64, k first; empty ones when there are none.
     """
     n = len(block["k"])
     if not table.arrays:
@@ -95,8 +98,9 @@ class StoredRows:
 def read_blocks(
     csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
-    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line
-    cut short.
+    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end.
+
+    No line is cut short.
     """
     done = first
     while True:
@@ -126,8 +130,10 @@ def read_blocks(
 
 
 def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
-    """Return the numbers of lines (rows, width); InputError names the first line that holds
-    something else.
+    """Return the numbers of lines (rows, width).
+
+    Raises:
+        InputError: names the first line that holds something else.
     """
     values: list[list[float]] = []
     for i, line in enumerate(lines):
@@ -163,8 +169,10 @@ class StoredArrays:
             self._file.close()
 
     def rows(self, first: int, steps: Array) -> Block:
-        """Return the arrays of consecutive rows, of these steps; InputError where one is
-        missing.
+        """Return the arrays of consecutive rows, of these steps.
+
+        Raises:
+            InputError: one is missing.
         """
         if not self._samples:
             return {}
@@ -236,7 +244,7 @@ class StoredArrays:
 
 
 def _journal_rows(path: Path, width: int) -> Array:
-    """The rows of the journal; one that was cut short by a crash is left out."""
+    """Return the rows of the journal; one that was cut short by a crash is left out."""
     if not is_own(path):
         return np.zeros((0, width))
     with open_to_read(path) as file:

@@ -1,5 +1,6 @@
-"""Hold the histories of a run in memory: compact columns, of a run with a folder only so much of
-them; tally them.
+"""Hold the histories of a run in memory, and tally them.
+
+These are compact columns; of a run with a folder only so much of them is held.
 """
 
 import copy
@@ -67,8 +68,9 @@ class Table:
         self.append(first)
 
     def check(self, row: Row) -> None:
-        """Raise InputError for a row with other columns than its recorder has announced, or not of
-        numbers.
+        """Raise InputError for a row with other columns than its recorder has announced.
+
+        So it does for a row that is not of numbers.
         """
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
@@ -101,8 +103,9 @@ class Table:
             self._store(self._columns(rows))
 
     def restore(self, block: Block) -> None:
-        """Add rows of an earlier run, which are those before the one that the table was made
-        with.
+        """Add rows of an earlier run.
+
+        They are those before the one that the table was made with.
         """
         if self.count == 1 and self._open:
             self._open, self.count = [], 0
@@ -124,8 +127,9 @@ class Table:
             self._blocks.append(block)
 
     def remembered(self) -> Block | None:
-        """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let
-        some go.
+        """Return all rows, column -> values, arrays on rank 0 only.
+
+        It is None when the memory has let some go.
         """
         self._gather()
         names = [*self.numbers, *self.arrays] if self._kept else []
@@ -141,9 +145,10 @@ class Table:
         return tally.facts()
 
     def history(self) -> Mapping[str, Array]:
-        """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of
-        too many rows for the memory, or points for every rank, as they are in the file.
-        Collective.
+        """Return column -> values of all rows. Collective.
+
+        They are (rows,) float64, or (rows, *shape of the arrays); of too many rows for the memory,
+        or points for every rank, as they are in the file.
         """
         kept = self.remembered() or {}
         shared = [
@@ -167,8 +172,9 @@ class Table:
 
 
 class StoredHistory(Mapping[str, Array]):
-    """Hold histories that are read column by column from history.h5 when somebody asks, but for
-    those that are kept.
+    """Hold histories that are read column by column from history.h5 when somebody asks.
+
+    Those that are kept are not read.
 
     ViContactError when there is no file, or not any more, or it no longer holds these rows.
     """
@@ -250,7 +256,7 @@ class Tally:
         self._sums[name] = self._sums.get(name, 0.0) + float(np.sum(values))
 
     def _raise(self, name: str, values: Array, larger: np.ufunc = np.maximum) -> None:
-        """The largest so far; NaN stays NaN, but is left out with ``np.fmax``."""
+        """Take the largest so far; NaN stays NaN, but is left out with ``np.fmax``."""
         if len(values):
             found = float(larger.reduce(values))
             self._most[name] = float(larger(self._most.get(name, found), found))
@@ -277,8 +283,9 @@ class Tally:
         return facts | (self._energy() if "defect" in most else {})
 
     def _energy(self) -> dict[str, Any]:
-        """The ledger at the end [J], and its largest defect relative to the largest energy or input
-        work of the run.
+        """Return the ledger at the end [J], and its largest defect.
+
+        The defect is relative to the largest energy or input work of the run.
         """
         most, last = self._most, self._last
         start = self._first["energy_kinetic"] + self._first["energy_strain"]

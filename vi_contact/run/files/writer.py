@@ -1,5 +1,6 @@
-"""Write everything a run writes while it works, in one place: histories, fields, checkpoints, log
-and summary.
+"""Write everything a run writes while it works, in one place.
+
+This is histories, fields, checkpoints, log and summary.
 """
 
 import logging
@@ -117,8 +118,9 @@ class Writer:
         self._files = HistoryFiles(folder, self._table, geometry, self._stored)
 
     def append(self, row: Row) -> None:
-        """Take a row of the histories; it is written, with all that wait, when the next one might
-        be late.
+        """Take a row of the histories.
+
+        It is written, with all that wait, when the next one might be late.
         """
         if self.folder is None:
             self._table.append(row)
@@ -177,8 +179,9 @@ class Writer:
         on_root(self._comm, lambda: self._close(facts))
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
-        """Do the same after a failure: not collective, as others might not come; no error hides the
-        first.
+        """Do the same after a failure.
+
+        It is not collective, as others might not come; no error hides the first.
         """
         with suppress(
             Exception
