@@ -1,5 +1,6 @@
-"""Assemble the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (boundary
-method, eqs. 7-10a).
+"""Assemble the semi-discrete system of a linear elastic body.
+
+It is M u'' + C u' + K u = f(t) (boundary method, eqs. 7-10a).
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
     K = ∫ sigma(u):eps(v),   C = alpha M + beta K
@@ -204,7 +205,10 @@ def _stated(
     *,
     selective: bool,
 ) -> ElasticForms:
-    """The forms of the materials, or the user's own with those of the materials beside them."""
+    """Return the forms of the materials, or the user's own.
+
+    The user's own have those of the materials beside them.
+    """
     materials = [] if material is None else cell_materials(space.mesh, material)
     if forms is None:
         body = ElasticForms(space, materials, section, damping, selective=selective)
@@ -216,8 +220,9 @@ def _stated(
 
 
 def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
-    """C of materials and absorbing boundaries, before elimination (PETSc); None where nothing
-    damps.
+    """Return C of materials and absorbing boundaries, before elimination (PETSc).
+
+    It is None where nothing damps.
     """
     terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     if not terms:
@@ -230,8 +235,9 @@ def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
 def _reduced(
     full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
-    """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is
-    destroyed.
+    """Return (Pᵀ A P as the algebra stores it, the load of prescribed motions).
+
+    The full matrix is destroyed.
     """
     pull: tuple[Callable[[float], Array], ...] = ()
     if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
@@ -246,8 +252,9 @@ def _reduced(
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
-    """Assemble f(t) on the free unknowns: tractions, body forces, linear forms and initial
-    strains.
+    """Assemble f(t) on the free unknowns.
+
+    It is that of tractions, body forces, linear forms and initial strains.
     """
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
@@ -266,8 +273,9 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 
 
 def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
-    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its
-    own.
+    """Return t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here.
+
+    Of a form it is its own.
     """
     if isinstance(load, InitialStrain):
         return lambda t: space.forms.initial.forces(t, only=load)
@@ -286,7 +294,7 @@ def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
 
 
 def _initial(space: FemSpace, name: str, value: Initial) -> Array:
-    """Initial values on the free unknowns."""
+    """Return initial values on the free unknowns."""
     if value is None:
         return np.zeros(len(space.ids))
     if isinstance(value, Sequence) and value and isinstance(value[0], tuple):

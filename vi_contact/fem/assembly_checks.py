@@ -1,5 +1,6 @@
-"""Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not
-contradict.
+"""Check what a body is assembled of.
+
+These are kinds of objects, groups of this mesh, conditions that do not contradict.
 """
 
 import logging
@@ -55,8 +56,10 @@ def check_body(
     degree: Any = 1,
     integration: Any = "full",
 ) -> tuple[Section, Damping]:
-    """Return (section, damping), the usual for None; InputError for objects of another kind, cells
-    of another mesh.
+    """Return (section, damping), the usual for None.
+
+    Raises:
+        InputError: objects of another kind, cells of another mesh.
     """
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
@@ -155,8 +158,9 @@ def _check_damping(damping: Any, section: Any, forms: Any) -> None:
 
 
 def check_ratios(body: ElasticForms, of_materials: bool) -> None:
-    """Raise InputError, on all ranks, for a damping law that damps nothing, and for damping ratios
-    that no law reads.
+    """Raise InputError, on all ranks, for a damping law that damps nothing.
+
+    So it does for damping ratios that no law reads.
 
     body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
     those of materials, and not the user's own forms.
@@ -188,8 +192,9 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
 
 
 def _refuse_ratio_behind(body: ElasticForms) -> None:
-    """Raise InputError for a ratio of a material that only dashpots have: they have no damping but
-    their own.
+    """Raise InputError for a ratio of a material that only dashpots have.
+
+    They have no damping but their own.
     """
     inside = [one for _, one in body.materials]
     for boundary in body.boundaries:
@@ -203,8 +208,9 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
 
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:
-    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell, as parts of
-    meshes may leave.
+    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell.
+
+    Parts of meshes may leave such nodes.
     """
     own = np.arange(mesh.geometry.index_map().size_local)
     lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
@@ -218,8 +224,9 @@ def _refuse_lonely_nodes(mesh: Mesh) -> None:
 
 
 def _check_degree(mesh: Mesh, degree: Any) -> None:
-    """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not
-    folded. Collective.
+    """Raise InputError unless the degree is 1 or 2 and suits the cells. Collective.
+
+    Curved cells must not be folded.
     """
     if isinstance(degree, bool) or degree not in (1, 2):
         raise InputError(
@@ -262,8 +269,9 @@ def _check_integration(
     degree: int,
     integration: Any,
 ) -> None:
-    """Raise InputError for a word that is none, and where cells cannot or need not be integrated
-    selectively.
+    """Raise InputError for a word of integration that is none.
+
+    So it does where cells cannot or need not be integrated selectively.
     """
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":
@@ -305,9 +313,10 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
 def check_boundaries(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
-    """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of
-    another mesh, and for prescribed displacements that contradict each other on the same facets.
-    Collective. All are tuples.
+    """Raise InputError, on all ranks, for conditions and loads that do not fit. Collective.
+
+    They are of another kind or on groups of another mesh, or prescribed displacements that
+    contradict each other on the same facets. All are tuples.
     """
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
@@ -346,8 +355,9 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
 def _refuse_empty(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and
-    loads nothing.
+    """Raise InputError, on all ranks, for a boundary group without facets on any rank.
+
+    It holds and loads nothing.
     """
     own = {
         "clamped": clamped,
@@ -378,8 +388,9 @@ def _refuse_empty(
 def _contradictions(
     held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
 ) -> Iterator[str]:
-    """Pairs of conditions on the same facets of this rank: other values of one component, ties and
-    dashpots.
+    """Return pairs of conditions on the same facets of this rank that contradict.
+
+    These are other values of one component, ties and dashpots.
     """
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):

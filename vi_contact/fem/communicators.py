@@ -1,5 +1,6 @@
-"""Offer collective operations, communicators that last, and what frees PETSc objects that wait on
-them.
+"""Offer collective operations and communicators that last.
+
+What frees PETSc objects that wait on them is here too.
 """
 
 from typing import Any
@@ -60,8 +61,9 @@ _KEPT: list[Any] = []
 
 
 def give_back(comm: Any) -> None:
-    """Free the PETSc objects that nobody holds any more: PETSc keeps them until all ranks ask it
-    to. Collective.
+    """Free the PETSc objects that nobody holds any more. Collective.
+
+    PETSc keeps them until all ranks ask it to.
     """
     for _ in range(2):  # what one held may be free only after it
         PETSc.garbage_cleanup(comm)

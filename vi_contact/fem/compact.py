@@ -1,5 +1,6 @@
-"""Store the symmetric matrices of large systems compactly: one half, and after a change of basis
-what it changed.
+"""Store the symmetric matrices of large systems compactly.
+
+This is one half, and after a change of basis what it changed.
 
 Half of K in blocks of nodes takes 0.2 kB an unknown on tetrahedra where AIJ takes 0.53, and its
 product half the time; of M, whose components are not coupled along the axes, only what is not zero
@@ -43,8 +44,9 @@ class Half(PetscMatrix):
 
 
 class Replaced(PetscMatrix):
-    """Hold a symmetric matrix that is another but for ``part``, some owned rows; ``alike``: same
-    places.
+    """Hold a symmetric matrix that is another but for ``part``, some owned rows.
+
+    ``alike``: same places.
     """
 
     def __init__(self, base: PetscMatrix, rows: Indices, part: Any, alike: bool) -> None:
@@ -146,7 +148,7 @@ class CompactAlgebra(PetscAlgebra):
         return Half(made)
 
     def _changed(self, P: Any, A: Any) -> Indices:
-        """The owned rows in which PᵀAP may differ from A, ascending. Collective."""
+        """Return the owned rows in which PᵀAP may differ from A, ascending. Collective."""
         rows, first = rows_of(P), P.getOwnershipRange()[0]
         changed = np.flatnonzero(np.diff(sp.csr_matrix(rows - sp.eye(*rows.shape, k=first)).indptr))
         reached = [self.entries(PetscMatrix(one), changed).indices for one in (P, A)]

@@ -1,5 +1,6 @@
-"""Let the ground go on behind boundaries: dashpots that absorb waves, and a base that lets waves in
-from below.
+"""Let the ground go on behind boundaries.
+
+There are dashpots that absorb waves, and a base that lets waves in from below.
 
 Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877: on facets with outward normal n
 
@@ -97,8 +98,9 @@ class Dashpots:
 
 @dataclass(frozen=True, kw_only=True)
 class CompliantBase(Dashpots):
-    """Put dashpots and an upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop's
-    (``upgoing``).
+    """Put dashpots and an upgoing wave ``motion`` on a boundary.
+
+    It is t [s] -> v_up (d,) [m/s], half the outcrop's (``upgoing``).
     """
 
     motion: Callable[[float], Array] = field(repr=False)
@@ -216,8 +218,10 @@ class DashpotMatrix:
 def impedances(
     dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any
 ) -> tuple[Any, Any]:
-    """Return thickness · (normal rho c_P, tangential rho c_S): of the ground beside the dashpots,
-    whose constants given here hold the thickness already, or of their own material.
+    """Return thickness · (normal rho c_P, tangential rho c_S).
+
+    They are those of the ground beside the dashpots, whose constants given here hold the thickness
+    already, or of their own material.
     """
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho

@@ -1,5 +1,6 @@
-"""Take the volumetric strain of every cell as its mean, so that first-order quadrilaterals and
-hexahedra do not lock.
+"""Take the volumetric strain of every cell as its mean.
+
+So first-order quadrilaterals and hexahedra do not lock.
 
     K = ∫ 2 mu eps(u):eps(v) + sum over cells of  lambda / |cell| ∫ tr eps(u) ∫ tr eps(v)
 
@@ -39,8 +40,10 @@ class MeanDilatation:
         self._means: list[tuple[Any, Any]] = []
 
     def add(self, matrix: Any, *moduli: Any) -> None:
-        """Add sum of modulus / |cell| ∫ tr eps(u) ∫ tr eps(v) to a PETSc matrix of all unknowns;
-        the modulus [Pa] is the product of cellwise Functions, None for 1.
+        """Add sum of modulus / |cell| ∫ tr eps(u) ∫ tr eps(v) to a PETSc matrix.
+
+        The matrix is of all unknowns; the modulus [Pa] is the product of cellwise Functions, None
+        for 1.
         """
         density = 1.0 / self._volume
         for modulus in (one for one in moduli if one is not None):

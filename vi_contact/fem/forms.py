@@ -31,8 +31,9 @@ KINDS = (LinearElastic, Orthotropic, Heterogeneous)
 
 
 class ElasticForms:
-    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all
-    materials.
+    """Hold the variational forms of one body.
+
+    Constants are cellwise: one compiled form serves all materials.
 
     Attributes: fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and
         beta: functions of DG0, of DG1
@@ -108,8 +109,9 @@ class ElasticForms:
         return np.asarray(field.x.array[compat.cell_blocks(field.function_space)].mean(axis=1))
 
     def own(self, system: SemiDiscreteSystem) -> None:
-        """Remember the matrices of a system as made of these materials; the forms are then those of
-        its space.
+        """Remember the matrices of a system as made of these materials.
+
+        The forms are then those of its space.
         """
         self.space.forms = self
         for name, known in self._matrices.items():
@@ -117,8 +119,9 @@ class ElasticForms:
                 known.add(getattr(system, name))
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
-        """Return the letters of ``names`` whose matrices in a system were not made of these
-        materials.
+        """Return the letters of ``names`` whose matrices are not of these materials.
+
+        The matrices of a system were not made of these.
         """
         return "".join(
             name for name in names if getattr(system, name) not in (None, *self._matrices[name])
@@ -133,8 +136,9 @@ class ElasticForms:
         return self.stresses(u)[0]
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
-        """Return the stress and sigma_zz(u) times the thickness of a body in the plane, 0 in plane
-        stress and else.
+        """Return the stress and sigma_zz(u) times the thickness of a body in the plane.
+
+        sigma_zz = 0 in plane stress and else.
         """
         eps, trace = ufl.sym(ufl.grad(u)), self._trace(u)
         if self.initial is None or u is self.u:
@@ -143,8 +147,9 @@ class ElasticForms:
         return self.hooke(eps - own, -across, trace - ufl.tr(own))
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        """Return (sigma (d, d), sigma_zz) times the thickness of a strain, that across the plane,
-        and its trace.
+        """Return (sigma (d, d), sigma_zz) times the thickness of a strain.
+
+        Given are the strain, that across the plane, and its trace.
         """
         d, fields = self.space.dimension, self.fields
         if self._anisotropic is None:
@@ -160,8 +165,9 @@ class ElasticForms:
         return sigma, flat[3] if d == 2 else 0.0 * trace
 
     def _trace(self, u: Any) -> Any:
-        """tr eps or, of a Function, its mean over each cell; none in bilinear forms where
-        ``dilatation`` adds it.
+        """Return tr eps or, of a Function, its mean over each cell.
+
+        There is none in bilinear forms where ``dilatation`` adds it.
         """
         if self.dilatation is None:
             return ufl.tr(ufl.sym(ufl.grad(u)))
@@ -178,8 +184,9 @@ class ElasticForms:
             self.initial.follow(t)
 
     def bilinear(self, name: str) -> Any:
-        """Return the form of M, K, or C of the materials in the trial function ``u`` and the test
-        function ``v``.
+        """Return the form of M, K, or C of the materials.
+
+        It is in the trial function ``u`` and the test function ``v``.
         """
         u, v, fields = self.u, self.v, self.fields
         if name == "M":  # forms=… without a stress take the mass from here
@@ -191,8 +198,10 @@ class ElasticForms:
         return form + self._viscous_form() if self.viscous else form
 
     def against(self, name: str, r: Any, inside: Any) -> Any:
-        """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r
-        as test function. ``follow`` when the values of the Function r have changed since.
+        """Return rᵀA of the cells inside, A = M, K or C, as a linear form.
+
+        It is the bilinear form with r as test function. Call ``follow`` when the values of the
+        Function r have changed since.
         """
         form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
         if self.dilatation is None or name == "M":
@@ -234,8 +243,9 @@ def cell_constants(space: Any, material: Materials) -> Array:
 
 
 def _constants(space: Any, cells: Any, material: Material) -> Any:
-    """The material, or its values at all unknowns of the space where it is given by functions or
-    has no Lamé constants. Collective.
+    """Return the material, or its values at all unknowns of the space. Collective.
+
+    It is the values where it is given by functions or has no Lamé constants.
     """
     if isinstance(material, Heterogeneous):
         return material.at(space, cells)
@@ -267,7 +277,10 @@ def _anisotropic(
     section: Section,
     d: int,
 ) -> Any:
-    """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
+    """Return the matrix of all cells times the thickness, as a function.
+
+    See ``Orthotropic.matrix``.
+    """
     if d == 1:
         raise InputError(
             "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"
@@ -296,8 +309,10 @@ def _anisotropic(
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:
-    """Return (local cells, material) pairs that cover every local cell once; InputError for cells
-    with none or two.
+    """Return (local cells, material) pairs that cover every local cell once.
+
+    Raises:
+        InputError: cells with none or two.
     """
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts

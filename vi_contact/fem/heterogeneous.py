@@ -32,8 +32,9 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
 
 @dataclass(frozen=True)
 class Heterogeneous:
-    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³], and xi(x), which
-    DampingRatio damps by.
+    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³].
+
+    There is also xi(x), which DampingRatio damps by.
 
     Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there,
     or a function of points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes
@@ -136,7 +137,7 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
 
 
 def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
-    """What is wrong with the values of this rank."""
+    """Return what is wrong with the values of this rank."""
     for name, (words, low, high, remedy) in RANGES.items():
         wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
         if len(wrong):

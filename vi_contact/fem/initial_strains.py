@@ -1,5 +1,6 @@
-"""Strain a body before it has stresses: temperature, swelling, given dislocations (boundary method,
-eq. 25).
+"""Strain a body before it has stresses.
+
+This is by temperature, swelling, given dislocations (boundary method, eq. 25).
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +24,9 @@ from .mesh import Cells
 
 @dataclass(frozen=True)
 class InitialStrain(ActingLoad):
-    """Apply an initial strain eps_0(x, t): sigma = C (eps(u) - eps_0), as the load ∫ C eps_0 :
-    eps(v).
+    """Apply an initial strain eps_0(x, t) as the load ∫ C eps_0 : eps(v).
+
+    sigma = C (eps(u) - eps_0).
 
     Warming by T - T_0 is alpha (T - T_0) in all directions. A dislocation, a given jump b [m]
     across a surface with the normal n, is the tensor b⊗n / h in a layer of cells of height h (Mura,
@@ -63,8 +65,9 @@ class InitialStrain(ActingLoad):
             _tensors("InitialStrain", self.value, (), dimensions)
 
     def at(self, points: Array, room: Array, t: float) -> Array:
-        """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the
-        room.
+        """Return the tensors at points (k, d), less the history.
+
+        They are in the shape (k, 9) of the room.
         """
         value: Any = (
             self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
@@ -85,8 +88,10 @@ class InitialStrain(ActingLoad):
 def _tensors(
     owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
 ) -> Array:
-    """Return strains, one or one at each point, as tensors; InputError unless one of these
-    dimensions has the shape.
+    """Return strains, one or one at each point, as tensors.
+
+    Raises:
+        InputError: none of these dimensions has the shape.
     """
     shape = shape_of(value)
     if shape != leading and shape not in {
@@ -104,8 +109,9 @@ def _tensors(
 
 
 class InitialStrains:
-    """Hold the sum of the initial strains of a body at a time, as tensors (3, 3), its load and
-    energy. Collective.
+    """Hold the sum of the initial strains of a body at a time. Collective.
+
+    This is the sum as tensors (3, 3), its load and energy.
     """
 
     def __init__(self, body: ElasticForms, given: Sequence[InitialStrain]) -> None:
@@ -140,8 +146,9 @@ class InitialStrains:
         ), 0.0 if free else eps[2, 2]
 
     def against(self, r: Any, inside: Any) -> Any:
-        """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what
-        ``follow`` returns.
+        """Return -rᵀf_0 of the cells inside as a linear form.
+
+        Its products are with what ``follow`` returns.
         """
         own, across = self._split(ufl.TestFunction(self.tensors))
         return (
@@ -151,8 +158,9 @@ class InitialStrains:
         )
 
     def follow(self, t: float, *, only: InitialStrain | None = None) -> Array:
-        """Sum up the strains at a time, or one of them less its history; return the owned
-        values.
+        """Sum up the strains at a time, or one of them less its history.
+
+        Returned are the owned values.
         """
         points, blocks = self.tensors.tabulate_dof_coordinates(), compat.cell_blocks(self.tensors)
         values = self._field.x.array.reshape(-1, 9)

@@ -1,5 +1,6 @@
-"""Describe what acts on a body: prescribed displacements, tractions and body forces (boundary
-method, eqs. 3, 4, 6).
+"""Describe what acts on a body.
+
+It is prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values
 (k, d). They are interpolated at the nodes and then integrated exactly, so a load costs one sparse
@@ -35,8 +36,9 @@ def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Ar
 
 
 def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
-    """Return (values at the points, what is wrong with them or an empty text); zeros where
-    something is wrong.
+    """Return (values at the points, what is wrong with them or an empty text).
+
+    The values are zeros where something is wrong.
     """
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
@@ -106,15 +108,17 @@ class Prescribed:
         return any(value is not _zero for value in self.motions)
 
     def places(self, space: Any) -> tuple[Any, Any]:
-        """Return (owned blocks, components) of a FemSpace that are held, as indices of an array of
-        nodal values.
+        """Return (owned blocks, components) of a FemSpace that are held.
+
+        They are indices of an array of nodal values.
         """
         held = components_of("prescribed", self.components, space.dimension)
         return space.facet_blocks(self.facets.indices)[:, None], held
 
     def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
-        """Return (values of the motion or a rate at the places, what is wrong with them or an empty
-        text).
+        """Return (values of the motion or a rate at the places, what is wrong with them).
+
+        What is wrong is an empty text where nothing is.
         """
         name = f"prescribed motion on '{self.facets.name}'"
         motion, defect = evaluate_here(
@@ -129,8 +133,9 @@ class Prescribed:
 
     @property
     def companions(self) -> tuple[Any, ...]:
-        """Return the motions that are marched beside the run: objects whose methods are given, as
-        ``BaseMotion``.
+        """Return the motions that are marched beside the run.
+
+        They are objects whose methods are given, as ``BaseMotion``.
         """
         owners = {
             id(owner): owner
@@ -209,8 +214,9 @@ class Traction(ActingLoad):
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """Apply the tangential traction S_T = C_T(x, t) on the contact boundary: ``value`` less its
-    normal part.
+    """Apply the tangential traction S_T = C_T(x, t) on the contact boundary.
+
+    It is ``value`` less its normal part.
     """
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
@@ -220,8 +226,9 @@ class TangentialTraction(Traction):
 
 @dataclass(frozen=True)
 class Pressure(Traction):
-    """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets:
-    water, uplift in a joint.
+    """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets.
+
+    Such are water, uplift in a joint.
 
     ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all
     nodes of the body; it is kept as the first component of a vector field. p is interpolated at

@@ -105,8 +105,9 @@ class Group:
 
     @classmethod
     def where(cls, name: str, mesh: Mesh, marker: Callable[[npt.NDArray[np.float64]], Any]) -> Self:
-        """Return the group of the facets of the boundary, or of the cells, whose vertices are all
-        marked. Collective.
+        """Return the group of the facets of the boundary, or of the cells, in a region. Collective.
+
+        Their vertices are all marked.
 
         ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
         it fails or marks none on any rank.
@@ -139,8 +140,9 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Facets(Group):
-    """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept
-    ascending. Collective.
+    """Name a part of the boundary or of an inner surface. Collective.
+
+    It is local facets, ghosts included; kept ascending.
 
     ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks
     points. InputError, on all ranks, for numbers that are no facets of this mesh.
@@ -169,8 +171,12 @@ def local_count(mesh: Mesh, codimension: int) -> int:
 
 
 class Tags(dict[str, Any]):
-    """Hold the groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks;
-    InputError for others.
+    """Hold the groups of a mesh by name.
+
+    They are `Cells` or `Facets`, the same names on all ranks.
+
+    Raises:
+        InputError: other names.
     """
 
     def __missing__(self, name: str) -> Any:
@@ -192,8 +198,9 @@ def alone() -> MPI.Comm:
 
 
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Read a mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical
-    groups.
+    """Read a mesh and its physical groups.
+
+    Cells are intervals, triangles, quadrilaterals, tetrahedra or hexahedra.
 
     Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in
     metres. The file is in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on
@@ -205,8 +212,9 @@ def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with
-    `build(gmsh)`.
+    """Build a mesh without a file from a script of ``vi_contact.meshes``.
+
+    Any object with `build(gmsh)` serves too.
 
     It raises the errors of `read_mesh`. Collective.
     """
@@ -223,8 +231,9 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among
-    the nodes in use.
+    """Return the numbers of local geometry nodes (owned, then ghosts) as in the input.
+
+    They count from 0, the rank among the nodes in use.
 
     Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is
     numbered in their order.

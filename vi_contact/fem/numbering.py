@@ -24,8 +24,9 @@ def is_curved(mesh: Any) -> bool:
 
 
 def supports(V: Any) -> list[list[int]]:
-    """Return, for every node of a cell, the local vertices whose mean it is: one, or those of its
-    edge, side or cell.
+    """Return, for every node of a cell, the local vertices whose mean it is.
+
+    This is one vertex, or those of its edge, side or cell.
 
     ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``.
     """
@@ -36,8 +37,9 @@ def supports(V: Any) -> list[list[int]]:
 
 
 def numbered(V: Any) -> tuple[Indices, Array]:
-    """Return (numbers, points (k, gdim)) of the local blocks of unknowns of a space, owned, then
-    ghosts. Collective.
+    """Return (numbers, points (k, gdim)) of the local blocks of a space. Collective.
+
+    They are blocks of unknowns, owned, then ghosts.
     """
     mesh = V.mesh
     if compat.cell_blocks(V).shape[1] == compat.geometry_dofmap(mesh).shape[1]:
@@ -69,8 +71,9 @@ def _with_mid_points(V: Any) -> tuple[Indices, Array]:
 
 
 def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
-    """(place of each of this rank's rows among the different ones of all ranks in order, how many
-    those are).
+    """Return (place of each of this rank's rows, how many different ones there are).
+
+    The places are among the different rows of all ranks in order.
 
     Members are less than ``count`` and ascend in a row: its first one tells which rank sorts it.
     Collective.
@@ -90,8 +93,9 @@ def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
 
 
 def facet_rows(V: Any, facets: Any) -> Indices:
-    """Return the local blocks (k, n) on each of these local facets: of its vertices first, then of
-    mid-points.
+    """Return the local blocks (k, n) on each of these local facets.
+
+    Those of its vertices come first, then those of mid-points.
 
     Collective.
     """

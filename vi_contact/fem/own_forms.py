@@ -20,8 +20,9 @@ ROLES = {"K": "stiffness", "C": "damping", "M": "mass"}
 
 @dataclass(frozen=True, kw_only=True)
 class Forms:
-    """State a body by weak forms: functions (u, v) -> UFL form, u the trial and v the test
-    function.
+    """State a body by weak forms.
+
+    They are functions (u, v) -> UFL form, u the trial and v the test function.
 
         M_ij = mass(phi_j, phi_i),   K_ij = stiffness(phi_j, phi_i),   C_ij = damping(phi_j, phi_i)
 
@@ -57,8 +58,9 @@ class Forms:
 
 
 class OwnForms(ElasticForms):
-    """Hold the user's forms of one body; ``fields`` are those of the material beside them, empty
-    where there is none.
+    """Hold the user's forms of one body.
+
+    ``fields`` are those of the material beside them, empty where there is none.
 
     Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective.
     """
@@ -106,7 +108,7 @@ class OwnForms(ElasticForms):
         self.notes = self._notes(bool(materials))
 
     def _own(self, name: str) -> Any:
-        """The form that was given for a matrix, or None."""
+        """Return the form that was given for a matrix, or None."""
         call = getattr(self._given, ROLES[name])
         return (
             None

@@ -1,5 +1,6 @@
-"""Make the system of matrices that come from anywhere: a user's own elements, another program,
-beams and frames.
+"""Make the system of matrices that come from anywhere.
+
+This is a user's own elements, another program, beams and frames.
 
     M u'' + C u' + K u = f(t),   M symmetric and positive (semi)definite
 
@@ -46,8 +47,9 @@ def system_from_arrays(
     u0: Any = None,
     v0: Any = None,
 ) -> SemiDiscreteSystem:
-    """Make the system M u'' + C u' + K u = f of scipy or dense matrices, on one process, by numpy
-    and scipy alone.
+    """Make the system M u'' + C u' + K u = f of scipy or dense matrices.
+
+    It is made on one process, by numpy and scipy alone.
 
     ``contact_points`` makes contact for it. All that asks for no material works: every scheme and
     impact law, friction, solvers, static stages, ``Energy``, ``Contact``, ``Probe``, checkpoints,
@@ -94,7 +96,7 @@ def system_from_arrays(
 
 
 def _serial(name: str, value: Any) -> SerialMatrix:
-    """A copy of a matrix, of a vector as its diagonal."""
+    """Return a copy of a matrix, of a vector as its diagonal."""
     if not sp.issparse(value):
         lumped = name == "M" and np.ndim(value) == 1
         found = array(OWNER, name, value, (None,) if lumped else (None, None))
@@ -111,9 +113,10 @@ def own_system(
     matrices: Mapping[str, Matrix],
     given: Mapping[str, Any],
 ) -> SemiDiscreteSystem:
-    """Return the system of matrices M, K and perhaps C of one size and of what is given of this
-    rank's rows and nodes, which is checked here. ``unsymmetric``: the algebra for C or K that are
-    not symmetric. Collective.
+    """Return the system of matrices M, K and perhaps C of one size. Collective.
+
+    What is given of this rank's rows and nodes is checked here. ``unsymmetric``: the algebra for C
+    or K that are not symmetric.
     """
     comm, n = algebra.comm, matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
@@ -222,8 +225,9 @@ def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array,
 
 
 class MatrixSpace(NodalSpace):
-    """Say what the unknowns of a user's matrices mean: a component of a node each, or no
-    displacement of a point.
+    """Say what the unknowns of a user's matrices mean.
+
+    Each is a component of a node, or no displacement of a point.
 
     Attributes: coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1
         for what is no displacement;
@@ -253,8 +257,10 @@ class MatrixSpace(NodalSpace):
 
 
 def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
-    """Return the body (0, 1, ..., in the order of least numbers) of each owned unknown: K or a node
-    joins those of one body. ``block``: (n,) the node of each, all on one rank. Collective.
+    """Return the body (0, 1, ..., by least numbers) of each owned unknown. Collective.
+
+    Bodies are in the order of least numbers; K or a node joins those of one body. ``block``: (n,)
+    the node of each, all on one rank.
     """
     n, first = K.rows, algebra.first(K.rows)
     entries, own = algebra.entries(K, np.arange(n)), first + np.arange(n)

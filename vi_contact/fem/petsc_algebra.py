@@ -1,5 +1,6 @@
-"""Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises,
-vectors are of numpy.
+"""Implement the algebra protocol on PETSc matrices, on any number of ranks.
+
+MUMPS factorises, vectors are of numpy.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -31,8 +32,9 @@ RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the d
 
 
 def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
-    """Room that all matrices share, as a product needs it only for as long as it takes, and a
-    vector in it.
+    """Return room that all matrices share, and a vector in it.
+
+    A product needs it only for as long as it takes.
     """
     room = _ROOM.get((size, way))
     if room is None:
@@ -44,8 +46,10 @@ _ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
 
 
 class PetscMatrix:
-    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat``
-    too unless it is stored otherwise: then it is made anew (``fem.compact``).
+    """Hold an AIJ matrix behind the ``Matrix`` protocol.
+
+    ``stored`` is the PETSc object, ``mat`` too unless it is stored otherwise: then it is made anew
+    (``fem.compact``).
     """
 
     def __init__(self, mat: Any) -> None:
@@ -148,8 +152,9 @@ class PetscFactor:
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell
-        nothing, as copies.
+        """Return the bytes of the entries, an equal share on each rank.
+
+        They are 0 for factors that tell nothing, as copies.
         """
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
@@ -199,8 +204,9 @@ class PetscFactor:
 
 @contextmanager
 def _default_options(values: Mapping[str, object]) -> Iterator[None]:
-    """PETSc options of the factor that hold while it is made, unless the user has given them:
-    others may differ.
+    """Set PETSc options of the factor that hold while it is made.
+
+    They do not where the user has given them: others may differ.
     """
     database = PETSc.Options(PREFIX)
     added = [name for name in values if not database.hasName(name)]
@@ -214,8 +220,9 @@ def _default_options(values: Mapping[str, object]) -> Iterator[None]:
 
 
 class PetscAlgebra:
-    """Make and combine PETSc matrices on one communicator; ``symmetric``: whether those of its
-    system are.
+    """Make and combine PETSc matrices on one communicator.
+
+    ``symmetric``: whether those of its system are.
     """
 
     symmetric = True
@@ -315,8 +322,9 @@ class UnsymmetricAlgebra(PetscAlgebra):
 
 
 def triple_product(K: Any, P: Any) -> Any:
-    """Return PᵀKP of PETSc matrices, a copy: what PETSc makes holds K and P for as long as it
-    lives.
+    """Return PᵀKP of PETSc matrices, a copy.
+
+    What PETSc makes holds K and P for as long as it lives.
     """
     give_back(K.comm)
     product = K.PtAP(P)

@@ -70,8 +70,10 @@ def system_from_matrices(
 
 
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
-    """A copy of this rank's rows of a matrix with the layout of K; InputError for another type or
-    layout.
+    """Return a copy of this rank's rows of a matrix with the layout of K.
+
+    Raises:
+        InputError: another type or layout.
     """
     (n, _), (_, columns), first = K.getLocalSize(), K.getSize(), K.getOwnershipRangeColumn()[0]
     if name == "M" and not isinstance(A, PETSc.Mat):

@@ -1,5 +1,6 @@
-"""Say what the unknowns of a finite element system mean: nodes, bodies, free and prescribed parts,
-points, output.
+"""Say what the unknowns of a finite element system mean.
+
+This is nodes, bodies, free and prescribed parts, points, output.
 """
 
 import logging
@@ -31,8 +32,9 @@ from .ties import PLACE_TOLERANCE, Links, Tied, linked
 
 
 def body_numbers(mesh: Any) -> Indices:
-    """Return the body (0, 1, ..., in the order of their least node number) of each local geometry
-    node. Collective.
+    """Return the body (0, 1, ...) of each local geometry node. Collective.
+
+    Bodies are in the order of their least node number.
     """
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
@@ -81,8 +83,9 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
 
 
 def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
-    """Warn when M, C or K of a system is not what fem.assemble made, for outputs that go by the
-    materials given there.
+    """Warn when M, C or K of a system is not what fem.assemble made.
+
+    It is for outputs that go by the materials given there.
 
     Springs added to K leave the stresses of the elements as they are; another material does not.
     """
@@ -98,8 +101,9 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
 
 
 class FemSpace(NodalSpace):
-    """Number the nodal unknowns of a displacement space, with the prescribed and the tied ones
-    eliminated.
+    """Number the nodal unknowns of a displacement space.
+
+    The prescribed and the tied ones are eliminated.
 
     "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations
     solve for.
@@ -164,8 +168,9 @@ class FemSpace(NodalSpace):
         )
 
     def compiled(self, form: Any) -> Any:
-        """Return a form compiled, its integrals with the degree of the space, if any, unless they
-        say their own.
+        """Return a form compiled.
+
+        Its integrals have the degree of the space, if any, unless they say their own.
         """
         degree = self.quadrature_degree
         if degree is None:
@@ -194,8 +199,10 @@ class FemSpace(NodalSpace):
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
 
     def corners_of_facets(self, facets: Any) -> Indices:
-        """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too, that
-        may have contact conditions: all, in a hierarchy the vertices. Collective.
+        """Return the numbers (k, n) of the contact nodes on each of these facets. Collective.
+
+        The facets are local, ghosts' too; the nodes are those that may have contact conditions:
+        all, in a hierarchy the vertices.
         """
         if self.degree == 1:
             return node_numbers(self.mesh)[
@@ -223,8 +230,10 @@ class FemSpace(NodalSpace):
         return numbers[order], points[order]
 
     def _followers(self, links: Links) -> Mask:
-        """Which owned components follow another node; InputError where some of those that move as
-        one are held.
+        """Return which owned components follow another node.
+
+        Raises:
+            InputError: some of those that move as one are held.
         """
         held = [
             self._of_unknowns(numbers, self.held) > 0.0
@@ -240,15 +249,17 @@ class FemSpace(NodalSpace):
         return np.isin(ids, links.followers[~held[0]])
 
     def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
-        """Return owned nodal values (k, d) of unknowns, node number * d + component, on every
-        rank.
+        """Return owned nodal values (k, d) of unknowns, on every rank.
+
+        An unknown is node number * d + component.
         """
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
 
     def leaders(self, nodes: Indices) -> Indices:
-        """Return these node numbers, of nodes that follow another that of the other; -1 for those
-        tied in part.
+        """Return these node numbers, of nodes that follow another that of the other.
+
+        It is -1 for those tied in part.
         """
         return (
             np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
@@ -257,7 +268,7 @@ class FemSpace(NodalSpace):
         )
 
     def _numbers(self, links: Links) -> Indices:
-        """The unknown of every owned component, numbered over all ranks."""
+        """Return the unknown of every owned component, numbered over all ranks."""
         d, first = self.dimension, int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
         numbers = np.where(self.free, first + self.free_index, -1)
         leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
@@ -278,8 +289,9 @@ class FemSpace(NodalSpace):
 
     @property
     def tied_unknowns(self) -> Mask | None:
-        """Return the free unknowns of nodes that move together with others; None when no boundaries
-        are tied.
+        """Return the free unknowns of nodes that move together with others.
+
+        It is None when no boundaries are tied.
         """
         if self._P is None:
             return None
@@ -292,8 +304,9 @@ class FemSpace(NodalSpace):
 
     @cached_property
     def body_of_node(self) -> Indices:
-        """Return the body of every owned node: parts of the mesh that share no node, in the order
-        of node numbers.
+        """Return the body of every owned node.
+
+        Bodies are parts of the mesh that share no node, in the order of node numbers.
         """
         body = np.empty_like(self.node_of_block)
         body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[
@@ -336,8 +349,10 @@ class FemSpace(NodalSpace):
         return full.reshape(-1, self.dimension)
 
     def pull(self, force: Array) -> Array:
-        """Pull back by Pᵀ: forces on all owned components -> on the free ones; tied nodes count at
-        their partners.
+        """Pull back by Pᵀ.
+
+        This takes forces on all owned components -> on the free ones; tied nodes count at their
+        partners.
         """
         return force[self.free] if self._P is None else self._P.transpose_apply(force)
 

@@ -1,5 +1,6 @@
-"""Tie boundaries whose opposite nodes move together: tied sides of a soil layer, one period of a
-periodic body.
+"""Tie boundaries whose opposite nodes move together.
+
+Such are tied sides of a soil layer, one period of a periodic body.
 
     u(x) = u(x + a),  x on the first boundary, a the distance between the two
 
@@ -49,16 +50,18 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """Hold unknowns, node number * d + component, that move as others do; the same arrays on every
-    rank.
+    """Hold unknownsthat move as others do, the same arrays on every rank.
+
+    An unknown is node number * d + component.
     """
 
     followers: Indices
     leaders: Indices
 
     def of_nodes(self, d: int) -> dict[int, int]:
-        """Return whom tied nodes follow: one other in all d components, or themselves; -1 for those
-        tied in part.
+        """Return whom tied nodes follow.
+
+        This is one other in all d components, or themselves; -1 for those tied in part.
         """
         nodes = np.column_stack([self.followers, self.leaders]) // d
         found, count = np.unique(nodes, axis=0, return_counts=True)
@@ -93,7 +96,7 @@ def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) ->
 
 
 def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indices, Indices]:
-    """The unknowns of the first boundary, and those of the second that move alike."""
+    """Return the unknowns of the first boundary, and those of the second that move alike."""
     first, second = nodes(tie.first), nodes(tie.second)
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):

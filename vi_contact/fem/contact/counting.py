@@ -1,5 +1,6 @@
-"""Count the nodes of a contact boundary by what became of them: the `Census` of a contact
-surface.
+"""Count the nodes of a contact boundary by what became of them.
+
+This is the `Census` of a contact surface.
 """
 
 import logging
@@ -44,8 +45,9 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
 
 
 def tell(comm: Comm, census: Census) -> None:
-    """Log, on rank 0, what became of the nodes of a boundary, where not all are plain contact
-    points.
+    """Log, on rank 0, what became of the nodes of a boundary.
+
+    It is told where not all are plain contact points.
     """
     if census.places and comm.rank == 0:
         log.info("contact on '%s': %s", census.name, census.in_words())
@@ -59,5 +61,5 @@ def _gathered(comm: Comm, nodes: Nodes) -> Array:
 
 
 def _filled(places: Mapping[str, Array]) -> dict[str, Array]:
-    """The kinds of which there are nodes."""
+    """Return the kinds of which there are nodes."""
     return {kind: points for kind, points in places.items() if len(points)}

@@ -1,5 +1,6 @@
-"""Turn contact nodes to their frames, and conditions with them: the bases T and R of a
-`ContactSurface`.
+"""Turn contact nodes to their frames, and conditions with them.
+
+These are the bases T and R of a `ContactSurface`.
 
 A condition is a node, a contact direction and, between two bodies, what the node faces. Each node
 has one frame Q, with the directions of all its conditions among its vectors, and its unknowns are û
@@ -36,8 +37,9 @@ INDEPENDENT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j, nodes
-    of all ranks.
+    """Hold what contact nodes face.
+
+    Opposite node s the other body moves by sum_j P_sj u_j, nodes of all ranks.
     """
 
     nodes: Nodes
@@ -46,10 +48,11 @@ class Facing:
 
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
-    """Hold this rank's conditions u·direction <= gap at nodes, u being relative to what they are
-    ``facing`` if that deforms too, and less what the ``bubbles`` of edges add where displacements
-    have them (``.bubbles``); ``slots``: their numbers among those of all ranks, ascending.
-    ``borrowed``: pressures of nodes without one.
+    """Hold this rank's conditions u·direction <= gap at nodes.
+
+    u is relative to what they are ``facing`` if that deforms too, and less what the ``bubbles`` of
+    edges add where displacements have them (``.bubbles``); ``slots``: their numbers among those of
+    all ranks, ascending. ``borrowed``: pressures of nodes without one.
     """
 
     nodes: Nodes
@@ -62,8 +65,9 @@ class NodalConditions:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class FemSurface(ContactSurface):
-    """Hold a contact surface that remembers what it was made of, so that it can be joined with
-    others.
+    """Hold a contact surface that remembers what it was made of.
+
+    So it can be joined with others.
     """
 
     space: NodalSpace = field(repr=False)
@@ -71,8 +75,9 @@ class FemSurface(ContactSurface):
 
 
 class NodalFrames:
-    """Make one frame of unit vectors per node of conditions, orthonormal unless the node has
-    oblique directions.
+    """Make one frame of unit vectors per node of conditions.
+
+    It is orthonormal unless the node has oblique directions.
 
     Attributes: numbers: (k,) nodes; blocks: (k, d, d) frames Q, vectors as columns; turns: (k, d,
         d) Q⁻ᵀ. place, column: (m,) node and column of each condition; double: (k,) nodes with
@@ -111,8 +116,9 @@ class NodalFrames:
         self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
 
     def own_vectors(self) -> Mask:
-        """Return which vectors (m, d) of its node belong to each condition: its direction, and
-        those that rub.
+        """Return which vectors (m, d) of its node belong to each condition.
+
+        They are its direction, and those that rub.
         """
         m, d = self.place.size, self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
@@ -150,16 +156,18 @@ class NodalFrames:
 
 
 def snapped(directions: Array) -> Array:
-    """Turn directions to an axis where they are along it to round-off: axis-aligned walls stay
-    unrotated.
+    """Turn directions to an axis where they are along it to round-off.
+
+    Axis-aligned walls stay unrotated.
     """
     snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
 
 
 def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
-    """Return what makes the frames of conditions: numbers and points of their nodes, directions,
-    held components.
+    """Return what makes the frames of conditions.
+
+    This is numbers and points of their nodes, directions, held components.
     """
     nodes = joined_nodes([part.nodes for part in parts])
     return (
@@ -210,8 +218,9 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
 
 
 def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
-    """The identity but for the blocks of contact nodes (T, or T⁻ᵀ); None when all are the identity
-    too. Collective.
+    """Return the identity but for the blocks of contact nodes (T, or T⁻ᵀ). Collective.
+
+    It is None when all blocks are the identity too.
     """
     n = len(space.ids)
     if not largest(space.comm, np.any(blocks != np.eye(space.dimension))):
@@ -230,8 +239,10 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
 def _coupling(
     space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
 ) -> Matrix | None:
-    """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj
-    u_j + sum_k P_sk e_k).
+    """Return R with û = R ǔ.
+
+    To the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk
+    e_k).
 
     At nodes with several conditions each one's own vectors only are relative to what it faces.
     """
@@ -297,7 +308,9 @@ def _faced(
 
 
 def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
-    """InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another: R⁻¹ = 2
+    """Raise InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another.
+
+    R⁻¹ = 2
     - R needs them apart. Collective.
     """
     coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles]

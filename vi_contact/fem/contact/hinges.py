@@ -1,5 +1,6 @@
-"""Find nodes at which two bodies hang together by a point, or by a line in space: a contact is
-glued there.
+"""Find nodes at which two bodies hang together by a point, or by a line in space.
+
+A contact is glued there.
 
 Bodies that are drawn between the same corner points share these nodes, although each has sides of
 its own. The tip of a crack is a shared node too, but there the material goes on: its cells hang
@@ -81,8 +82,9 @@ def hinges_of(space: FemSpace, nodes: Nodes) -> Mask:
 
 
 def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
-    """Raise InputError for hinges at these points (k, d), ordered, if there are any; ``names``: of
-    the boundaries.
+    """Raise InputError for hinges at these points (k, d), if there are any.
+
+    The points are ordered; ``names`` are those of the boundaries.
     """
     if not len(points):
         return

@@ -27,9 +27,10 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Nodes(Rows):
-    """Hold nodes of a boundary, those of this rank or all: original numbers, coordinates, body
-    normals, weights, held components, and the numbers over all ranks of their free unknowns, -1 for
-    held ones.
+    """Hold nodes of a boundary, those of this rank or all.
+
+    This is original numbers, coordinates, body normals, weights, held components, and the numbers
+    over all ranks of their free unknowns, -1 for held ones.
     """
 
     numbers: Indices
@@ -48,8 +49,9 @@ def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
 
 
 def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
-    """Return the nodes of all ranks on every rank, by their numbers: about 90 bytes for each in
-    space. Collective.
+    """Return the nodes of all ranks on every rank, by their numbers. Collective.
+
+    It takes about 90 bytes for each in space.
     """
     found = joined_nodes(from_each(comm, nodes))
     return found.pick(np.argsort(found.numbers))

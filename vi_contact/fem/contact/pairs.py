@@ -1,5 +1,6 @@
-"""Make contact between two deformable bodies: the unknowns of side 1 become displacements relative
-to side 2.
+"""Make contact between two deformable bodies.
+
+The unknowns of side 1 become displacements relative to side 2.
 
 Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s
 = Q_sᵀ u_s, the unknowns û of the nodal frames are written in new ones ǔ,
@@ -57,8 +58,9 @@ def contact_pair(
     feature_angle: float = FEATURE_ANGLE,
     hinges: bool = False,
 ) -> ContactSurface:
-    """Make the contact conditions between two boundaries of deformable bodies, or two faces of a
-    crack.
+    """Make the contact conditions between two deformable boundaries.
+
+    They are those of two bodies, or two faces of a crack.
 
     Each node of side 1 has a condition, with the normals, weights (times the section's thickness)
     and forces of side 1; r_n / weights is the pressure. Either side may be the first. Pressures are
@@ -230,8 +232,9 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 
 def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
-    """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers
-    of those in front of side 2, and of those that are clamped.
+    """Return kind -> mask of the nodes of side 1 without a condition.
+
+    ``opposite``, ``clamped``: numbers of those in front of side 2, and of those that are clamped.
     """
     numbers = one.nodes.numbers
     return {
@@ -273,8 +276,9 @@ def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
 def _watched(
     space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
-    """What watches nodes of side 1, given of all ranks, that are held in every component in front
-    of others that are. Collective.
+    """Return what watches nodes of side 1 that are held in every component. Collective.
+
+    They are given of all ranks, and in front of others that are held so too.
     """
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
     nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
@@ -292,8 +296,9 @@ def _watched(
 def _borrowed(
     space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
-    """What nodes of side 1 without a pressure of their own take of neighbours, not those in front
-    of nothing.
+    """Return what nodes of side 1 without a pressure of their own take of neighbours.
+
+    Those in front of nothing are left out.
     """
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
@@ -302,8 +307,10 @@ def _borrowed(
 
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
-    """Return which nodes of side 1 only glue bodies together; InputError unless they are
-    ``allowed``. Collective.
+    """Return which nodes of side 1 only glue bodies together. Collective.
+
+    Raises:
+        InputError: there are some, and they are not ``allowed``.
     """
     numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
@@ -319,9 +326,10 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
 
 
 def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all
-    components; of several, as where ties meet, the nearest; -1 for others. They cannot part, as the
-    two sides of a weld.
+    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied.
+
+    They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
+    They cannot part, as the two sides of a weld.
     """
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):
@@ -349,8 +357,9 @@ def _refuse_common(one: Side, two: Side) -> None:
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1, with normals and weights of their own, and the nodes' over
-    the whole side.
+    """Return the smooth faces of side 1, with normals and weights of their own.
+
+    The nodes' normals and weights over the whole side are returned too.
     """
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
@@ -380,8 +389,9 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
 def _by_face(
     faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
-    """(nodes with the normals and weights of their faces, what they face), ordered by number;
-    ``carried`` are numbers of nodes then.
+    """Return (nodes with the normals and weights of their faces, what they face).
+
+    They are ordered by number; ``carried`` are numbers of nodes then.
 
     Faces in front of nothing are left out where the matching leaves out parts of sides, unless all
     are.
@@ -419,9 +429,11 @@ def _by_face(
 
 
 def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
-    """What a face of side 1 faces: along its own normals or, since across a gap the partner of a
-    corner lies on the bisector, along the ``mean`` normals of its nodes; not where a matching
-    leaves out what faces nothing: sides of a block would see the ground beside its base.
+    """Return what a face of side 1 faces.
+
+    It is sought along its own normals or, since across a gap the partner of a corner lies on the
+    bisector, along the ``mean`` normals of its nodes. This is not so where a matching leaves out
+    what faces nothing: sides of a block would see the ground beside its base.
     """
     try:
         return matching.match(side, two, size)
@@ -436,8 +448,10 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 
 def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Return what is matched and not clamped; InputError for clamped nodes facing free ones, or
-    with none left.
+    """Return what is matched and not clamped.
+
+    Raises:
+        InputError: clamped nodes face free ones, or none are left.
     """
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
@@ -461,8 +475,9 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
 def _gap(
     space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
-    """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of
-    polygons count as 0.
+    """Return initial gaps n·(P x_2 - x_1) >= 0.
+
+    Overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0.
     """
     gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)

@@ -31,8 +31,9 @@ class Surface:
 
 
 def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int) -> Mask:
-    """Return in front of which facets at a node of side 1 (m,) the facets at its partner lie, seen
-    along the normal.
+    """Return in front of which facets at a node of side 1 (m,) those at its partner lie.
+
+    They are seen along the normal.
     """
     frame = nodal_frames(normal[None])[0][:, 1:]
     ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
@@ -70,8 +71,9 @@ def one_of(
 
 
 def _within(ways: Array, arm: Array) -> Mask:
-    """Return which directions (m, d - 1) lie in the corner of a facet whose nodes are seen at
-    ``arm`` (v, d - 1).
+    """Return which directions (m, d - 1) lie in the corner of a facet.
+
+    The nodes of the facet are seen at ``arm`` (v, d - 1).
     """
     length = np.linalg.norm(arm, axis=1)
     seen = length > FLAT * length.max(initial=0.0)

@@ -1,5 +1,6 @@
-"""Watch the nodes of a contact boundary that are prescribed in every component, and so have no
-condition.
+"""Watch the nodes of a contact boundary that have no condition.
+
+They are prescribed in every component.
 
 Where they are depends on the time alone. The gap of such a node s with the direction n, in front of
 nodes j that are prescribed too,
@@ -27,10 +28,11 @@ ROUND_OFF = 1e-9  # of the largest motion and gap of the nodes
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """Hold nodes of this rank without conditions on the boundary ``name``, their directions (k, d)
-    and gaps (k,), and what they face, on side 2 (``side``); None where that is a rigid obstacle.
-    ``advance``: how far a moving obstacle has come towards them at time t, minus infinity where it
-    is not known.
+    """Hold nodes of this rank without conditions on the boundary ``name``.
+
+    This is their directions (k, d) and gaps (k,), and what they face, on side 2 (``side``); None
+    where that is a rigid obstacle. ``advance``: how far a moving obstacle has come towards them at
+    time t, minus infinity where it is not known.
     """
 
     space: Any
@@ -103,8 +105,9 @@ class Watched:
         )
 
     def _towards(self, t: float) -> tuple[Array, float]:
-        """How far the nodes have moved towards what they face (k,), and the largest displacement
-        [m]. Collective.
+        """Return how far the nodes have moved towards what they face (k,). Collective.
+
+        The largest displacement [m] is returned too.
         """
         space = self.space
         values = np.asarray(space.prescribed_values(t)).reshape(-1, space.dimension)
@@ -137,8 +140,10 @@ def watched_nodes(
 
 
 def clamped_or_prescribed(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, Mask]:
-    """Return kind -> mask (k,) of the nodes in ``mask``, those of this rank, prescribed in every
-    component: those that some condition moves are "prescribed", the others "clamped".
+    """Return kind -> mask (k,) of the nodes in ``mask``.
+
+    They are those of this rank, prescribed in every component: those that some condition moves are
+    "prescribed", the others "clamped".
     """
     moved = np.zeros(len(space.nodes), dtype=bool)
     for one in space.prescribed:

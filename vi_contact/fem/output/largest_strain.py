@@ -15,8 +15,9 @@ from ..space import space_of
 
 
 class LargestStrain:
-    """Record the largest shear strain since the start, and keep that of every cell in ``values``
-    (owned cells,).
+    """Record the largest shear strain since the start.
+
+    That of every cell is kept in ``values`` (owned cells,).
 
     gamma² = 2 dev(eps):dev(eps) of the mean eps of a cell, in the plane of the body or in space: in
     the plane the difference of the principal strains, in simple shear gamma_xy. Strains of the

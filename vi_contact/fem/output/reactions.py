@@ -18,8 +18,9 @@ from .nodal_work import Loads, NodalWork, check_actions
 
 @dataclass
 class Reactions:
-    """Record what a prescribed or absorbing boundary does to its body: force [N] and moment about a
-    centre [N m].
+    """Record what a prescribed or absorbing boundary does to its body.
+
+    It is a force [N] and a moment about a centre [N m].
 
     On the components c of the nodes of the facets that are held, and on all of those with dashpots,
     with the loads f on them, K, C, M of the elements and the absolute acceleration a + a_g:

@@ -1,5 +1,6 @@
-"""Record section forces N, V, M of plane cuts through walls, slabs and columns, along element sides
-or through them.
+"""Record section forces N, V, M of plane cuts through walls, slabs and columns.
+
+The cuts go along element sides or through elements.
 """
 
 import tomllib
@@ -35,8 +36,9 @@ _QUANTITIES = tomllib.loads(
 
 @dataclass
 class SectionForces:
-    """Record the resultants of plane cuts: label -> its ends a, b in the plane, corners a, b, c of
-    a rectangle [m].
+    """Record the resultants of plane cuts.
+
+    A cut is label -> its ends a, b in the plane, corners a, b, c of a rectangle [m].
 
     In the plane e is the unit vector from a to b and n the one to its left, F the force that the
     part on the left exerts through the cut on the part on the right, and c the middle of the cut:
@@ -104,8 +106,9 @@ class SectionForces:
         check_actions("SectionForces", self.loads, self.gravity)
 
     def columns(self) -> Columns:
-        """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2,
-        M_3.
+        """Return the columns N_<label>, V_<label>, M_<label>.
+
+        In space they are N, V_2, V_3, M_t, M_2, M_3.
         """
         return {
             f"{quantity}_{label}": (unit, f"{text}, section {label}")
@@ -136,8 +139,9 @@ class SectionForces:
 
 
 def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
-    """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of
-    a cut (d, d).
+    """Return (unit vectors (d, d), lengths (d - 1,) of the sides) of a cut (d, d).
+
+    The vectors are along the normal and the sides.
     """
     size = np.linalg.norm(corners[1:] - corners[0], axis=1)
     if not size.all():
@@ -155,9 +159,10 @@ def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
 
 
 def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tuple[Rigid, Array]:
-    """Return (what moves on one side of a cut with ends or corners (d, d), the matrix that makes N,
-    V, M, … of its work). InputError, on all ranks, unless the cut goes through all of the group
-    that it reaches. Collective.
+    """Return (what moves on one side of a cut, the matrix that makes N, V, M, … of its work).
+
+    The cut has ends or corners (d, d). Collective. There is an InputError, on all ranks, unless the
+    cut goes through all of the group that it reaches.
 
     The nodes on the cut and behind it move, and the cells before them hold them; the other way
     round where sides of cells lie on the cut behind it only, as at a foot.
@@ -228,8 +233,9 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
 
 class _Trace:
-    """What the plane of a cut leaves in cells, by boxes round it along the sides of the cut, low,
-    high (cells, d - 1).
+    """Hold what the plane of a cut leaves in cells.
+
+    It is held by boxes round it along the sides of the cut, low, high (cells, d - 1).
 
     left, right: cells with vertices before and behind the plane; touches: with a point of the cut;
     beyond: (2 (d - 1), cells) those of them that go on over one of its ends; cover: (3, cells) how
