@@ -31,12 +31,15 @@ class Census:
 
     The places of those that are not plain contact points are held.
 
-    Args: name: the boundary, as the user named it; of a pair, that of side 1. nodes: number of
-        nodes of the boundary on all ranks. points: number of contact conditions on all ranks. A
-        node at an edge has one for each of its faces. places: kind of node -> coordinates (k, d)
-        [m] of all nodes of this kind, on all ranks alike, ordered by node
-            number. A kind says in a few words what became of the node, as in "shared by both
-            sides", "clamped", "prescribed", "in front of nothing", "partly covered".
+    Args:
+        name: the boundary, as the user named it; of a pair, that of side 1.
+        nodes: number of nodes of the boundary on all ranks.
+        points: number of contact conditions on all ranks. A node at an edge has one for each of its
+            faces.
+        places: kind of node -> coordinates (k, d) [m] of all nodes of this kind, on all ranks
+            alike, ordered by node number. A kind says in a few words what became of the node, as in
+            "shared by both sides", "clamped", "prescribed", "in front of nothing", "partly
+            covered".
     """
 
     name: str

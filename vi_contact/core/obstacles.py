@@ -140,11 +140,14 @@ def facing(
     which looks towards the obstacle, and the normals turn from theirs to its own by no more than
     ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
 
-    Args: name: of the boundary, for the sentence. alone: whether these are all its points; some of
-        them only are refused where others might decide.
-    Raises: InputError: other shapes, what are no real numbers, directions of no length, along the
-        boundary or into the
-            body.
+    Args:
+        name: of the boundary, for the sentence.
+        alone: whether these are all its points; some of them only are refused where others might
+            decide.
+
+    Raises:
+        InputError: other shapes, what are no real numbers, directions of no length, along the
+            boundary or into the body.
     """
     owner, m = type(obstacle).__name__, len(points)
     directions = array(

@@ -90,10 +90,13 @@ class FrictionLaw(Protocol):
 
         It is in the unit of ``r_n``.
 
-        Args: r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as
-            zero. weights: tributary lengths times thickness, or areas (m,) [m²]: what turns
-            stresses into forces. scale: of the step: 1 for forces, dt [s] for impulses. A limit
-            that ignores r_n is multiplied by it.
+        Args:
+            r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as
+                zero.
+            weights: tributary lengths times thickness, or areas (m,) [m²]: what turns stresses into
+                forces.
+            scale: of the step: 1 for forces, dt [s] for impulses. A limit that ignores r_n is
+                multiplied by it.
         """
 
     def slope(self, weights: Array) -> Array:
@@ -170,11 +173,13 @@ class ImpactLaw(Protocol):
     ) -> Array:
         """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,).
 
-        Velocities are left alone where ``target`` is NaN.
+        Velocities are left alone where ``target`` is NaN. Collective.
 
-        Args: system: the equations that are marched, whose M says what an impulse does. surface:
-            its contact conditions, ``surface.normal_values(v)`` are the velocities to change. v:
-            the velocity (n,) [m/s] that the step left; not to be written to. Collective.
+        Args:
+            system: the equations that are marched, whose M says what an impulse does.
+            surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to
+                change.
+            v: the velocity (n,) [m/s] that the step left; not to be written to.
         """
 
 
@@ -188,10 +193,13 @@ class MassLaw(Protocol):
 
         It is ``system.changed(M=…, massless=…)``, or ``system`` as it is.
 
-        Args: system: in the rotated basis of ``surface``, every body in its own unknowns, before
-            the excitations. surface: the conditions, whose nodes may lose their inertia
-            (``massless``: True for unknowns without). tangential: whether there is friction: then
-            tangential contact unknowns matter as normal ones do.
+        Args:
+            system: in the rotated basis of ``surface``, every body in its own unknowns, before the
+                excitations.
+            surface: the conditions, whose nodes may lose their inertia (``massless``: True for
+                unknowns without).
+            tangential: whether there is friction: then tangential contact unknowns matter as normal
+                ones do.
 
         Total mass and centre of mass should stay as they are; C and the load follow when inertia is
         moved. Collective.

@@ -56,14 +56,18 @@ class WatchedNodes(Protocol):
 class ContactSurface:
     """Hold the m contact conditions whose unknowns this rank owns, of the ``total`` on all ranks.
 
-    Attributes: comm: the ranks that share the surface. points: (m, d) positions [m]; normals: (m,
-        d) unit contact directions (towards the obstacle). weights: (m,) tributary length [m] times
-        thickness, or area [m²]: pressure = r_n / weights. gap0: (m,) initial gap [m], >= 0.
+    Attributes:
+        comm: the ranks that share the surface.
+        points: (m, d) positions [m].
+        normals: (m, d) unit contact directions (towards the obstacle).
+        weights: (m,) tributary length [m] times thickness, or area [m²]: pressure = r_n / weights.
+        gap0: (m,) initial gap [m], >= 0.
         bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either
-        sign). compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring. owned: (m,)
-        indices in û of the normal unknowns; slots: (m,) the numbers of the conditions among those
-        of all
-            ranks, ascending; they do not depend on the number of ranks.
+            sign).
+        compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring.
+        owned: (m,) indices in û of the normal unknowns.
+        slots: (m,) the numbers of the conditions among those of all ranks, ascending; they do not
+            depend on the number of ranks.
         tangents: (m, d-1) indices in û of the tangential unknowns of the same points; -1 where
             prescribed.
         basis: T with u = T û, the turn into nodal frames, or None when they already point along the

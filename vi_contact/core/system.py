@@ -169,13 +169,16 @@ class SemiDiscreteSystem:
 
     Prescribed displacements are already eliminated into f.
 
-    Attributes: algebra: how its matrices are combined, factorised and reduced over ranks. M, K:
-        consistent mass [kg] and stiffness [N/m] (per thickness of the section), symmetric. C:
-        damping [N s/m] or None. load: f(t) [N]. influence: (n, d) rigid unit translation in each
-        direction, for the inertia load -M r a_g(t). base_mass: (n, d) forces on the unknowns when
-        the prescribed nodes alone are accelerated by one in each
-            direction: the part of the inertia load that comes from mass shared with them. None:
-                left out.
+    Attributes:
+        algebra: how its matrices are combined, factorised and reduced over ranks.
+        M, K: consistent mass [kg] and stiffness [N/m] (per thickness of the section), symmetric.
+        C: damping [N s/m] or None.
+        load: f(t) [N].
+        influence: (n, d) rigid unit translation in each direction, for the inertia load -M r
+            a_g(t).
+        base_mass: (n, d) forces on the unknowns when the prescribed nodes alone are accelerated by
+            one in each direction: the part of the inertia load that comes from mass shared with
+            them. None: left out.
         u0, v0: initial displacement [m] and velocity [m/s].
         space: what the unknowns mean.
         massless: unknowns without inertia (rows and columns of M are zero), None when there are

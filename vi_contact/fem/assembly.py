@@ -73,23 +73,26 @@ def assemble(
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
-    Args: mesh: DOLFINx mesh (``read_mesh``) with cells of first order or, with degree 2, of second
-        order too. degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2
-        (docs/guide/second_order.md). material: LinearElastic, Orthotropic or fem.Heterogeneous, or
-        (cells, material) pairs that cover the mesh. forms: the user's own weak forms,
-        ``fem.Forms``; a material beside them gives the density where they have no
-            mass, and the wave speeds that dashpots and free fields need.
+    Args:
+        mesh: DOLFINx mesh (``read_mesh``) with cells of first order or, with degree 2, of second
+            order too.
+        degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2
+            (docs/guide/second_order.md).
+        material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that
+            cover the mesh.
+        forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
+            where they have no mass, and the wave speeds that dashpots and free fields need.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
-        space: the user's own DOLFINx space V of the displacement, which sets the degree. bcs:
-            ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
+        space: the user's own DOLFINx space V of the displacement, which sets the degree.
+        bcs: ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
             values; where two meet, the last one counts.
-        clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some
-            components.
+        clamped: facets with u = 0.
+        prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts
             as damping.
-        tied: boundaries whose opposite nodes move together; damping: NoDamping() by default,
-            MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or DampingRatio, which alone reads
-            the xi of materials.
+        tied: boundaries whose opposite nodes move together.
+        damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or
+            DampingRatio, which alone reads the xi of materials.
         loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
         base_inertia: whether the inertia load of a ground motion counts the mass that elements
             share with prescribed nodes. True is right for motions relative to the ground; False is
@@ -101,11 +104,12 @@ def assemble(
             cells without a pair start from zero.
         quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with
             parallel sides.
-    Raises: InputError: cells without a material, of an order that does not fit the degree, or
-        folded; NaN in data,
-            components that do not exist, a damping law that damps nothing, ratios xi that no law
-            reads, dashpots on held facets, groups without facets or cells, of another mesh or kind,
-            contradictions.
+
+    Raises:
+        InputError: cells without a material, of an order that does not fit the degree, or folded;
+            NaN in data, components that do not exist, a damping law that damps nothing, ratios xi
+            that no law reads, dashpots on held facets, groups without facets or cells, of another
+            mesh or kind, contradictions.
     """
     if hasattr(mesh, "comm"):
         agree(

@@ -35,18 +35,20 @@ class ElasticForms:
 
     Constants are cellwise: one compiled form serves all materials.
 
-    Attributes: fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and
-        beta: functions of DG0, of DG1
-            where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
-        damping: the law of C, as it was given; largest_ratio: the largest xi of the materials, on
-            all ranks.
-        damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping,
-            cell by cell.
+    Attributes:
+        fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta:
+            functions of DG0, of DG1 where a material changes inside of cells. Lamé constants are
+            NaN in orthotropic cells.
+        damping: the law of C, as it was given.
+        largest_ratio: the largest xi of the materials, on all ranks.
+        damped: whether there is a C.
+        densities: whether ``fields`` tell the mass and its damping, cell by cell.
         materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in
             K, in C = beta K and in stresses (``fem.dilatation``); None otherwise.
-        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what
-            comes from where;
+        tells_stress: whether ``stress`` is known.
+        symmetric: whether all matrices are.
+        notes: what comes from where.
         own_damping: whether the user gave a form of C.
     """
 

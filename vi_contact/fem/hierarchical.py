@@ -38,8 +38,9 @@ class Hierarchy:
 
     Collective, as all it does.
 
-    Attributes: vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H
-        and H⁻¹ = 2 - H.
+    Attributes:
+        vertices: the P1 space, and the owned blocks of ``V`` that its own are.
+        H, back: H and H⁻¹ = 2 - H.
     """
 
     def __init__(self, space: Any) -> None:

@@ -35,15 +35,18 @@ class InitialStrain(ActingLoad):
     what displacements of this degree can follow leaves a free body without stress. Stresses,
     reactions, section forces and the energy ledger go by eps(u) - eps_0, damping by the rates of u.
 
-    Args: value: the strain of all directions, across the plane too, or a tensor, of which the
-        symmetric part counts,
-            (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] ->
-            (k,), (k, d, d) or in the plane (k, 3, 3), which is asked at t = 0 s when a body is
-            assembled. A bar is held sideways: warming then lengthens it by (1 + nu)/(1 - nu) alpha
-            (T - T_0); nu = 0 is a bar with free sides.
-        history: factor s(t) of the value at t = 0 s; cells: the part of the body that is strained.
-    Raises: InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not
-        tell C.
+    Args:
+        value: the strain of all directions, across the plane too, or a tensor, of which the
+            symmetric part counts, (d, d) or in the plane (3, 3); or a function of points (k, d) [m]
+            and the time [s] -> (k,), (k, d, d) or in the plane (k, 3, 3), which is asked at t = 0 s
+            when a body is assembled. A bar is held sideways: warming then lengthens it by (1 +
+            nu)/(1 - nu) alpha (T - T_0); nu = 0 is a bar with free sides.
+        history: factor s(t) of the value at t = 0 s.
+        cells: the part of the body that is strained.
+
+    Raises:
+        InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell
+            C.
     """
 
     # the value as it is given

@@ -34,19 +34,20 @@ class LinearForm:
     gradients of v and Measures with the user's own MeshTags: LinearForm(lambda v: ufl.inner(g, v) *
     ds(3)).
 
-    Args: form: called once, with a test function of the displacement's space. history: factor f(t)
-        of the form, which is assembled once, as it is without one; t in seconds. update: function
-        of the time alone that sets Constants and Functions of the form to their values at t, on
-        every
-            rank (``f.x.scatter_forward()`` where it writes to arrays). The form is then assembled
-            anew at every time
-            that a step asks for: one sweep over its cells or facets, where a history costs one
-            vector update. Whether a restart goes on with the same update is looked at in the first
-            steps only.
-    Raises: InputError: history and update together; from ``assemble``, on all ranks: what is no
-        linear form in v on this
-            mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an
-            error.
+    Args:
+        form: called once, with a test function of the displacement's space.
+        history: factor f(t) of the form, which is assembled once, as it is without one; t in
+            seconds.
+        update: function of the time alone that sets Constants and Functions of the form to their
+            values at t, on every rank (``f.x.scatter_forward()`` where it writes to arrays). The
+            form is then assembled anew at every time that a step asks for: one sweep over its cells
+            or facets, where a history costs one vector update. Whether a restart goes on with the
+            same update is looked at in the first steps only.
+
+    Raises:
+        InputError: history and update together; from ``assemble``, on all ranks: what is no linear
+            form in v on this mesh; from ``assemble`` and in steps: NaN or infinite forces, an
+            update that ends in an error.
     """
 
     form: Callable[[Any], Any]

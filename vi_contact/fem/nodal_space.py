@@ -22,14 +22,18 @@ class NodalSpace:
 
     Every rank owns some of the nodes.
 
-    Attributes: algebra: of the matrices of its systems; comm: its ranks; dimension: d; size:
-        diagonal of the bounding box [m]. nodes: (k,) numbers of the owned nodes; points: their
-        coordinates (k, d) [m]. free_index: (k d,) the owned unknown that a component is, -1 where
-        it is none; numbers: (k, d) the same among
-            those of all ranks, also of a component that follows another; held: (k, d) components
-            that are given.
-        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how
-            many on all ranks.
+    Attributes:
+        algebra: of the matrices of its systems.
+        comm: its ranks.
+        dimension: d.
+        size: diagonal of the bounding box [m].
+        nodes: (k,) numbers of the owned nodes.
+        points: their coordinates (k, d) [m].
+        free_index: (k d,) the owned unknown that a component is, -1 where it is none.
+        numbers: (k, d) the same among those of all ranks, also of a component that follows another.
+        held: (k, d) components that are given.
+        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component).
+        unknowns: how many on all ranks.
     """
 
     algebra: Algebra

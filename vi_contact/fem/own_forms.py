@@ -32,17 +32,20 @@ class Forms:
     multiplied by that of the section. What they hold must keep its values while the system is used:
     reactions and section forces integrate them again.
 
-    Args: stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for
-        Volume() and Lemke(). mass: the form of M [kg], symmetric and positive; None: the density of
-        ``assemble(…, material)``. damping: the form of C [N s/m]; None: that of ``assemble(…,
-        damping=)``, Rayleigh on these M and K, or
-            KelvinVoigt; both add up.
+    Args:
+        stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for Volume()
+            and Lemke().
+        mass: the form of M [kg], symmetric and positive; None: the density of ``assemble(…,
+            material)``.
+        damping: the form of C [N s/m]; None: that of ``assemble(…, damping=)``, Rayleigh on these M
+            and K, or KelvinVoigt; both add up.
         stress: u -> stress tensor [Pa], (d, d), or in the plane (3, 3) with sigma_zz; von Mises
             stresses and stresses as Functions need it.
-    Raises: InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms
-        that are not bilinear in
-            u and v or on another mesh, masses that are not positive, and entries that are not
-            finite.
+
+    Raises:
+        InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms that
+            are not bilinear in u and v or on another mesh, masses that are not positive, and
+            entries that are not finite.
     """
 
     stiffness: Bilinear

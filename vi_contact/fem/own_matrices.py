@@ -55,9 +55,9 @@ def system_from_arrays(
     impact law, friction, solvers, static stages, ``Energy``, ``Contact``, ``Probe``, checkpoints,
     ``fem.XDMF``. Bodies are what K joins.
 
-    Args: M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None;
-        stiffness [N/m]. C and
-            K that are not symmetric are for Volume() and Condensed(Lemke()).
+    Args:
+        M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None;
+            stiffness [N/m]. C and K that are not symmetric are for Volume() and Condensed(Lemke()).
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
         unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no
             displacement of a point (a rotation); None: row node * d + c is component c of the node.
@@ -67,9 +67,11 @@ def system_from_arrays(
         load: f, a Load or (n,) constant forces [N]; histories also by ``system.with_load``. Ground
             motion acts on the unit translation of all displacements.
         u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
-    Raises: InputError: matrices that are not real, finite, square and of one size, M that is not
-        symmetric or has masses
-            below zero; coordinates, unknowns or vectors that do not fit them.
+
+    Raises:
+        InputError: matrices that are not real, finite, square and of one size, M that is not
+            symmetric or has masses below zero; coordinates, unknowns or vectors that do not fit
+            them.
     """
     matrices = {
         name: _serial(name, A)
@@ -229,9 +231,10 @@ class MatrixSpace(NodalSpace):
 
     Each is a component of a node, or no displacement of a point.
 
-    Attributes: coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1
-        for what is no displacement;
-            bodies: (n,) body of each.
+    Attributes:
+        coordinates: (n, d) position of the node of each unknown [m].
+        component: (n,), -1 for what is no displacement.
+        bodies: (n,) body of each.
     """
 
     def __init__(

@@ -39,12 +39,16 @@ def system_from_matrices(
     and coordinates: where it changes with the number of ranks, as that of DOLFINx does,
     ``system.space.find_nodes`` finds them, and restarts keep that number.
 
-    Args: M, C, K: AIJ matrices of one layout; M also a Vec or (n,) where lumped, C may be None.
+    Args:
+        M, C, K: AIJ matrices of one layout; M also a Vec or (n,) where lumped, C may be None.
         coordinates: (nodes of this rank, d) [m], or a DOLFINx function space of displacements, of
-        any degree. unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each
-        of its rows. clamped: its rows that stand still, counted from 0 on every rank.
-    Raises: InputError: matrices of another type, layout or communicator; what
-        ``system_from_arrays`` refuses.
+            any degree.
+        unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each of its rows.
+        clamped: its rows that stand still, counted from 0 on every rank.
+
+    Raises:
+        InputError: matrices of another type, layout or communicator; what ``system_from_arrays``
+            refuses.
     """
     given = {
         "coordinates": coordinates,

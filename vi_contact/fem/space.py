@@ -108,16 +108,19 @@ class FemSpace(NodalSpace):
     "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations
     solve for.
 
-    Attributes: V: the DOLFINx function space, the user's if given; dimension d; free: (owned full,)
-        mask of free components. held, tied: (owned nodes, d) masks of components that are
-        prescribed, or follow those of another node;
-            tied_nodes: numbers of all nodes that move together with another, on every rank.
+    Attributes:
+        V: the DOLFINx function space, the user's if given; dimension d.
+        free: (owned full,) mask of free components.
+        held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of
+            another node.
+        tied_nodes: numbers of all nodes that move together with another, on every rank.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
             -1 where held.
         degree: 1 for P1 and Q1, 2 for P2 and Q2.
         nodes: numbers of the nodes of the owned blocks, those of the mesh (``fem.numbering``: of
-            mid-points too); points: their coordinates (k, d); node_of_block: the numbers, those of
-            ghosts too.
+            mid-points too).
+        points: their coordinates (k, d).
+        node_of_block: the numbers, those of ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
     """

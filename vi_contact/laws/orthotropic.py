@@ -30,15 +30,20 @@ class Orthotropic:
 
     with i != j: nu_ij is the contraction along j under a stress along i alone.
 
-    Args: E1, E2, E3: Young's moduli [Pa] > 0; G12, G13, G23: shear moduli [Pa] > 0; rho: mass
-        density [kg/m³] > 0. nu12, nu13, nu23: Poisson's ratios. axes: the angle [rad] from x to
-        axis 1, anticlockwise about z, which is axis 3; or a rotation matrix (3, 3)
-            whose columns are the axes 1, 2, 3. A body in the plane needs z among the axes.
+    Args:
+        E1, E2, E3: Young's moduli [Pa] > 0.
+        G12, G13, G23: shear moduli [Pa] > 0.
+        rho: mass density [kg/m³] > 0.
+        nu12, nu13, nu23: Poisson's ratios.
+        axes: the angle [rad] from x to axis 1, anticlockwise about z, which is axis 3; or a
+            rotation matrix (3, 3) whose columns are the axes 1, 2, 3. A body in the plane needs z
+            among the axes.
         xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads
             it.
-    Raises: InputError: a modulus or density that is not positive, ratios with which some strain
-        would have negative energy,
-            axes that are no rotation.
+
+    Raises:
+        InputError: a modulus or density that is not positive, ratios with which some strain would
+            have negative energy, axes that are no rotation.
     """
 
     E1: float

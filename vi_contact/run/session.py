@@ -60,11 +60,15 @@ class Session:
 
     This is what of the arguments of ``simulate`` holds for all of it, and where it is.
 
-    Attributes: recorders: the user's, after those of every run. wall_time: when the process has to
-        have ended. table: the rows so far. step_plan: the base steps. place: the end of the last
-        base step. loop: its steps, where others have them too. resumed_from: the step of the
-        checkpoint that it continues, None
-            for a new run. stopped: in words, when the callback has asked for the end.
+    Attributes:
+        recorders: the user's, after those of every run.
+        wall_time: when the process has to have ended.
+        table: the rows so far.
+        step_plan: the base steps.
+        place: the end of the last base step.
+        loop: its steps, where others have them too.
+        resumed_from: the step of the checkpoint that it continues, None for a new run.
+        stopped: in words, when the callback has asked for the end.
     """
 
     method: Method

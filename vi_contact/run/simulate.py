@@ -61,10 +61,10 @@ def simulate(
 
     Collective; every rank gets the solution.
 
-    Args: scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
-        Zienkiewicz-Wood-Taylor
-            step. A problem that names no mass matrix gets the one of the scheme
-            (``run.method.with_defaults``).
+    Args:
+        scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
+            Zienkiewicz-Wood-Taylor step. A problem that names no mass matrix gets the one of the
+            scheme (``run.method.with_defaults``).
         solver: None means Automatic().
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and
             checkpoint_every count base steps.
@@ -83,8 +83,8 @@ def simulate(
             if problem, dt or scheme differ from the checkpoint.
         changed: True continues even if they differ; after a change of dt, ``steps`` count from the
             checkpoint.
-        progress: show a progress line on a terminal. fields: fem.XDMF(every=10) writes frames for
-            ParaView.
+        progress: show a progress line on a terminal.
+        fields: fem.XDMF(every=10) writes frames for ParaView.
         cross_check: a solver whose report() goes into the summary.
         wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends
             before it is over.
@@ -93,12 +93,14 @@ def simulate(
             are read-only. If it returns True on some rank, the run ends with this base step, with a
             checkpoint and status "stopped". If it raises an error, the run ends with an InputError
             that says where, on all ranks and with a checkpoint.
-    Raises: InputError: before anything is computed or overwritten; also when another run writes
-        into the folder. Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM
-        or SIGHUP, with a checkpoint. OutOfTime: before the wall time is over, with a checkpoint.
-        StepFailure: no solver could certify a step. ViContactError: the disk refused to read or
-        write. All that was
-            computed is then in the folder, and summary.json says why the run ended.
+
+    Raises:
+        InputError: before anything is computed or overwritten; also when another run writes into
+            the folder. Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM
+            or SIGHUP, with a checkpoint. OutOfTime: before the wall time is over, with a
+            checkpoint. StepFailure: no solver could certify a step. ViContactError: the disk
+            refused to read or write. All that was computed is then in the folder, and summary.json
+            says why the run ended.
     """
     with opened(**locals()) as (session, writer):
         return session.go(writer)

@@ -29,11 +29,15 @@ CREATED = (
 class Solution:
     """Hold the result of ``simulate``.
 
-    Attributes: history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial
-        state. columns: column -> (unit, meaning). state: the final state in the basis of the nodal
-        frames (``problem.cartesian`` turns it back). facts: the contents of summary.json; the times
-        of a step are medians in seconds, nan without steps. problem: the solved problem, with the
-        mass matrix that the scheme chose. folder: the run folder, or None.
+    Attributes:
+        history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial state.
+        columns: column -> (unit, meaning).
+        state: the final state in the basis of the nodal frames (``problem.cartesian`` turns it
+            back).
+        facts: the contents of summary.json; the times of a step are medians in seconds, nan without
+            steps.
+        problem: the solved problem, with the mass matrix that the scheme chose.
+        folder: the run folder, or None.
     """
 
     history: Mapping[str, Array]

@@ -56,8 +56,9 @@ def static_equilibrium(
     Free rigid motions that no load drives keep the mean position of u0 (see ``proximal``). If
     ``solver`` is None, it is Automatic().
 
-    Raises: InputError: the loads drive a rigid motion that nothing stops, so that there is no
-        equilibrium. StepFailure: no answer has a certificate below the tolerance.
+    Raises:
+        InputError: the loads drive a rigid motion that nothing stops, so that there is no
+            equilibrium. StepFailure: no answer has a certificate below the tolerance.
     """
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
@@ -170,14 +171,17 @@ def quasi_static(
     error is that of implicit Euler). K is factorised once. Prescribed motions should have no
     velocity and acceleration: their C U' + M U'' are loads.
 
-    Args: solver: Automatic() when None. times: increasing, none before ``state.t``; the loads are
-        taken there, excitations are not. state: where the history starts, from
-        ``static_equilibrium`` or an earlier history; u0 at t = 0 without
-            reactions when None. A body pressed without friction first: the state of that problem.
-    Raises: InputError: times that do not increase; friction that depends on the slip rate; loads
-        that drive a rigid motion
-            which nothing stops.
-        StepFailure: no answer below the certificate tolerance.
+    Args:
+        solver: Automatic() when None.
+        times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
+        state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t
+            = 0 without reactions when None. A body pressed without friction first: the state of
+            that problem.
+
+    Raises:
+        InputError: times that do not increase; friction that depends on the slip rate; loads that
+            drive a rigid motion which nothing stops. StepFailure: no answer below the certificate
+            tolerance.
     """
     check_problem_given("quasi_static", problem)
     if isinstance(times, Iterable) and not isinstance(times, str | bytes):

@@ -47,9 +47,11 @@ from .consistent_data import ROUND_OFF
 class MoreauJean(SingleStep):
     """Step by the module's equations.
 
-    Attributes: theta: weight of the end of the step, from ½ to 1/(1 + e). e: restitution
-        coefficient of the contact nodes, from 0 to 1. allow_energy_gain: accept any theta from ½ to
-        1, and use Newton's law for points that separate too.
+    Attributes:
+        theta: weight of the end of the step, from ½ to 1/(1 + e).
+        e: restitution coefficient of the contact nodes, from 0 to 1.
+        allow_energy_gain: accept any theta from ½ to 1, and use Newton's law for points that
+            separate too.
 
     InputError for numbers outside these ranges.
     """

@@ -99,9 +99,10 @@ class Problem:
     along a straight line, of which the share ``left`` is still to come: 0.0 where the conditions
     are met.
 
-    Attributes: constant: whether J is the same at every u, so that the problem is linear. given:
-        the values of u before the first step (of a part of the change, see ``aim``), those of
-        ghosts too.
+    Attributes:
+        constant: whether J is the same at every u, so that the problem is linear.
+        given: the values of u before the first step (of a part of the change, see ``aim``), those
+            of ghosts too.
     """
 
     def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:

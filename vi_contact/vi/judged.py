@@ -21,10 +21,11 @@ SMALL = 1e-6
 class Judged:
     """Hold what is known at the present u of a problem; arrays are of its free unknowns.
 
-    Attributes: x, F: the free unknowns and the residual F(u; phi_i) at u. A, b: the linear problem
-        about u, F(u) + J (x_new - x) = A x_new - b. Where held unknowns are not yet at their
-            prescribed values (``left``), b moves them there: F in it has ``gain``, what F gains by
-                that.
+    Attributes:
+        x, F: the free unknowns and the residual F(u; phi_i) at u.
+        A, b: the linear problem about u, F(u) + J (x_new - x) = A x_new - b. Where held unknowns
+            are not yet at their prescribed values (``left``), b moves them there: F in it has
+            ``gain``, what F gains by that.
         left: the share of the change of the held unknowns that is still to come.
         diagonal: sizes of the diagonal entries of A, none of them zero.
         push: the multipliers (lower, upper), zero where the bound does not act.

@@ -39,10 +39,14 @@ LEAST_WEIGHT = 0.25  # of the weight that a node has without what it carries
 class Covered:
     """Hold what is covered of the k facets of side 1 in front of which something lies.
 
-    Attributes: facets: (k, v) their nodes; middles: (k, d) middles of their covered parts. weights,
-        full: (k, v) integrals of the functions of their nodes, over the covered part and over all
-        of it. inside: (k, v) nodes that are in front of side 2 themselves; parts: (k,) covered
-        shares of the facets. common: (m,) nodes of side 1 that are nodes of side 2 too.
+    Attributes:
+        facets: (k, v) their nodes.
+        middles: (k, d) middles of their covered parts.
+        weights, full: (k, v) integrals of the functions of their nodes, over the covered part and
+            over all of it.
+        inside: (k, v) nodes that are in front of side 2 themselves.
+        parts: (k,) covered shares of the facets.
+        common: (m,) nodes of side 1 that are nodes of side 2 too.
     """
 
     facets: Indices

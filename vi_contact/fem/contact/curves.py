@@ -37,8 +37,10 @@ def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
     feature angle; H is the fit of normals to nodes. Facets at the rim of a face see half of the
     turning only, so that theirs is doubled.
 
-    Args: corners: (k, v, d) of the facets; facets: (k, v) their nodes; normals: (k, d) outward unit
-        normals.
+    Args:
+        corners: (k, v, d) of the facets.
+        facets: (k, v) their nodes.
+        normals: (k, d) outward unit normals.
     """
     nodal, rim = _nodal_normals(facets, normals)
     x = corners - corners.mean(axis=1, keepdims=True)
@@ -51,8 +53,10 @@ def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
 def left_out(H: Array, weights: Array, corners: Array) -> Array:
     """Return q (k, p): twice the distance of a curved face from a facet, at points.
 
-    Args: H: (k, d, d); weights: (k, p, v) shape functions at the points; corners: (k, v, d) of the
-        facet.
+    Args:
+        H: (k, d, d).
+        weights: (k, p, v) shape functions at the points.
+        corners: (k, v, d) of the facet.
     """
     x = corners - corners.mean(axis=1, keepdims=True)
     nodal = np.einsum("kvi,kij,kvj->kv", x, H, x)
@@ -67,9 +71,10 @@ def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) ->
 
     This is the most at their points, with the margin.
 
-    Args: H: (k, d, d) of side 2 at each piece; one, two: shape functions (k, p, v) at the points
-        and corners (k, v, d) of
-            the facets of side 1 and side 2.
+    Args:
+        H: (k, d, d) of side 2 at each piece.
+        one, two: shape functions (k, p, v) at the points and corners (k, v, d) of the facets of
+            side 1 and side 2.
     """
     delta = 0.5 * (left_out(H, *two) - left_out(H, *one))
     return np.asarray(MARGIN * np.abs(delta).max(axis=1, initial=0.0))

@@ -39,9 +39,11 @@ NAMED = 4  # corners that the log names
 class Boundary:
     """Hold facets of a group, the same on every rank in the order of the numbers of their nodes.
 
-    Attributes: vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, v,
-        d) outward there, unit ones. local: this rank's facets of the group; place: their numbers
-        among the k.
+    Attributes:
+        vertices: (k, v) numbers of their nodes, mid-points too, ascending.
+        normals: (k, v, d) outward there, unit ones.
+        local: this rank's facets of the group.
+        place: their numbers among the k.
     """
 
     vertices: Indices

@@ -79,14 +79,19 @@ class NodalFrames:
 
     It is orthonormal unless the node has oblique directions.
 
-    Attributes: numbers: (k,) nodes; blocks: (k, d, d) frames Q, vectors as columns; turns: (k, d,
-        d) Q⁻ᵀ. place, column: (m,) node and column of each condition; double: (k,) nodes with
-        several conditions. oblique: whether some node has directions that are not at right angles.
+    Attributes:
+        numbers: (k,) nodes.
+        blocks: (k, d, d) frames Q, vectors as columns.
+        turns: (k, d, d) Q⁻ᵀ.
+        place, column: (m,) node and column of each condition.
+        double: (k,) nodes with several conditions.
+        oblique: whether some node has directions that are not at right angles.
         rubs: (m, d-1) tangential vectors that belong to each condition; what a node with several of
-        them has left, the
-            direction of the edge in space, belongs to the first.
-    Raises: InputError: a contact direction that is partly prescribed; directions of one node that
-        depend on one another.
+            them has left, the direction of the edge in space, belongs to the first.
+
+    Raises:
+        InputError: a contact direction that is partly prescribed; directions of one node that
+            depend on one another.
     """
 
     def __init__(self, numbers: Indices, points: Array, directions: Array, held: Mask) -> None:

@@ -27,9 +27,10 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     the first of them: name the surface that carries the body first. A node of side 2 of a pair may
     touch an obstacle, but not be on side 1 of another pair.
 
-    Raises: InputError: surfaces of different systems; directions of a node that are parallel (a
-        boundary or a pair listed
-            twice) or depend on one another; a node on side 1 of one pair and side 2 of another.
+    Raises:
+        InputError: surfaces of different systems; directions of a node that are parallel (a
+            boundary or a pair listed twice) or depend on one another; a node on side 1 of one pair
+            and side 2 of another.
     """
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if (

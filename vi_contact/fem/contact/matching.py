@@ -59,11 +59,13 @@ def common_nodes(one: Side, two: Side) -> Indices:
 class Matched:
     """Hold the m nodes of side 1 that face side 2.
 
-    Attributes: rows: their rows among those of side 1; P: (m, nodes of side 2). weights: (m,) of
-        their shares of the interface [m] or [m²]. overlap: (m,) by how much the sides may overlap
-        there [m] and count as touching. covered: (m,) share of the facets around a node that is in
-        front of side 2, where the node itself is not; 1 for
-            all others, and by default.
+    Attributes:
+        rows: their rows among those of side 1.
+        P: (m, nodes of side 2).
+        weights: (m,) of their shares of the interface [m] or [m²].
+        overlap: (m,) by how much the sides may overlap there [m] and count as touching.
+        covered: (m,) share of the facets around a node that is in front of side 2, where the node
+            itself is not; 1 for all others, and by default.
         carried: rows of further nodes whose shares those of others contain, so that they have no
             condition.
     """

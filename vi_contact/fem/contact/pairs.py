@@ -80,15 +80,18 @@ def contact_pair(
     on several of them has one condition for each, as if every face were a pair of its own, joined
     by ``joined_surfaces``.
 
-    Args: matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
+    Args:
+        matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in
-        this order. feature_angle: angle [rad]; facets around a node that turn by less from one
-        another are one smooth face. hinges: True where bodies may hang together by nodes of these
-        boundaries, as by a pin.
-    Raises: InputError: nodes that only glue two bodies together, sides that do not pair or do not
-        face each other, bodies
-            that overlap, sides of one and the same boundary, contact directions that are partly
-            prescribed, clamped nodes that face free ones.
+            this order.
+        feature_angle: angle [rad]; facets around a node that turn by less from one another are one
+            smooth face.
+        hinges: True where bodies may hang together by nodes of these boundaries, as by a pin.
+
+    Raises:
+        InputError: nodes that only glue two bodies together, sides that do not pair or do not face
+            each other, bodies that overlap, sides of one and the same boundary, contact directions
+            that are partly prescribed, clamped nodes that face free ones.
     """
     space, angle = _checked_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)

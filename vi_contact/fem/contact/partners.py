@@ -55,9 +55,9 @@ def one_of(
 ) -> int:
     """Return which of several partners a node of side 1 faces; -1 where no single one is right.
 
-    Args: partners: (k,) places on side 2, of nodes that face this one. The first is taken where
-        none has a facet in front
-            of one of side 1, as where bodies meet at a corner only.
+    Args:
+        partners: (k,) places on side 2, of nodes that face this one. The first is taken where none
+            has a facet in front of one of side 1, as where bodies meet at a corner only.
         apart: (k,) their distances [m]; partners that differ by up to ``close`` [m] are at one
             place.
     """

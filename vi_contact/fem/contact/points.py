@@ -39,21 +39,25 @@ def contact_points(
     All ranks give the same. Nodes at which the normal is oblique get frames of their own, and
     tangents for friction.
 
-    Args: system: of ``system_from_arrays`` or ``fem.system_from_matrices``, whose numbers of nodes
-        count. nodes: (m,) numbers; a node that is listed with several normals has a condition for
-        each of these. normals: (m, d), or (d,) for all, from the body to what it may touch, of any
-        length. weights: (m,) or one for all: the length times thickness [m²], or area, of each, so
-        that r_n / weight is a
-            pressure. None: 1, what is called a pressure then is the force in newtons.
+    Args:
+        system: of ``system_from_arrays`` or ``fem.system_from_matrices``, whose numbers of nodes
+            count.
+        nodes: (m,) numbers; a node that is listed with several normals has a condition for each of
+            these.
+        normals: (m, d), or (d,) for all, from the body to what it may touch, of any length.
+        weights: (m,) or one for all: the length times thickness [m²], or area, of each, so that r_n
+            / weight is a pressure. None: 1, what is called a pressure then is the force in newtons.
         gap0: (m,) or one for all, the initial gap [m], >= 0. None: zero, or what lies between node
             and opposite node.
         obstacle: HalfSpace(…), AnalyticGap(…) or another, which says contact directions and gaps
             instead.
         opposite: (m,) numbers of nodes of another body, each of which the node faces: the gap is
             gap0 - (u - u_opp)·n.
-    Raises: InputError: a system of another kind, nodes that do not exist, normals of no length or
-        along components that
-            stand still, gaps below zero, directions of one node that depend on one another.
+
+    Raises:
+        InputError: a system of another kind, nodes that do not exist, normals of no length or along
+            components that stand still, gaps below zero, directions of one node that depend on one
+            another.
     """
     instance(
         OWNER,

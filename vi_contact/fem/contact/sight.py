@@ -84,10 +84,12 @@ def facets_of(side: Side, sense: int) -> Facets:
 class Looks(Rows):
     """Hold facets of side 1, each seen along the normals of some of its nodes.
 
-    Attributes: nodes, middles, reach: of the facets, as in `Facets`; asking: for which of its nodes
-        (k, v) each is seen. normals: along which they are seen; frames: two unit vectors (k, 3, 2)
-        beside that; slant: its cosine to the
-            facet's own normal, the share of the area that is seen.
+    Attributes:
+        nodes, middles, reach: of the facets, as in `Facets`.
+        asking: for which of its nodes (k, v) each is seen.
+        normals: along which they are seen.
+        frames: two unit vectors (k, 3, 2) beside that.
+        slant: its cosine to the facet's own normal, the share of the area that is seen.
         polygons: the facets as they are seen (k, v, 2), from their middles.
     """
 

@@ -61,15 +61,20 @@ def contact_surface(
     angle between them (``fem.contact.faces``). Where the obstacle gives all faces of a node one
     direction, as a HalfSpace does, the node has one condition.
 
-    Args: obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
-        every face of a node. points: (k, d) coordinates; each is replaced by the nearest node of
-        the facets. The order is kept. feature_angle: angle [rad]; facets around a node that turn by
-        less from one another are one smooth face. hinges: True where the body may hang together
-        with another one by nodes of this boundary, as by a pin.
-    Raises: InputError: no contact nodes, nodes that only glue two bodies together, a listed point
-        that is clamped or not on
-            the facets, a contact direction that is partly prescribed, initial penetration, a node
-            with more faces than the body has dimensions.
+    Args:
+        obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
+            every face of a node.
+        points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is
+            kept.
+        feature_angle: angle [rad]; facets around a node that turn by less from one another are one
+            smooth face.
+        hinges: True where the body may hang together with another one by nodes of this boundary, as
+            by a pin.
+
+    Raises:
+        InputError: no contact nodes, nodes that only glue two bodies together, a listed point that
+            is clamped or not on the facets, a contact direction that is partly prescribed, initial
+            penetration, a node with more faces than the body has dimensions.
     """
     space = contact_space(
         "contact_surface",

@@ -51,10 +51,12 @@ def check_actions(owner: str, loads: Any, gravity: Any) -> None:
 class NodalWork:
     """Compute rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
 
-    Args: owner: what is recorded, for messages. problem: its system is made by ``fem.assemble``;
-        InputError otherwise. loads: those given to ``fem.assemble``: what acts on cells of the
-        group belongs to their balance. gravity: acceleration (d,) [m/s²] of ``with_weight``, which
-        acts on the mass of the cells.
+    Args:
+        owner: what is recorded, for messages.
+        problem: its system is made by ``fem.assemble``; InputError otherwise.
+        loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their
+            balance.
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells.
     """
 
     def __init__(

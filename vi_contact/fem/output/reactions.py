@@ -43,10 +43,12 @@ class Reactions:
     the centre, anticlockwise positive (reaction_M_x_<name>, … in three dimensions). Base shear is
     reaction_x, the overturning moment of the body on its base is -reaction_M.
 
-    Args: facets: a boundary with prescribed components or dashpots; other components of its nodes
-        are not counted. loads: those given to ``assemble``: their part on the held nodes goes
-        straight into the support. gravity: acceleration (d,) [m/s²] of ``with_weight``, (0,
-        -9.80665) for example: likewise.
+    Args:
+        facets: a boundary with prescribed components or dashpots; other components of its nodes are
+            not counted.
+        loads: those given to ``assemble``: their part on the held nodes goes straight into the
+            support.
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, (0, -9.80665) for example: likewise.
     Raises:
         InputError: nothing is prescribed on the facets, and they have no dashpots.
     """

@@ -64,12 +64,15 @@ class SectionForces:
     step's equation of motion, row 0 those of the initial state at rest; per thickness of the
     section (plane strain: per metre).
 
-    Args: cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both
-        sides needs it. loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of
-        ``with_weight``, if these cells weigh.
-    Raises: InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes
-        through cells of degree
-            2; corners of no rectangle.
+    Args:
+        cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both
+            sides needs it.
+        loads: those given to ``assemble``.
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, if these cells weigh.
+
+    Raises:
+        InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes
+            through cells of degree 2; corners of no rectangle.
     """
 
     cuts: Mapping[str, Sequence[Sequence[float]]]

@@ -61,10 +61,13 @@ class ContactGeometry:
 class RunFolder:
     """Hold a run read from its files, as ``Solution`` has it.
 
-    Attributes: folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per
-        contact point. columns: column -> (unit, meaning). facts: summary.json; empty while a run
-        goes on or after it was killed. contact: None when history.h5 is missing, as early in a run,
-        or the problem has no contact points.
+    Attributes:
+        folder: where it is.
+        history: column -> values, (rows,) or (rows, …) for arrays per contact point.
+        columns: column -> (unit, meaning).
+        facts: summary.json; empty while a run goes on or after it was killed.
+        contact: None when history.h5 is missing, as early in a run, or the problem has no contact
+            points.
     """
 
     folder: Path

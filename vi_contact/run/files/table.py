@@ -36,11 +36,15 @@ Block = dict[
 class Table:
     """Hold columns and rows of a run: numbers on every rank, arrays on rank 0.
 
-    Attributes: columns: column -> (unit, meaning). first: the row it was made with. count: rows so
-        far. numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only
-        HDF5 holds, with a sample. file: the history.h5 of a run with a folder, which has the rows
-        too: beyond KEPT bytes the memory lets them go. block: how many rows are turned into
-        columns, read or written together.
+    Attributes:
+        columns: column -> (unit, meaning).
+        first: the row it was made with.
+        count: rows so far.
+        numbers: columns of history.csv, in order.
+        arrays: on rank 0 the others, which only HDF5 holds, with a sample.
+        file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the
+            memory lets them go.
+        block: how many rows are turned into columns, read or written together.
     """
 
     def __init__(

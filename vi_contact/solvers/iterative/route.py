@@ -59,10 +59,11 @@ class Iterative:
 
     It does so on any number of ranks.
 
-    Attributes: preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank),
-        "gamg" (algebraic multigrid
-            with rigid body modes), or "auto", which takes the first up to a Courant number of 0.5
-            in A, the second up to 30, and the third beyond. PETSc's options may name another.
+    Attributes:
+        preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg"
+            (algebraic multigrid with rigid body modes), or "auto", which takes the first up to a
+            Courant number of 0.5 in A, the second up to 30, and the third beyond. PETSc's options
+            may name another.
         petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold":
             0.02}; those of ICC begin with sub_pc_. Options of the command line override them. One
             that nothing reads is refused.

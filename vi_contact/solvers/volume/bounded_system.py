@@ -30,9 +30,12 @@ class BoundedSystem:
 
     It has ``size`` unknowns here, ``bounded`` of them bounded.
 
-    Attributes: soft: (m,) True where the support is a spring. spring, feet: stiffness k of these
-        springs, in the unit of A, and the positions in x of their body ends. bounded: (m,) position
-        of the bounded unknown in z. symmetric: whether A is.
+    Attributes:
+        soft: (m,) True where the support is a spring.
+        spring, feet: stiffness k of these springs, in the unit of A, and the positions in x of
+            their body ends.
+        bounded: (m,) position of the bounded unknown in z.
+        symmetric: whether A is.
     """
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:

@@ -45,10 +45,12 @@ class FrictionSystem:
 
     First comes z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
-    Attributes: point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A
-        of each lambda. disk: (m,) True for points with two free tangents; ``any_disk``: whether
-        some rank has one. pairs: (D, 2) places of their lambdas; line: (L,) True for the other
-        lambdas.
+    Attributes:
+        point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A of each
+            lambda.
+        disk: (m,) True for points with two free tangents; ``any_disk``: whether some rank has one.
+        pairs: (D, 2) places of their lambdas.
+        line: (L,) True for the other lambdas.
     """
 
     def __init__(self, body: BoundedSystem) -> None:

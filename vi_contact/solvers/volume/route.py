@@ -51,11 +51,11 @@ class Method(Protocol):
 class Volume:
     """Solve each step on all unknowns of the body by PETSc, and hold the settings for it.
 
-    Attributes: method: ReducedNewton (the reference), SemismoothNewton or TaoTron. petsc_options:
-        PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them.
-        One
-            that nothing has read by the end of the first step with an iteration is refused, with
-            the nearest known.
+    Attributes:
+        method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
+        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line
+            overrides them. One that nothing has read by the end of the first step with an iteration
+            is refused, with the nearest known.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: the largest relative error that is accepted when a solver stops improving above
             round-off.
