@@ -41,10 +41,17 @@ class Comm(Protocol):
     rank: int
     size: int
 
-    def sum(self, x: Array) -> Array: ...
-    def max(self, x: Array) -> Array: ...
-    def bcast(self, value: Any) -> Any: ...
-    def gather(self, value: Any) -> list[Any] | None: ...
+    def sum(self, x: Array) -> Array:
+        """Return the sum of x over the ranks, entry by entry, the same on every rank."""
+
+    def max(self, x: Array) -> Array:
+        """Return the largest x of the ranks, entry by entry, the same on every rank."""
+
+    def bcast(self, value: Any) -> Any:
+        """Return the value of rank 0 on every rank."""
+
+    def gather(self, value: Any) -> list[Any] | None:
+        """Return the values of all ranks, in their order, on rank 0; None on the others."""
 
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
@@ -90,14 +97,18 @@ class Matrix(Protocol):
         """Return how many rows this rank owns."""
 
     def __matmul__(self, x: Array) -> Array: ...
-    def transpose_apply(self, x: Array) -> Array: ...
-    def diagonal(self) -> Array: ...
+    def transpose_apply(self, x: Array) -> Array:
+        """Return Aᵀ x."""
+
+    def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
 
 
 class Factor(Protocol):
     """Hold a factorised symmetric matrix; ``solve`` is one forward and back substitution."""
 
-    def solve(self, b: Array) -> Array: ...
+    def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b."""
 
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
@@ -118,8 +129,12 @@ class Algebra(Protocol):
     symmetric: bool
 
     @property
-    def comm(self) -> Comm: ...
-    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix: ...
+    def comm(self) -> Comm:
+        """Return the ranks that share the matrices."""
+
+    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        """Return the sum of factor times matrix over the terms (factor, matrix)."""
+
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Return Tᵀ K T."""
 
@@ -153,7 +168,9 @@ class Algebra(Protocol):
         Columns are numbered over all ranks.
         """
 
-    def factor(self, A: Matrix) -> Factor: ...
+    def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
+
     def contact_last(self, A: Matrix, last: Indices) -> Any:
         """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``.
 
@@ -161,7 +178,8 @@ class Algebra(Protocol):
         where ``factor`` serves better or there is none. Collective.
         """
 
-    def dot(self, x: Array, y: Array) -> float: ...
+    def dot(self, x: Array, y: Array) -> float:
+        """Return x·y over all ranks."""
 
 
 class EffectiveMatrix:
@@ -233,15 +251,19 @@ class SerialComm:
     size = 1
 
     def sum(self, x: Array) -> Array:
+        """Return x, the sum over one rank."""
         return x
 
     def max(self, x: Array) -> Array:
+        """Return x, the largest on one rank."""
         return x
 
     def bcast(self, value: Any) -> Any:
+        """Return the value."""
         return value
 
     def gather(self, value: Any) -> list[Any] | None:
+        """Return the value in a list."""
         return [value]
 
 
@@ -253,15 +275,18 @@ class SerialMatrix:
 
     @property
     def rows(self) -> int:
+        """Return how many rows this rank owns."""
         return int(self.csr.shape[0])
 
     def __matmul__(self, x: Array) -> Array:
         return np.asarray(self.csr @ x)
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return Aᵀ x."""
         return np.asarray(self.csr.T @ x)
 
     def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
         return np.asarray(self.csr.diagonal())
 
 
@@ -278,11 +303,13 @@ class SerialFactor:
         self._rows = matrix.rows
 
     def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b."""
         return np.asarray(self._lu.solve(b))
 
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
+        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says."""
         units = np.zeros((self._rows, m))
         units[owned, slots] = 1.0
         columns = np.asarray(self._lu.solve(units)) if m else units
@@ -300,38 +327,49 @@ class SerialAlgebra:
         self.symmetric = symmetric
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        """Return the sum of factor times matrix over the terms (factor, matrix)."""
         return SerialMatrix(sum(factor * serial(matrix).csr for factor, matrix in terms))
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Return Tᵀ K T."""
         basis = serial(T).csr
         return SerialMatrix(basis.T @ serial(K).csr @ basis)
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        """Return the matrix of entries between the n unknowns of one rank."""
         return SerialMatrix(sp.coo_matrix((values, (rows, columns)), shape=(n, n)))
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
         free = sp.diags([(~mask).astype(float)], [0])
         return SerialMatrix(free @ serial(A).csr @ free + sp.diags([mask.astype(float)], [0]))
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return the rows and columns of A of the masked unknowns."""
         return SerialMatrix(serial(A).csr[mask][:, mask])
 
     def first(self, n: int) -> int:
+        """Return the number of the first of the n unknowns that this rank owns."""
         return 0
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
+        """Return these owned rows of A, their columns numbered over all ranks."""
         return serial(A).csr[rows]
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        """Return the identity of n owned rows with some of them replaced."""
         return SerialMatrix(identity_with(n, rows, entries, first=0))
 
     def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
         return SerialFactor(serial(A))
 
     def contact_last(self, A: Matrix, last: Indices) -> None:
+        """Return None: there is no factor with these unknowns last."""
         return None
 
     def dot(self, x: Array, y: Array) -> float:
+        """Return x·y."""
         return float(x @ y)
 
 

@@ -49,9 +49,11 @@ class Touching:
     """Fit the boundary exactly: zero initial gap, contact along the body's outward normal."""
 
     def directions(self, points: Array, normals: Array) -> Array:
+        """Return the outward normals of the body."""
         return normals
 
     def gap(self, points: Array, normals: Array) -> Array:
+        """Return zero gaps (k,) [m]."""
         return np.zeros(len(points))
 
 
@@ -86,9 +88,11 @@ class HalfSpace:
         return np.asarray(normal / np.linalg.norm(normal))
 
     def directions(self, points: Array, normals: Array) -> Array:
+        """Return -normal at every point, (k, d)."""
         return np.tile(-self.unit_normal, (len(points), 1))
 
     def gap(self, points: Array, normals: Array) -> Array:
+        """Return the distances (k,) [m] of the points from the plane."""
         return np.asarray((points - np.asarray(self.point, dtype=float)) @ self.unit_normal)
 
 
@@ -111,9 +115,11 @@ class AnalyticGap:
         )
 
     def directions(self, points: Array, normals: Array) -> Array:
+        """Return the outward normals of the body."""
         return normals
 
     def gap(self, points: Array, normals: Array) -> Array:
+        """Return the values (k,) [m] of the function at the points."""
         return self.function(points)
 
 
@@ -141,7 +147,11 @@ def facing(
     ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
 
     Args:
+        obstacle: what is asked.
+        points: (m, d) positions of the contact nodes [m].
+        normals: (m, d) outward unit normals of the body there.
         name: of the boundary, for the sentence.
+        angle: how much normals may turn at once [rad].
         alone: whether these are all its points; some of them only are refused where others might
             decide.
 

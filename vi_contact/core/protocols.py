@@ -180,6 +180,7 @@ class ImpactLaw(Protocol):
             surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to
                 change.
             v: the velocity (n,) [m/s] that the step left; not to be written to.
+            target: normal velocities (m,) [m/s], NaN where the velocity is left alone.
         """
 
 

@@ -45,13 +45,20 @@ class Space(Protocol):
     unknowns: int
 
     @property
-    def ids(self) -> np.ndarray: ...
+    def ids(self) -> np.ndarray:
+        """Return the numbers of the owned unknowns, node * dimension + component."""
+
     @property
-    def coordinates(self) -> Array: ...
+    def coordinates(self) -> Array:
+        """Return the coordinates (rows, d) [m]."""
+
     @property
-    def bodies(self) -> np.ndarray: ...
+    def bodies(self) -> np.ndarray:
+        """Return the body of every owned unknown."""
+
     @property
-    def hierarchy(self) -> Any: ...
+    def hierarchy(self) -> Any:
+        """Return the hierarchy of displacements whose contact conditions need one, else None."""
 
     def find_nodes(self, points: Array) -> np.ndarray:
         """Return the node numbers nearest to the points (k, d).
@@ -107,6 +114,7 @@ class Load:
                     raise InputError(f"Load: an item of separable has {len(part)} members; {PAIR}")
 
     def __call__(self, t: float) -> Array:
+        """Return f(t) [N]."""
         total = self.at_rest(t)
         for parts in (self.viscous, self.inertial):
             for moving in parts:

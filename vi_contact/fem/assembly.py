@@ -99,9 +99,10 @@ def assemble(
             the load of docs/start/first_wall.md.
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
             hexahedra, where each cell has one mean value of tr eps (``fem.dilatation``).
-        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a),
-            or (cells, value) pairs for several bodies. Where cells meet, the later pair counts;
-            cells without a pair start from zero.
+        initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
+            pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
+            start from zero.
+        initial_velocity: the like for the velocity.
         quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with
             parallel sides.
 

@@ -29,15 +29,19 @@ class MpiComm:
         return total
 
     def sum(self, x: Array) -> Array:
+        """Return the sum of x over the ranks, entry by entry."""
         return self._reduce(x, MPI.SUM)
 
     def max(self, x: Array) -> Array:
+        """Return the largest x of the ranks, entry by entry."""
         return self._reduce(x, MPI.MAX)
 
     def bcast(self, value: Any) -> Any:
+        """Return the value of rank 0 on every rank."""
         return self.mpi.bcast(value, root=0)
 
     def gather(self, value: Any) -> list[Any] | None:
+        """Return the values of all ranks on rank 0; None on the others."""
         return self.mpi.gather(value, root=0)
 
 

@@ -31,15 +31,18 @@ class Half(PetscMatrix):
 
     @property
     def mat(self) -> Any:
+        """Return the whole matrix, made anew."""
         whole = self.stored.convert("aij", PETSc.Mat())
         whole.setBlockSize(1)
         return whole
 
     @property
     def bytes(self) -> float:
+        """Return the bytes of the half that is stored."""
         return super().bytes * (2.0 + self.stored.getBlockSize() ** -2) / 3.0
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return A x, which is Aᵀ x."""
         return self @ x
 
 
@@ -55,10 +58,12 @@ class Replaced(PetscMatrix):
 
     @property
     def rows(self) -> int:
+        """Return how many rows this rank owns."""
         return self._base.rows
 
     @property
     def mat(self) -> Any:
+        """Return the whole matrix, made anew."""
         whole, part, kind = self._base.mat, rows_of(self.stored), PETSc.IntType
         whole = whole.copy() if whole is self._base.stored else whole
         if self._alike:
@@ -81,9 +86,11 @@ class Replaced(PetscMatrix):
         return y
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return A x, which is Aᵀ x."""
         return self @ x
 
     def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
         values, part = self._base.diagonal(), rows_of(self.stored)
         row = np.repeat(self._rows, np.diff(part.indptr))
         own = part.indices == self.stored.getOwnershipRangeColumn()[0] + row
@@ -100,6 +107,7 @@ class CompactAlgebra(PetscAlgebra):
         self._dimension = dimension
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Return Tᵀ K T."""
         P, A = as_petsc(T).mat, as_petsc(K).mat
         rows = self._changed(P, A)
         if total(self.comm, len(rows)) > 0.5 * A.getSize()[0]:
@@ -117,6 +125,7 @@ class CompactAlgebra(PetscAlgebra):
         return Replaced(as_petsc(K), rows, part, alike=not largest(self.comm, not alike))
 
     def held(self, mat: Any) -> PetscMatrix:
+        """Return the matrix stored compactly; the given one is destroyed."""
         give_back(self.comm.mpi)
         rows, first, width = rows_of(mat), mat.getOwnershipRange()[0], self._dimension
         (n, size), kind = rows.shape, PETSc.IntType

@@ -123,6 +123,7 @@ class CompliantBase(Dashpots):
 
     @property
     def expects(self) -> str:
+        """Return which motion the boundary expects, in words."""
         return (
             "expects the upgoing motion, half the velocity of an outcrop (not the within "
             "motion of its depth)"

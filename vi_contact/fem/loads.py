@@ -209,6 +209,7 @@ class Traction(ActingLoad):
         super().__post_init__()
 
     def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of the facets."""
         return compat.measure(mesh, mesh.topology.dim - 1, self.facets.indices)
 
 
@@ -220,6 +221,7 @@ class TangentialTraction(Traction):
     """
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the traction less its normal part."""
         n = ufl.FacetNormal(mesh)
         return g - ufl.dot(g, n) * n
 
@@ -257,6 +259,7 @@ class Pressure(Traction):
         super().__post_init__()
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the traction -p n."""
         return -g[0] * ufl.FacetNormal(mesh)
 
 

@@ -144,11 +144,13 @@ class OwnForms(ElasticForms):
         return tuple(notes)
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
+        """Return the stress and sigma_zz(u) times the thickness."""
         sigma, d, h = self._stress(u), self.space.dimension, self.section.thickness
         across = h * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
         return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
+        """Raise InputError: the forms do not tell the C of a material."""
         raise InputError(
             "InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0"
         )
@@ -159,6 +161,7 @@ class OwnForms(ElasticForms):
         return self._given.stress(u)
 
     def bilinear(self, name: str) -> Any:
+        """Return the form of M, K or C."""
         return self._forms[name]
 
     def matrix(self, name: str) -> Any:

@@ -56,8 +56,10 @@ def system_from_arrays(
     ``fem.XDMF``. Bodies are what K joins.
 
     Args:
-        M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None;
-            stiffness [N/m]. C and K that are not symmetric are for Volume() and Condensed(Lemke()).
+        M: (n, n), symmetric: mass [kg], also (n,) where lumped.
+        C: (n, n), symmetric: damping [N s/m] or None. C and K that are not symmetric are for
+            Volume() and Condensed(Lemke()).
+        K: (n, n), symmetric: stiffness [N/m].
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
         unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no
             displacement of a point (a rotation); None: row node * d + c is component c of the node.
@@ -66,7 +68,8 @@ def system_from_arrays(
             ``system.rows`` entries.
         load: f, a Load or (n,) constant forces [N]; histories also by ``system.with_load``. Ground
             motion acts on the unit translation of all displacements.
-        u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
+        u0: (n,) initial displacement [m], zero when None.
+        v0: (n,) initial velocity [m/s], zero when None.
 
     Raises:
         InputError: matrices that are not real, finite, square and of one size, M that is not

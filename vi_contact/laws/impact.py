@@ -68,6 +68,7 @@ class ComponentReset:
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
+        """Return v with the normal velocities ``target`` set, where they are not NaN."""
         target, after = with_open_faces(surface, v, target), v.copy()
         after.T[surface.owned] = np.where(np.isnan(target), surface.normal_values(v), target).T
         return after
@@ -89,6 +90,7 @@ class ImpulseUpdate:
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
+        """Return v after the impulse that gives it the normal velocities ``target``."""
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
         is_small = system.cached(
             "small impacts",
@@ -151,6 +153,7 @@ class ByUpdate:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
+        """Return v changed by ``update``."""
         return self.update(system, surface, v, target)
 
 
@@ -164,6 +167,7 @@ class Inelastic(ByUpdate):
         function("Inelastic", "update", self.update, UPDATE)
 
     def target(self, impact: Impact) -> Array:
+        """Return zero at active conditions, NaN elsewhere."""
         return np.where(impact.active, 0.0, np.nan)
 
 
@@ -191,6 +195,7 @@ class Newton(ByUpdate):
         function("Newton", "update", self.update, UPDATE)
 
     def target(self, impact: Impact) -> Array:
+        """Return -e v_n⁻ at conditions that have just closed, NaN elsewhere."""
         return np.where(impact.closing, -self.e * np.maximum(impact.before, 0.0), np.nan)
 
 

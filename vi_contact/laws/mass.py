@@ -34,6 +34,7 @@ class ConsistentMass:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
+        """Return the system as it is."""
         return system
 
 
@@ -70,6 +71,7 @@ class Redistributed:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
+        """Return the system without mass at the contact unknowns."""
         if surface.total == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)

@@ -134,7 +134,8 @@ class Section(Protocol):
     """
 
     @property
-    def thickness(self) -> float: ...
+    def thickness(self) -> float:
+        """Return the thickness [m] that integrals over the mesh are multiplied by."""
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """Return (lambda_eff, shear_modulus) [Pa] of the stress in the plane.

@@ -125,6 +125,7 @@ class PreparedCrossCheck:
     surface: ContactSurface
 
     def solve(self, step: StepProblem) -> StepResult:
+        """Return the answer of the first solver; compare those of the others with it."""
         result = self.solvers[0].solve(step)
         self.settings.begin(step)
         for solver, found in zip(self.solvers[1:], self.settings.found, strict=True):

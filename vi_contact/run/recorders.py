@@ -78,6 +78,7 @@ class Steps:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._row(
             report.new, report.result.iterations, report.certificate.worst, report.escalated
         )
@@ -139,6 +140,7 @@ class Energy:
         )
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         system, new = self._problem.equations, report.new
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
@@ -237,6 +239,7 @@ class Contact:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
@@ -381,6 +384,7 @@ class Probe:
         return problem.system.space.find_nodes(points)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         old, new, ground = report.old.t, report.new.t, self._problem.ground_acceleration
         return self._row(
             report.new,

@@ -112,6 +112,7 @@ class Loads(Load):
     rows: Any = None
 
     def __call__(self, t: float) -> Array:
+        """Return the loads of all runs at time t, as rows [N]."""
         return np.asarray(self.rows(t))
 
 

@@ -59,15 +59,19 @@ def simulate(
 ) -> Solution:
     """Compute steps in time until t_end, or so many steps, and record them.
 
-    Collective; every rank gets the solution.
+    Collective; every rank gets the solution. After an error all that was computed is in the folder,
+    and summary.json says why the run ended.
 
     Args:
+        problem: what is marched.
         scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
             Zienkiewicz-Wood-Taylor step. A problem that names no mass matrix gets the one of the
             scheme (``run.method.with_defaults``).
         solver: None means Automatic().
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and
             checkpoint_every count base steps.
+        t_end: the time [s] until which is marched; give it or ``steps``.
+        steps: the number of base steps.
         record: recorders; None means (Energy(), Contact()). Time, iterations and certificate are
             always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log,
@@ -75,7 +79,8 @@ def simulate(
             the folder is replaced, unless ``restart``.
         state: the initial state, from a gravity stage for example; None means u0 and v0 of the
             system.
-        escalation, tolerance: see ``march``.
+        escalation: see ``march``.
+        tolerance: see ``march``.
         checkpoint_every: number of base steps between checkpoints.
         restart: True continues the run in ``out`` from its checkpoint; a path continues the run in
             that folder. ``steps`` and ``t_end`` are those of the whole run. The result is that of
@@ -96,11 +101,12 @@ def simulate(
 
     Raises:
         InputError: before anything is computed or overwritten; also when another run writes into
-            the folder. Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM
-            or SIGHUP, with a checkpoint. OutOfTime: before the wall time is over, with a
-            checkpoint. StepFailure: no solver could certify a step. ViContactError: the disk
-            refused to read or write. All that was computed is then in the folder, and summary.json
-            says why the run ended.
+            the folder.
+        Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with
+            a checkpoint.
+        OutOfTime: before the wall time is over, with a checkpoint.
+        StepFailure: no solver could certify a step.
+        ViContactError: the disk refused to read or write.
     """
     with opened(**locals()) as (session, writer):
         return session.go(writer)

@@ -58,7 +58,8 @@ def static_equilibrium(
 
     Raises:
         InputError: the loads drive a rigid motion that nothing stops, so that there is no
-            equilibrium. StepFailure: no answer has a certificate below the tolerance.
+            equilibrium.
+        StepFailure: no answer has a certificate below the tolerance.
     """
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
@@ -172,16 +173,18 @@ def quasi_static(
     velocity and acceleration: their C U' + M U'' are loads.
 
     Args:
+        problem: what stands in equilibrium; its loads are taken at the times.
         solver: Automatic() when None.
         times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
         state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t
             = 0 without reactions when None. A body pressed without friction first: the state of
             that problem.
+        tolerance: of the certificate of every answer.
 
     Raises:
         InputError: times that do not increase; friction that depends on the slip rate; loads that
-            drive a rigid motion which nothing stops. StepFailure: no answer below the certificate
-            tolerance.
+            drive a rigid motion which nothing stops.
+        StepFailure: no answer below the certificate tolerance.
     """
     check_problem_given("quasi_static", problem)
     if isinstance(times, Iterable) and not isinstance(times, str | bytes):

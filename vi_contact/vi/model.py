@@ -276,6 +276,7 @@ class Preconditioner:
         layers.apply(self._pc, _set_up)
 
     def __call__(self, r: Array) -> Array:
+        """Return the preconditioned r."""
         self._x.array[:] = r
         self._pc.apply(self._x, self._y)
         return np.array(self._y.array_r)

@@ -22,6 +22,9 @@ def census_on_ranks(
     """Return the census of a boundary whose ``nodes`` are those of this rank only. Collective.
 
     Args:
+        comm: the ranks that share the boundary.
+        name: of the boundary.
+        nodes: those of this rank.
         kinds: kind -> mask (k,) of the nodes of this rank that are of this kind.
         points: number of contact conditions on this rank.
     """
@@ -37,6 +40,8 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
     """Return the census of a boundary whose ``nodes``, ordered by number, every rank has.
 
     Args:
+        name: of the boundary.
+        nodes: those of all ranks, ordered by number.
         kinds: kind -> mask (k,) of the nodes that are of this kind.
         points: number of contact conditions on all ranks.
     """

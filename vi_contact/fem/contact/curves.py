@@ -73,8 +73,8 @@ def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) ->
 
     Args:
         H: (k, d, d) of side 2 at each piece.
-        one, two: shape functions (k, p, v) at the points and corners (k, v, d) of the facets of
-            side 1 and side 2.
+        one: shape functions (k, p, v) at the points and corners (k, v, d) of the facets of side 1.
+        two: the same of the facets of side 2.
     """
     delta = 0.5 * (left_out(H, *two) - left_out(H, *one))
     return np.asarray(MARGIN * np.abs(delta).max(axis=1, initial=0.0))

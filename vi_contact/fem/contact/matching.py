@@ -120,6 +120,7 @@ class NodeToNode:
         attributes(self, positive=("tolerance",))
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
+        """Return what every node of side 1 faces; InputError where a node has no partner."""
         partner = self._partners(one, two, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):

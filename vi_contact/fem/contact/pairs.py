@@ -81,6 +81,9 @@ def contact_pair(
     by ``joined_surfaces``.
 
     Args:
+        system: the system of both bodies, of ``assemble``.
+        facets1: side 1, whose nodes have the conditions.
+        facets2: side 2.
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in
             this order.

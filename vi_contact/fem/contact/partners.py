@@ -56,10 +56,15 @@ def one_of(
     """Return which of several partners a node of side 1 faces; -1 where no single one is right.
 
     Args:
+        one: side 1.
+        node: the place of the node on side 1.
+        normal: (d,) its normal.
+        two: side 2.
         partners: (k,) places on side 2, of nodes that face this one. The first is taken where none
             has a facet in front of one of side 1, as where bodies meet at a corner only.
         apart: (k,) their distances [m]; partners that differ by up to ``close`` [m] are at one
             place.
+        close: that distance [m].
     """
     seen = np.array([in_front(one, node, normal, two, partner) for partner in partners])
     facing = np.flatnonzero(seen.any(axis=1))

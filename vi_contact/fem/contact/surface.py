@@ -62,6 +62,8 @@ def contact_surface(
     direction, as a HalfSpace does, the node has one condition.
 
     Args:
+        system: the system of the body, of ``assemble``.
+        facets: the part of the boundary.
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
             every face of a node.
         points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is

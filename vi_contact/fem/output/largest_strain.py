@@ -55,6 +55,7 @@ class LargestStrain:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._row(report.new)
 
     def _nodal(self, state: State) -> Array:

@@ -49,6 +49,7 @@ class Reactions:
         loads: those given to ``assemble``: their part on the held nodes goes straight into the
             support.
         gravity: acceleration (d,) [m/s²] of ``with_weight``, (0, -9.80665) for example: likewise.
+
     Raises:
         InputError: nothing is prescribed on the facets, and they have no dashpots.
     """
@@ -111,6 +112,7 @@ class Reactions:
         return self._named(self._work.at_rest(state))
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._named(self._work.of_step(report))
 
     def _named(self, values: np.ndarray) -> Row:

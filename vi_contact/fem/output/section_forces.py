@@ -135,6 +135,7 @@ class SectionForces:
         return self._named(work.at_rest(state))
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._named(self._work.of_step(report))
 
     def _named(self, values: Array) -> Row:

@@ -33,7 +33,8 @@ LATEST = (
 class OpenFields(Protocol):
     """Write frames of fields; collective."""
 
-    def write(self, state: State, acceleration: Array, report: Report | None = None) -> None: ...
+    def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
+        """Write a frame of the state."""
 
 
 class FieldWriter(Protocol):
@@ -43,11 +44,11 @@ class FieldWriter(Protocol):
     """
 
     @property
-    def every(self) -> int: ...
+    def every(self) -> int:
+        """Return how many steps lie between two frames."""
 
-    def open(
-        self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
-    ) -> OpenFields: ...
+    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> OpenFields:
+        """Return the open files of fields in the folder."""
 
 
 class Writer:

@@ -196,4 +196,5 @@ def _power_of_two(value: float) -> float:
 
 
 def fraction(value: float, reference: float) -> float:
+    """Return value/reference, or the value itself where the reference is not above zero."""
     return value / reference if reference > 0.0 else value
