@@ -2,7 +2,8 @@
 
 Read ``step.py`` first: ``Scheme``, ``Solver``, ``Recorder`` and the values between them. A
 ``ContactProblem`` is a ``SemiDiscreteSystem`` (M, C, K, loads) with a ``ContactSurface``;
-``verify.py`` judges. See docs/theory/routes.md."""
+``verify.py`` judges. See docs/theory/routes.md.
+"""
 
 from .lazy import lazy
 

@@ -4,7 +4,8 @@ Everything above this file (schemes, condensed solver, recorders) is written aga
 below and never asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and
 needs no finite element package; ``fem.petsc_algebra`` serves any number of ranks. Rules: a vector
 is the float64 array of its owned entries; scalars returned by ``dot`` and by ``Comm`` are the same
-number on every rank."""
+number on every rank.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -22,8 +23,10 @@ Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN. The places are found faster
-    than the values."""
+    """Return max |x| over the entries given, 0 for none; NaN stays NaN.
+
+    The places are found faster than the values.
+    """
     return float(max(x.item(x.argmax()), -x.item(x.argmin()))) if x.size else 0.0
 
 
@@ -38,15 +41,24 @@ class Comm(Protocol):
     rank: int
     size: int
 
-    def sum(self, x: Array) -> Array: ...
-    def max(self, x: Array) -> Array: ...
-    def bcast(self, value: Any) -> Any: ...
-    def gather(self, value: Any) -> list[Any] | None: ...
+    def sum(self, x: Array) -> Array:
+        """Return the sum of x over the ranks, entry by entry, the same on every rank."""
+
+    def max(self, x: Array) -> Array:
+        """Return the largest x of the ranks, entry by entry, the same on every rank."""
+
+    def bcast(self, value: Any) -> Any:
+        """Return the value of rank 0 on every rank."""
+
+    def gather(self, value: Any) -> list[Any] | None:
+        """Return the values of all ranks, in their order, on rank 0; None on the others."""
 
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
-    """Return the largest of the ranks' values, the same on every rank; of truth values: 1 where one
-    rank says True."""
+    """Return the largest of the ranks' values, the same on every rank.
+
+    Of truth values it is 1 where one rank says True.
+    """
     return float(value) if comm.size == 1 else float(comm.max(np.array([float(value)]))[0])
 
 
@@ -61,8 +73,10 @@ def from_each(comm: Comm, value: Any) -> list[Any]:
 
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
-    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers; elsewhere
-    none. Collective."""
+    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers.
+
+    Other ranks get none. Collective.
+    """
     parts = comm.gather((numbers, rows))
     if parts is None:
         return rows[:0]
@@ -73,82 +87,110 @@ def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
 
 
 class Matrix(Protocol):
-    """Provide products with a square sparse matrix whose rows are distributed like the vectors it
-    multiplies."""
+    """Provide products with a square sparse matrix.
+
+    Its rows are distributed like the vectors it multiplies.
+    """
 
     @property
     def rows(self) -> int:
         """Return how many rows this rank owns."""
 
     def __matmul__(self, x: Array) -> Array: ...
-    def transpose_apply(self, x: Array) -> Array: ...
-    def diagonal(self) -> Array: ...
+    def transpose_apply(self, x: Array) -> Array:
+        """Return Aᵀ x."""
+
+    def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
 
 
 class Factor(Protocol):
     """Hold a factorised symmetric matrix; ``solve`` is one forward and back substitution."""
 
-    def solve(self, b: Array) -> Array: ...
+    def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b."""
 
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
-        """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row
-        ``owned[k]`` of the owning rank. Returns the owned rows, shape (rows, m), or only those of
-        them that are named: the whole may not fit."""
+        """Return the columns A^-1 e_j for m unit vectors.
+
+        e_{slots[k]} has its one in row ``owned[k]`` of the owning rank. Returned are the owned
+        rows, shape (rows, m), or only those of them that are named: the whole may not fit.
+        """
 
 
 class Algebra(Protocol):
-    """Make matrices out of matrices: of M, C, K and their combinations, all of them ``symmetric``
-    or not."""
+    """Make matrices out of matrices.
+
+    These are M, C, K and their combinations, all of them ``symmetric`` or not.
+    """
 
     symmetric: bool
 
     @property
-    def comm(self) -> Comm: ...
-    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix: ...
+    def comm(self) -> Comm:
+        """Return the ranks that share the matrices."""
+
+    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        """Return the sum of factor times matrix over the terms (factor, matrix)."""
+
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Return Tᵀ K T."""
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of entries between the n unknowns of one rank; those given twice add
-        up."""
+        """Return the matrix of entries between the n unknowns of one rank.
+
+        Entries that are given twice add up.
+        """
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
-        """Return A with the rows and columns of the masked unknowns replaced by those of the
-        identity."""
+        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
         """Return the rows and columns of A of the masked unknowns, which their ranks own."""
 
     def first(self, n: int) -> int:
-        """Return the number, among those of all ranks, of the first of the n unknowns that this
-        rank owns."""
+        """Return the number of the first of the n unknowns that this rank owns.
+
+        It is the number among the unknowns of all ranks.
+        """
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         """Return these owned rows of A, ascending, their columns numbered over all ranks.
-        Collective."""
+
+        Collective.
+        """
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        """Return the identity of n owned rows with some of them replaced, columns numbered over all
-        ranks."""
+        """Return the identity of n owned rows with some of them replaced.
 
-    def factor(self, A: Matrix) -> Factor: ...
+        Columns are numbered over all ranks.
+        """
+
+    def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
+
     def contact_last(self, A: Matrix, last: Indices) -> Any:
-        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``; they are
-        numbered over all ranks and the same on every rank. None where ``factor`` serves better or
-        there is none. Collective."""
+        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``.
 
-    def dot(self, x: Array, y: Array) -> float: ...
+        The unknowns are numbered over all ranks and the same on every rank. The answer is None
+        where ``factor`` serves better or there is none. Collective.
+        """
+
+    def dot(self, x: Array, y: Array) -> float:
+        """Return x·y over all ranks."""
 
 
 class EffectiveMatrix:
-    """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it
-    lives as long as dt.
+    """Hold the matrix A of a step and its factor.
+
+    A prepared solver belongs to one of these; it lives as long as dt.
 
     ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k
     K. None: not known. ``image(x)``: A x, made of products with M, C and K that others need too,
-    where that is told."""
+    where that is told.
+    """
 
     def __init__(
         self,
@@ -167,8 +209,10 @@ class EffectiveMatrix:
         self.desk: dict[Any, tuple[list[Any], list[Any]]] = {}  # where small vectors are read
 
     def contact_last(self, last: Indices) -> Any:
-        """Return the factor with these unknowns last (see ``Algebra``), which is then ``factor``
-        too. Collective."""
+        """Return the factor with these unknowns last (see ``Algebra``).
+
+        It is then ``factor`` too. Collective.
+        """
         if self._last is None or not np.array_equal(self._last[0], last):
             self._last = last, self.algebra.contact_last(self.matrix, last)
             if self._last[1] is not None:
@@ -207,15 +251,19 @@ class SerialComm:
     size = 1
 
     def sum(self, x: Array) -> Array:
+        """Return x, the sum over one rank."""
         return x
 
     def max(self, x: Array) -> Array:
+        """Return x, the largest on one rank."""
         return x
 
     def bcast(self, value: Any) -> Any:
+        """Return the value."""
         return value
 
     def gather(self, value: Any) -> list[Any] | None:
+        """Return the value in a list."""
         return [value]
 
 
@@ -227,21 +275,26 @@ class SerialMatrix:
 
     @property
     def rows(self) -> int:
+        """Return how many rows this rank owns."""
         return int(self.csr.shape[0])
 
     def __matmul__(self, x: Array) -> Array:
         return np.asarray(self.csr @ x)
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return Aᵀ x."""
         return np.asarray(self.csr.T @ x)
 
     def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
         return np.asarray(self.csr.diagonal())
 
 
 class SerialFactor:
-    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged
-    where they must."""
+    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering.
+
+    Rows are exchanged where they must.
+    """
 
     def __init__(self, matrix: SerialMatrix) -> None:
         self._lu = splu(
@@ -250,11 +303,13 @@ class SerialFactor:
         self._rows = matrix.rows
 
     def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b."""
         return np.asarray(self._lu.solve(b))
 
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
+        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says."""
         units = np.zeros((self._rows, m))
         units[owned, slots] = 1.0
         columns = np.asarray(self._lu.solve(units)) if m else units
@@ -262,46 +317,59 @@ class SerialFactor:
 
 
 class SerialAlgebra:
-    """Combine matrices of scipy.sparse on one process; solvers that need symmetric ones ask for
-    ``symmetric``."""
+    """Combine matrices of scipy.sparse on one process.
+
+    Solvers that need symmetric ones ask for ``symmetric``.
+    """
 
     def __init__(self, *, symmetric: bool = True) -> None:
         self.comm: Comm = SerialComm()
         self.symmetric = symmetric
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        """Return the sum of factor times matrix over the terms (factor, matrix)."""
         return SerialMatrix(sum(factor * serial(matrix).csr for factor, matrix in terms))
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Return Tᵀ K T."""
         basis = serial(T).csr
         return SerialMatrix(basis.T @ serial(K).csr @ basis)
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        """Return the matrix of entries between the n unknowns of one rank."""
         return SerialMatrix(sp.coo_matrix((values, (rows, columns)), shape=(n, n)))
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
         free = sp.diags([(~mask).astype(float)], [0])
         return SerialMatrix(free @ serial(A).csr @ free + sp.diags([mask.astype(float)], [0]))
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return the rows and columns of A of the masked unknowns."""
         return SerialMatrix(serial(A).csr[mask][:, mask])
 
     def first(self, n: int) -> int:
+        """Return the number of the first of the n unknowns that this rank owns."""
         return 0
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
+        """Return these owned rows of A, their columns numbered over all ranks."""
         return serial(A).csr[rows]
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        """Return the identity of n owned rows with some of them replaced."""
         return SerialMatrix(identity_with(n, rows, entries, first=0))
 
     def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
         return SerialFactor(serial(A))
 
     def contact_last(self, A: Matrix, last: Indices) -> None:
+        """Return None: there is no factor with these unknowns last."""
         return None
 
     def dot(self, x: Array, y: Array) -> float:
+        """Return x·y."""
         return float(x @ y)
 
 
@@ -313,8 +381,10 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
-    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin
-    at ``first``."""
+    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows.
+
+    The rows begin at ``first``.
+    """
     counts, columns, values = (
         [np.zeros(1, dtype=np.int64)],
         [rows.indices[:0]],
@@ -333,8 +403,10 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
 
 
 def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
-    """Return n rows of the identity, whose ones begin in column ``first``, with these rows replaced
-    by the entries."""
+    """Return n rows of the identity, with these rows replaced by the entries.
+
+    The ones of the identity begin in column ``first``.
+    """
     kept = np.setdiff1d(np.arange(n), rows)
     where = np.concatenate([kept, np.repeat(rows, np.diff(entries.indptr))])
     column = np.concatenate([first + kept, entries.indices])

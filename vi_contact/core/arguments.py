@@ -1,9 +1,11 @@
-"""Check the arguments of public functions against their types, so that a wrong one is a sentence
-and no traceback.
+"""Check the arguments of public functions against their types.
+
+A wrong argument is then a sentence and no traceback.
 
 ``@checked`` is for functions that users call with their own values, and that look at these before
 any other function does. Limits of numbers (positive, finite) are checked by the functions
-themselves."""
+themselves.
+"""
 
 import os
 import types
@@ -27,8 +29,10 @@ R = TypeVar("R")
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with a check of its arguments: InputError for one that is not of its
-    type."""
+    """Return the function with a check of its arguments.
+
+    The check raises InputError for an argument that is not of its type.
+    """
     name, of = function.__qualname__, signature(function)
 
     @wraps(function)
@@ -46,8 +50,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def check_fields(one: Any) -> None:
-    """Raise InputError for the first field of a dataclass that is not of its type: call it in
-    ``__post_init__``."""
+    """Raise InputError for the first field of a dataclass that is not of its type.
+
+    Call it in ``__post_init__``.
+    """
     kind: Any = type(one)
     hints = _hints(kind)
     for field in fields(one):
@@ -62,7 +68,7 @@ def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
 
 @cache
 def _hints(owner: Any) -> dict[str, Any]:
-    """The types of arguments or fields, each once."""
+    """Return the types of arguments or fields, each once."""
     return typing.get_type_hints(owner)
 
 
@@ -72,32 +78,26 @@ def fits(value: Any, kind: Any) -> bool:
     if kind is Any:
         return True
     if origin in (typing.Union, types.UnionType):
-        is_path = any(_is_path(one) for one in inside)
-        return any(
-            _fits_path(value) if is_path and one is str else fits(value, one) for one in inside
-        )
+        return _fits_one_of(value, inside)
     if kind is None or kind is type(None):
         return value is None
     if _is_path(kind):
         return _fits_path(value)
-    if kind is float:
-        return _is_number(value)
-    if kind is int:
-        return _is_number(value) and (
-            isinstance(value, Integral) or real(value) == np.rint(real(value))
-        )
-    if kind is bool:
-        return isinstance(value, bool | np.bool_)
-    if origin is np.ndarray or kind is np.ndarray:
-        return _are_numbers(value)
-    if origin is tuple:
-        return _fits_tuple(value, inside)
-    if origin in (Sequence, Iterable, list):
-        return _is_sequence(value) and all(fits(one, inside[0]) for one in value)
-    if origin in (Mapping, dict):
-        return isinstance(value, Mapping) and all(
-            fits(key, inside[0]) and fits(value[key], inside[1]) for key in value
-        )
+    if kind in _SIMPLE:
+        return _SIMPLE[kind](value)
+    if origin in _MADE_OF:
+        return _MADE_OF[origin](value, inside)
+    return _fits_object(value, kind, origin)
+
+
+def _fits_one_of(value: Any, kinds: tuple[Any, ...]) -> bool:
+    """Return whether a value is of one of several types; a text beside a path is a path."""
+    is_path = any(_is_path(one) for one in kinds)
+    return any(_fits_path(value) if is_path and one is str else fits(value, one) for one in kinds)
+
+
+def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
+    """Return whether a value is a function, satisfies a protocol, or is of a class."""
     if kind is Callable or origin is Callable:
         return callable(value) and not isclass(value)
     if getattr(kind, "_is_protocol", False):
@@ -150,6 +150,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool | np.bool_)
 
 
+def _is_whole(value: Any) -> bool:
+    return _is_number(value) and (
+        isinstance(value, Integral) or real(value) == np.rint(real(value))
+    )
+
+
 def _are_numbers(value: Any) -> bool:
     return (
         not isinstance(value, str | bytes)
@@ -173,8 +179,35 @@ def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
     )
 
 
+def _fits_sequence(value: Any, inside: tuple[Any, ...]) -> bool:
+    return _is_sequence(value) and all(fits(one, inside[0]) for one in value)
+
+
+def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
+    return isinstance(value, Mapping) and all(
+        fits(key, inside[0]) and fits(value[key], inside[1]) for key in value
+    )
+
+
+_SIMPLE: dict[Any, Callable[[Any], bool]] = {
+    float: _is_number,
+    int: _is_whole,
+    bool: lambda value: isinstance(value, bool | np.bool_),
+    np.ndarray: _are_numbers,
+}
+_MADE_OF: dict[Any, Callable[[Any, tuple[Any, ...]], bool]] = {
+    np.ndarray: lambda value, _: _are_numbers(value),
+    tuple: _fits_tuple,
+    Sequence: _fits_sequence,
+    Iterable: _fits_sequence,
+    list: _fits_sequence,
+    Mapping: _fits_mapping,
+    dict: _fits_mapping,
+}
+
+
 def _asked(protocol: Any) -> list[str]:
-    """The attributes and methods that a protocol asks for."""
+    """Return the attributes and methods that a protocol asks for."""
     names = {
         name
         for one in protocol.__mro__

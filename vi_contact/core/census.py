@@ -27,8 +27,9 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class Census:
-    """Count the nodes of one contact boundary and hold the places of those that are not plain
-    contact points.
+    """Count the nodes of one contact boundary by their kinds.
+
+    The places of those that are not plain contact points are held.
 
     Args:
         name: the boundary, as the user named it; of a pair, that of side 1.
@@ -47,8 +48,10 @@ class Census:
     places: Mapping[str, Array] = field(default_factory=dict)
 
     def in_words(self) -> str:
-        """Return how many points of how many nodes there are, and the other kinds with their first
-        places."""
+        """Return in words how many points of how many nodes there are.
+
+        The other kinds follow with their first places.
+        """
         kinds = [self._kind(kind, points) for kind, points in self.places.items()]
         return "; ".join([f"{self.points} points of {self.nodes} nodes", *kinds])
 

@@ -1,5 +1,7 @@
-"""Judge one step: how far an answer is from solving its inequality problem. ``core.verify``
-computes it."""
+"""Judge one step: how far an answer is from solving its inequality problem.
+
+``core.verify`` computes it.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,22 +9,31 @@ from functools import cached_property
 
 @dataclass(frozen=True)
 class Certificate:
-    """Hold the dimensionless residuals of the inequality problem of one step; each is 0 for an
-    exact solution.
+    """Hold the dimensionless residuals of the inequality problem of one step.
 
-    equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max, 1e-5 |A_ii|_max |x|_max). The last term matters on
-    fine meshes only, where the parts of A x cancel: it keeps the rounding errors of the residual itself (1e-16 |A||x|)
-    below the tolerance; what passes at 1e-9 is then at most 1e-14 |A||x|.
-    penetration: max(-gap, 0) / x_ref;  tension: max(-r_n, 0) / r_ref.
-    complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref over the others: the set
-    that the impact law will see is certified too.
-    cone: max(|r_t| - limit(r_n), 0) / t_ref;  dissipation: max (limit |slip| - r_t·slip) / (t_ref s_ref), the maximum
-    dissipation that Coulomb's and Tresca's law ask for: it is 0 where the slip or the limit is, or where r_t lies
-    along the slip on the edge of the cone. t_ref = max(limit, |r_t|, 1e-10 r_ref), s_ref = max(|slip|, 1e-5 x_ref): a
-    step slides a small part of the way and rubs with a small part of the inertia. Both are 0 without friction.
-    x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), maxima over all unknowns: a wide gap blunts no residual.
-    resultant: of static stages, the largest |w·(b - B_nᵀ r_n - B_tᵀ r_t)| over max |w| times the sum of |b| and |Bᵀr|
-    on a body, for its rigid motions w that no prescribed displacement holds: nodal residuals may be small and add up.
+    Each is 0 for an exact solution.
+
+    Attributes:
+        equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max, 1e-5 |A_ii|_max |x|_max).
+            The last term matters on fine meshes only, where the parts of A x cancel: it keeps the
+            rounding errors of the residual itself (1e-16 |A||x|) below the tolerance; what passes
+            at 1e-9 is then at most 1e-14 |A||x|.
+        penetration: max(-gap, 0) / x_ref.
+        tension: max(-r_n, 0) / r_ref.
+        complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref
+            over the others: the set that the impact law will see is certified too.
+        cone: max(|r_t| - limit(r_n), 0) / t_ref; 0 without friction.
+        dissipation: max (limit |slip| - r_t·slip) / (t_ref s_ref), the maximum dissipation that
+            Coulomb's and Tresca's law ask for: it is 0 where the slip or the limit is, or where
+            r_t lies along the slip on the edge of the cone, and without friction.
+        resultant: of static stages, the largest |w·(b - B_nᵀ r_n - B_tᵀ r_t)| over max |w| times
+            the sum of |b| and |Bᵀr| on a body, for its rigid motions w that no prescribed
+            displacement holds: nodal residuals may be small and add up.
+
+    The references are maxima over all unknowns, so that a wide gap blunts no residual:
+    x_ref = max(|x|, |guess|), r_ref = max(|b|, |r_n|), t_ref = max(limit, |r_t|, 1e-10 r_ref) and
+    s_ref = max(|slip|, 1e-5 x_ref): a step slides a small part of the way and rubs with a small
+    part of the inertia.
     """
 
     equilibrium: float

@@ -2,7 +2,8 @@
 
 Every constructor and every entry point of the package asks here, before any work is done. A check
 returns the value in the type that the caller goes on with, so that one line reads and checks an
-argument."""
+argument.
+"""
 
 import math
 import re
@@ -33,8 +34,11 @@ def number(
     not_negative: bool = False,
     unit: str = "",
 ) -> float:
-    """Return a finite real number as a float; InputError for texts, NaN, infinity, truth values and
-    wrong signs."""
+    """Return a finite real number as a float.
+
+    Raises:
+        InputError: texts, NaN, infinity, truth values and wrong signs.
+    """
     kind = "a finite number above zero" if positive else "zero or a positive finite number"
     wanted = (kind if positive or not_negative else "a finite number") + (
         f" in {unit}" if unit else ""
@@ -52,8 +56,10 @@ def number(
 
 
 def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | None = None) -> int:
-    """Return a whole number between ``least`` and ``most`` as an int; 3.0 counts as one, True does
-    not."""
+    """Return a whole number between ``least`` and ``most`` as an int.
+
+    3.0 counts as a whole number, True does not.
+    """
     found = real(value)
     if (
         not math.isfinite(found)
@@ -83,8 +89,11 @@ def check_word(name: str, given: object, known: Sequence[str]) -> None:
 def counted(
     owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST
 ) -> int:
-    """Return how many things an input asks for, before memory is taken for them; InputError above
-    ``most``, and NaN."""
+    """Return how many things an input asks for, before memory is taken for them.
+
+    Raises:
+        InputError: more than ``most``, and NaN.
+    """
     found = real(value)
     if not found <= most:
         raise InputError(
@@ -103,9 +112,11 @@ def attributes(
     counts: tuple[str, ...] = (),
     flags: tuple[str, ...] = (),
 ) -> None:
-    """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not
-    > 0, or not >= 0, or no whole number of at least 1 (``counts``), or neither True nor False
-    (``flags``)."""
+    """Raise InputError that names the first attribute of ``owner`` which is wrong.
+
+    Wrong is what is not a finite number, or not > 0, or not >= 0, or no whole number of at least 1
+    (``counts``), or neither True nor False (``flags``).
+    """
     what = type(owner).__name__
     for name in finite + positive + not_negative:
         number(
@@ -136,8 +147,11 @@ def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
 
 
 def column_name(kind: str, name: Any) -> str:
-    """Return a name that columns may carry; InputError unless it is made of letters, digits and
-    underscores."""
+    """Return a name that columns may carry.
+
+    Raises:
+        InputError: the name is not made of letters, digits and underscores alone.
+    """
     if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
         return str(name)
     raise InputError(
@@ -146,8 +160,11 @@ def column_name(kind: str, name: Any) -> str:
 
 
 def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...]:
-    """Return the members of a list or tuple; InputError for one object, a text or a mapping in its
-    place."""
+    """Return the members of a list or tuple.
+
+    Raises:
+        InputError: one object, a text or a mapping in its place.
+    """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
@@ -156,8 +173,11 @@ def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...
 def instance(
     owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...], remedy: str
 ) -> Any:
-    """Return an object of one of these types; InputError for a class instead of an object, and for
-    anything else."""
+    """Return an object of one of these types.
+
+    Raises:
+        InputError: a class instead of an object, and anything else.
+    """
     if isinstance(value, kinds):
         return value
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
@@ -172,8 +192,11 @@ def provides(
     *,
     lacks: tuple[str, ...] = (),
 ) -> Any:
-    """Return an object with these attributes (a protocol's) and without those of other kinds; else
-    InputError."""
+    """Return an object with these attributes (a protocol's) and without those of other kinds.
+
+    Raises:
+        InputError: the object lacks an attribute, or has one of another kind.
+    """
     fits = all(hasattr(value, name) for name in names) and not any(
         hasattr(value, name) for name in lacks
     )
@@ -185,8 +208,10 @@ def provides(
 def array(
     owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *, unit: str = ""
 ) -> Array:
-    """Return finite real values as a float array of this shape; None stands for any length along an
-    axis."""
+    """Return finite real values as a float array of this shape.
+
+    None in the shape stands for any length along an axis.
+    """
     unit = f" in {unit}" if unit else ""
     wanted = (
         "("
@@ -224,8 +249,10 @@ def optional(
 
 
 def shape_of(value: Any) -> tuple[int, ...]:
-    """Return the shape of numbers in lists or arrays; (-1,) for lists of different lengths, which
-    have none."""
+    """Return the shape of numbers in lists or arrays.
+
+    Lists of different lengths have none: (-1,) stands for it.
+    """
     try:
         return np.shape(value)
     except ValueError:
@@ -241,8 +268,11 @@ def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]
 
 
 def mask(owner: str, meaning: str, value: Any, shape: tuple[int, ...]) -> Mask:
-    """Return truth values of this shape; InputError for indices, numbers, texts and other
-    shapes."""
+    """Return truth values of this shape.
+
+    Raises:
+        InputError: indices, numbers, texts and other shapes.
+    """
     try:
         found = np.asarray(value)
     except ValueError:
@@ -283,8 +313,10 @@ def _called(value: Any) -> str:
 
 
 def real(value: Any) -> float:
-    """Return the value as a float, NaN for what is no real number; integers too large for a float
-    are infinite."""
+    """Return the value as a float, NaN for what is no real number.
+
+    Integers too large for a float are infinite.
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Integral):
@@ -296,8 +328,10 @@ def real(value: Any) -> float:
 
 
 def refuse(defects: Iterable[str], comm: Comm) -> None:
-    """Raise InputError on all ranks with the first text that is not empty, whichever rank found it;
-    collective."""
+    """Raise InputError on all ranks with the first text that is not empty.
+
+    It does not matter which rank found it. Collective.
+    """
     mine = next((text for text in defects if text), "")
     if largest(comm, bool(mine)):
         found = comm.bcast(comm.gather(mine))
@@ -305,8 +339,10 @@ def refuse(defects: Iterable[str], comm: Comm) -> None:
 
 
 def ended(name: str, error: Exception) -> str:
-    """Return the sentence about an error in a user's function: the package's own as it is, others
-    with their line."""
+    """Return the sentence about an error in a user's function.
+
+    The package's own errors are told as they are, others with their line.
+    """
     place = traceback.extract_tb(error.__traceback__)[-1]
     said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
     if of_machine(error):
@@ -319,12 +355,18 @@ def ended(name: str, error: Exception) -> str:
 
 
 def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
-    """Return what a call of a user's function returns; InputError on all ranks where it raises on
-    one. Collective."""
+    """Return what a call of a user's function returns.
+
+    Collective.
+
+    Raises:
+        InputError: on all ranks, where the call raises on one.
+    """
     found, defect, failure = [], "", None
     try:
         found.append(call())
-    except Exception as error:  # of a user's function, which may raise anything: the others must not wait for this one
+    except Exception as error:
+        # A user's function may raise anything, and the others must not wait for this one.
         defect, failure = ended(name, error), error
     try:
         refuse([defect], comm)

@@ -9,7 +9,8 @@ call such a function:
   on with another value; at the end of the frame all ranks are asked once, however many functions
   were called. This is for every step.
 
-On one rank a frame does nothing, and errors are raised where they happen."""
+On one rank a frame does nothing, and errors are raised where they happen.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -41,13 +42,15 @@ _OPEN: list[
 
 @contextmanager
 def together(comm: Comm) -> Iterator[None]:
-    """Open a frame: what ``users`` keeps in it, or this rank raises, is raised on all ranks at its
-    end. Collective.
+    """Open a frame at whose end errors are raised on all ranks.
+
+    These are what ``users`` keeps in it, and what this rank raises. Collective.
 
     Where ``users`` kept an error, all ranks raise the first of these. Otherwise a rank raises its
     own error, and those without one raise that of the first rank that has one. What is raised
     within the frame between collective calls, and not by a function that ``users`` calls, may still
-    leave the others waiting: give it a frame of its own."""
+    leave the others waiting: give it a frame of its own.
+    """
     if comm.size == 1:
         yield
         return
@@ -65,13 +68,15 @@ def together(comm: Comm) -> Iterator[None]:
 
 
 def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
-    """Open a frame for calls of a scheme, a solver or a law of the user's own, which may raise
-    anywhere."""
+    """Open a frame for calls of a scheme, a solver or a law of the user's own.
+
+    These may raise anywhere.
+    """
     return nullcontext() if type(value).__module__.startswith("vi_contact.") else together(comm)
 
 
 def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> Exception:
-    """The error that this rank raises when some rank has one. Collective."""
+    """Return the error that this rank raises when some rank has one. Collective."""
     own: Any = kept or broken
     kind = next((number for number, kind in enumerate(KINDS) if isinstance(own, kind)), None)
     every = from_each(comm, None if own is None else (kept is not None, kind, str(own), repr(own)))
@@ -93,10 +98,13 @@ def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> 
 
 
 def users(name: str, call: Callable[[], T], instead: T, *, as_it_is: bool = False) -> T:
-    """Return what a user's function returns. Where it raises, InputError says so with its name and
+    """Return what a user's function returns.
+
+    Where it raises, InputError says so with its name and
     line: at once, or in a frame of several ranks at its end, and ``instead`` is returned.
     ``as_it_is``: its own rank raises what it has raised, and the other ranks alone that
-    InputError."""
+    InputError.
+    """
     try:
         return call()
     except Exception as error:
@@ -115,8 +123,10 @@ def _input_error(name: str, error: Exception) -> ViContactError:
 
 
 def kept_error(name: str, error: Exception, instead: T) -> T:
-    """Raise what a user's function has raised, or keep it for the end of the frame and return
-    ``instead``."""
+    """Raise what a user's function has raised, or keep it for the end of the frame.
+
+    When it is kept, ``instead`` is returned.
+    """
     told = _input_error(name, error)
     if not _OPEN:
         raise told from (None if told is error else error)
@@ -143,12 +153,14 @@ def slope_of(law: Any, weights: Any) -> Any:
 
 
 def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
-    """Raise InputError, on all ranks, that names the first argument which is not the same on all of
-    them. Collective.
+    """Raise InputError on all ranks unless arguments are the same on all of them.
+
+    The error names the first argument that is not the same. Collective.
 
     Numbers, texts, arrays, and lists and dataclasses of these are compared; of functions and of
     other objects the type alone. ``Parts`` says of which argument each rank may hold its part:
-    there lists and arrays are not compared."""
+    there lists and arrays are not compared.
+    """
     if comm.size == 1:
         return
     own = {
@@ -182,8 +194,10 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
 
 
 class Parts:
-    """Wrap an argument of which each rank may hold its part: its tuples, lists and arrays are not
-    compared."""
+    """Wrap an argument of which each rank may hold its part.
+
+    Its tuples, lists and arrays are not compared.
+    """
 
     def __init__(self, value: Any) -> None:
         self.value = value
@@ -193,7 +207,7 @@ class Parts:
 
 
 def _described(value: Any, depth: int, parts: bool = False) -> str:
-    """A text that is the same on all ranks where the argument is."""
+    """Return a text that is the same on all ranks where the argument is."""
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
     if isinstance(value, Parts):
         return _described(value.value, depth, parts=True)
@@ -226,7 +240,7 @@ def _described(value: Any, depth: int, parts: bool = False) -> str:
 
 
 def _of_many(value: Any, depth: int) -> str:
-    """A text of the members of a list or array, short where they are many numbers."""
+    """Return a text of the members of a list or array, short where they are many numbers."""
     if (
         isinstance(value, np.ndarray)
         or len(value) > LONG

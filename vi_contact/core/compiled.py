@@ -1,10 +1,13 @@
-"""Compile the C files of this room when they are first needed, and keep them in the user's cache,
-as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact.
+"""Compile the C files of this room when they are first needed.
+
+They are kept in the user's cache, as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder
+vi_contact.
 
 ``loops.c`` needs a C compiler only. ``contact_last.c`` needs CHOLMOD too, and takes none but the
 one that PETSc has brought into the process: another one beside it would share names with it, and
 with the METIS and the BLAS of PETSc, so that functions of one call those of the other. Compiling
-against the header beside that CHOLMOD makes any version do."""
+against the header beside that CHOLMOD makes any version do.
+"""
 
 import ctypes
 import logging
@@ -32,15 +35,19 @@ OF_CHOLMOD = ("order", "factorise", "columns", "release", "substitute")
 
 
 def library(comm: Comm) -> Any:
-    """Return the functions of ``loops.c``, or None, the same on all ranks; the first rank compiles
-    them. Collective."""
+    """Return the functions of ``loops.c``, or None, the same on all ranks.
+
+    The first rank compiles them. Collective.
+    """
     return _alike(comm, _loops)
 
 
 def cholmod(comm: Comm) -> Any:
-    """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD, or None where PETSc has no
-    CHOLMOD or nothing can be compiled, the same on all ranks; the first rank compiles it.
-    Collective."""
+    """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD.
+
+    It is None where PETSc has no CHOLMOD or nothing can be compiled, and the same on all ranks. The
+    first rank compiles it. Collective.
+    """
     return _alike(comm, _factoriser)
 
 
@@ -59,7 +66,10 @@ def _alike(comm: Comm, found: Callable[[], Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _loops() -> Any:
-    """The functions; None, and once a line in the log, where there is no compiler or cache."""
+    """Return the functions, or None where there is no compiler or cache.
+
+    Without one, a line in the log says so once.
+    """
     try:
         found = ctypes.CDLL(str(compiled(LOOPS, [])))
     except (
@@ -77,8 +87,10 @@ def _loops() -> Any:
 
 
 def _factoriser() -> Any:
-    """The functions for the CHOLMOD of this process, which a PETSc may bring later than we are
-    asked first."""
+    """Return the functions for the CHOLMOD of this process.
+
+    A PETSc may bring it later than we are asked first.
+    """
     try:
         return _with_cholmod(cholmod_of_petsc())
     except OSError as problem:
@@ -112,8 +124,11 @@ def _without_cholmod(reason: str) -> None:
 
 
 def cholmod_of_petsc() -> Path:
-    """Return the file of the CHOLMOD that PETSc has brought into this process; OSError, which says
-    why, without one."""
+    """Return the file of the CHOLMOD that PETSc has brought into this process.
+
+    Raises:
+        OSError: there is none; the error says why.
+    """
     if not packages.petsc_is_here():
         raise OSError("no PETSc is in this process")
     if not packages.petsc_has("cholmod"):
@@ -134,8 +149,10 @@ def _loaded_cholmod(maps: Path) -> Path:
 
 
 def _header(file: Path) -> Path:
-    """The folder of the header that was installed with this library: lib, or lib/x86_64-linux-gnu,
-    beside include."""
+    """Return the folder of the header that was installed with this library.
+
+    The library lies in lib, or lib/x86_64-linux-gnu, beside include.
+    """
     for parent in file.parents[1:3]:
         for folder in (parent / "include" / "suitesparse", parent / "include"):
             if (folder / "cholmod.h").is_file():
@@ -144,12 +161,14 @@ def _header(file: Path) -> Path:
 
 
 def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
-    """Return the file of the compiled functions, made unless one that can be loaded is there. Safe
-    in any number of processes: each compiles aside, and the last one to end replaces the file as a
-    whole.
+    """Return the file of the compiled functions, made unless one that can be loaded is there.
+
+    Safe in any number of processes: each compiles aside, and the last one to end replaces the file
+    as a whole.
 
     ``libraries``: files to link with, which are in the process already; a changed one is another
-    result."""
+    result.
+    """
     command = [*shlex.split(os.environ.get("CC") or "cc"), "-O3", "-shared", "-fPIC", *options]
     stamps = [(str(one), one.stat().st_size, one.stat().st_mtime_ns) for one in libraries]
     text = f"{source.read_text(encoding='utf-8')}{command}{stamps}{platform.machine()}"
@@ -169,7 +188,7 @@ def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
 
 
 def _said(problem: Exception) -> str:
-    """The first line of what a compiler or the system said."""
+    """Return the first line of what a compiler or the system said."""
     return (
         (getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)]
     )[0]

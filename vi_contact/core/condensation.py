@@ -1,5 +1,6 @@
-"""Condense A onto contact unknowns c: their flexibility, their motion without reactions, and the
-answer to reactions.
+"""Condense A onto contact unknowns c.
+
+What comes of it is their flexibility, their motion without reactions, and the answer to reactions.
 
     G = (A⁻¹)_cc,    free: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
 
@@ -7,7 +8,8 @@ With the contact unknowns last in the factor (``contact_last``) a step costs one
 backward substitution, and G comes from the corner of the factor. Where there is no such factor it
 costs two whole ones, and G one for each contact unknown. Contact values here are those of all
 ranks, on every rank: the normal unknowns by the numbers of the conditions or, with friction, (r_n,
-r_t) node by node. What cannot move (a prescribed tangent) stays at zero."""
+r_t) node by node. What cannot move (a prescribed tangent) stays at zero.
+"""
 
 from typing import Any
 
@@ -24,7 +26,9 @@ def condense(
     A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False
 ) -> "Last | _Twice":
     """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns.
-    Collective."""
+
+    Collective.
+    """
     mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
     if frictional:
         mine = np.hstack([mine, surface.tangents])
@@ -38,8 +42,11 @@ def condense(
 
 
 class Last:
-    """Hold A condensed onto k contact unknowns, which come last in its factor. ``free`` begins a
-    step, ``answer`` ends it; collective. ``flexibility`` (k, k); ``there`` (k,): what can move."""
+    """Hold A condensed onto k contact unknowns, which come last in its factor.
+
+    ``free`` begins a step, ``answer`` ends it; collective. ``flexibility`` (k, k); ``there`` (k,):
+    what can move.
+    """
 
     def __init__(self, factor: ContactLast, there: Mask) -> None:
         self._factor, self.there, corner = factor, there, factor.corner
@@ -61,8 +68,10 @@ class Last:
         return x if self._all else x.T[self.there].T
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
-        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values: it
-        removes round-off only."""
+        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values.
+
+        Holding them removes round-off only.
+        """
         if np.count_nonzero(r):
             x = self._factor.free(self._y - self._factor.reduced(self._moving(r)))
         else:
@@ -76,8 +85,10 @@ class Last:
 
 
 class _Twice:
-    """Hold the same with any factor of A; ``owned`` contact unknowns of this rank and their
-    ``places`` among all."""
+    """Hold the same with any factor of A.
+
+    There are ``owned`` contact unknowns of this rank and they have ``places`` among all.
+    """
 
     def __init__(
         self,

@@ -8,7 +8,8 @@ any x_c that contact asks for may be put in between the two substitutions: with 
 equilibrium.
 
 Loads, answers and contact values may also be of several runs, a row for each: L is then read once
-for eight of them."""
+for eight of them.
+"""
 
 import ctypes
 import weakref
@@ -30,11 +31,13 @@ SHORT_COLUMNS = 120.0
 
 
 class ContactLast:
-    """Hold the factor of a symmetric positive definite matrix, with the unknowns ``last`` in the
-    last rows of L.
+    """Hold the factor of a symmetric positive definite matrix.
+
+    The unknowns ``last`` are in the last rows of L.
 
     Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the
-    owned rows. Vectors of c are in the order of ``last``. ``corner``: L_cc, lower triangular."""
+    owned rows. Vectors of c are in the order of ``last``. ``corner``: L_cc, lower triangular.
+    """
 
     def __init__(
         self,
@@ -84,8 +87,10 @@ class ContactLast:
         return self._c.copy()
 
     def backward(self, x_c: Array) -> Array:
-        """Return x, the owned entries, whose contact unknowns are exactly x_c and the others in
-        equilibrium with them under the load of the last ``forward``."""
+        """Return x, the owned entries, whose contact unknowns are exactly x_c.
+
+        The other unknowns are in equilibrium with them under the load of the last ``forward``.
+        """
         if x_c.ndim == 2:
             return self._backward_many(x_c)
         if self._columns:
@@ -151,7 +156,7 @@ class ContactLast:
 
 
 def _by_corner(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Array:
-    """What a routine of BLAS makes of the triangle and of every row."""
+    """Return what a routine of BLAS makes of the triangle and of every row."""
     return (
         np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T)
         if rows.size
@@ -160,7 +165,7 @@ def _by_corner(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Arra
 
 
 def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
-    """The rows of A in the order of elimination."""
+    """Return the rows of A in the order of elimination."""
     inner = np.ones(A.shape[0], dtype=bool)
     inner[last] = False
     rows, dissect = np.flatnonzero(inner), len(inner) > FEW_ROWS
@@ -181,7 +186,7 @@ def _factorise(library: Any, A: sp.csr_matrix, order: NDArray[np.int32]) -> Any:
 
 
 def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
-    """A symmetric matrix with the sorted 32 bit indices that CHOLMOD reads."""
+    """Return a symmetric matrix with the sorted 32 bit indices that CHOLMOD reads."""
     if A.nnz > np.iinfo(np.int32).max:
         raise ArithmeticError("the matrix has too many entries for 32 bits")
     indices = A.indices.astype(np.int32, copy=False), A.indptr.astype(np.int32, copy=False)
@@ -190,6 +195,8 @@ def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def at(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return where an array lies in memory; ``array.ctypes`` takes several times as long to
-    tell."""
+    """Return where an array lies in memory.
+
+    ``array.ctypes`` takes several times as long to tell.
+    """
     return ctypes.c_void_p(array.__array_interface__["data"][0])

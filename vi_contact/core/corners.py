@@ -2,7 +2,8 @@
 
 With the directions n_i of a node its unknowns are û_i = n_i·u, and a force on them is Σ f̂_i n_i.
 Where the directions are oblique, with the cosines G_ij = n_i·n_j, a change of velocity along one
-normal changes the others' û too, Δû = G a, and a lumped mass m is m G⁻¹."""
+normal changes the others' û too, Δû = G a, and a lumped mass m is m G⁻¹.
+"""
 
 from itertools import permutations
 
@@ -28,8 +29,10 @@ def at_right_angles(directions: Array) -> bool:
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
-    """Return (columns, Q): the frame of a node with two or three independent contact directions (k,
-    d)."""
+    """Return (columns, Q), the frame of a node with several contact directions.
+
+    These are two or three independent directions (k, d).
+    """
     d, square = directions.shape[1], at_right_angles(directions)
     columns: list[int] = []
     for direction in directions:
@@ -53,11 +56,13 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
 
 
 def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
-    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,), along which
-    slip and r_t are.
+    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,).
+
+    Slip and r_t are along them.
 
     Of a node with several directions they are the other vectors of its frame. ``nodes``: None for
-    one each."""
+    one each.
+    """
     column, blocks = nodal_blocks(nodal_frames(normals))
     for rows in () if nodes is None else same_node(nodes):
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
@@ -91,9 +96,11 @@ def refuse_rubbing(surface: ContactSurface) -> None:
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
-    """Return the target normal velocities (m,), NaN for open faces, with those that oblique open
-    faces get from the closed faces of their nodes, whose velocity changes along the normals of
-    these."""
+    """Return the target normal velocities (m,), NaN for open faces.
+
+    Among them are those that oblique open faces get from the closed faces of their nodes, whose
+    velocity changes along the normals of these.
+    """
     corners = oblique_corners(surface)
     if not corners:
         return target
@@ -111,8 +118,10 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
 
 
 def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
-    """Return (rows, columns, values) of the lumped masses ``nodal``: the diagonal, but m G⁻¹ at
-    oblique corners."""
+    """Return (rows, columns, values) of the lumped masses ``nodal``.
+
+    The matrix is the diagonal, but m G⁻¹ at oblique corners.
+    """
     rows = [np.arange(len(nodal))]
     columns, values = [rows[0]], [nodal.copy()]
     for corner in oblique_corners(surface):

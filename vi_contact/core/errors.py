@@ -1,5 +1,7 @@
-"""Name the ways a run stops early: wrong input, a step that no method could certify, or somebody
-asked it to."""
+"""Name the ways a run stops early.
+
+These are wrong input, a step that no method could certify, and that somebody asked it to.
+"""
 
 import errno
 import signal
@@ -26,26 +28,34 @@ _MACHINE = (
 
 
 class ViContactError(Exception):
-    """Name every error raised on purpose; the command line prints its one sentence and exits with
-    1."""
+    """Name every error raised on purpose.
+
+    The command line prints its one sentence and exits with 1.
+    """
 
 
 class InputError(ViContactError, ValueError):
-    """Say that the input is wrong: the message is one sentence that names the offending thing and
-    the remedy."""
+    """Say that the input is wrong.
+
+    The message is one sentence that names the offending thing and the remedy.
+    """
 
 
 class StepFailure(ViContactError, RuntimeError):
-    """Say that a step stayed above the certificate tolerance with every method; nothing before it
-    is lost."""
+    """Say that a step stayed above the certificate tolerance with every method.
+
+    Nothing before it is lost.
+    """
 
 
 class Interrupted(KeyboardInterrupt):
-    """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks; its
-    folder has all so far.
+    """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks.
+
+    The run's folder has all so far.
 
     Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal;
-    ``status``: 128 + number."""
+    ``status``: 128 + number.
+    """
 
     def __init__(self, message: str = "interrupted", number: int = signal.SIGINT) -> None:
         super().__init__(message, number)
@@ -58,7 +68,8 @@ class Interrupted(KeyboardInterrupt):
 class OutOfTime(Interrupted):
     """Say that a run ended, on all ranks, because its wall time was nearly over; a restart goes on.
 
-    ``status`` is 75, which says that the command may be given again (EX_TEMPFAIL)."""
+    ``status`` is 75, which says that the command may be given again (EX_TEMPFAIL).
+    """
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
@@ -66,8 +77,10 @@ class OutOfTime(Interrupted):
 
 
 def of_memory(error: BaseException) -> bool:
-    """Say whether an error, or one it came from, says that there is no memory: Python's, numpy's,
-    HDF5's, PETSc's."""
+    """Say whether an error, or one it came from, says that there is no memory.
+
+    Errors of Python, numpy, HDF5 and PETSc are known.
+    """
     return any(
         isinstance(one, MemoryError)
         or getattr(one, "errno", None) == errno.ENOMEM
@@ -81,10 +94,12 @@ def of_memory(error: BaseException) -> bool:
 
 
 def of_machine(error: BaseException) -> bool:
-    """Say whether an error tells of the machine (memory, permissions, open files), and so nothing
-    of what a file holds.
+    """Say whether an error tells of the machine: memory, permissions, open files.
 
-    A handler that takes other errors for the damage of a file raises these again."""
+    Such an error says nothing of what a file holds.
+
+    A handler that takes other errors for the damage of a file raises these again.
+    """
     return of_memory(error) or (isinstance(error, OSError) and error.errno in _MACHINE)
 
 

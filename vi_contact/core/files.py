@@ -1,7 +1,8 @@
 """Write files that a crash cannot spoil, on rank 0 alone, with failures told to all ranks.
 
 Which names are opened, and that no link is followed: ``core.own_files``; HDF5 files are read by
-``core.hdf5``."""
+``core.hdf5``.
+"""
 
 import csv
 import errno
@@ -37,10 +38,12 @@ FRAMES = re.compile(r"frames_\d{6,}\.h5")  # a file of several frames
 
 
 def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
-    """Return where the frames of an XDMF series in a run folder are: step -> (HDF5 file, group in
-    it).
+    """Return where the frames of an XDMF series in a run folder are.
 
-    InputError where the folder of fields, or a file of frames, is a link."""
+    The answer is step -> (HDF5 file, group in it).
+
+    InputError where the folder of fields, or a file of frames, is a link.
+    """
     fields = inner_folder(folder, FIELDS)
     names = sorted(os.listdir(fields)) if fields.is_dir() else []
     found = {
@@ -53,10 +56,12 @@ def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
 
 
 def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
-    """Return the action's value on rank 0, None elsewhere; what it raises there is raised on every
-    rank.
+    """Return the action's value on rank 0, None elsewhere.
 
-    An OSError becomes a ViContactError of one sentence with path and reason. Collective."""
+    What it raises there is raised on every rank.
+
+    An OSError becomes a ViContactError of one sentence with path and reason. Collective.
+    """
     value: T | None = None
     failure: Exception | None = None
     if comm.rank == 0:
@@ -107,18 +112,22 @@ def sentence(error: OSError) -> str:
 
 
 def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
-    """Write a file as a whole or not at all; OSError names it. ``safe``: even if the power fails,
-    which takes time."""
+    """Write a file as a whole or not at all; OSError names it.
+
+    ``safe``: even if the power fails, which takes time.
+    """
     with _whole_or_not_at_all(path, safe) as file:
         write_all(file, data)
 
 
 def write_output(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file that a user has named, as a whole or not at all; to a stream, such as
-    /dev/stdout, as it is.
+    """Write a file that a user has named, as a whole or not at all.
+
+    To a stream, such as /dev/stdout, it is written as it is.
 
     OSError names the file. A link of this name is replaced, and what it points at stays as it
-    is."""
+    is.
+    """
     if is_stream(Path(path)):
         with open(path, "ab", buffering=0) as file:
             write_all(file, data)
@@ -127,8 +136,11 @@ def write_output(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def copy_start(source: Path, target: Path, length: int) -> None:
-    """Copy the first bytes of a file of a run, as a whole or not at all; OSError names the
-    target."""
+    """Copy the first bytes of a file of a run, as a whole or not at all.
+
+    Raises:
+        OSError: names the target.
+    """
     with open_to_read(source) as old, _whole_or_not_at_all(target) as new:
         left = length
         while left and (data := old.read(min(left, STRIDE))):
@@ -151,7 +163,9 @@ def write_all(file: Any, data: bytes) -> None:
 
 def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
     """Write a table as a whole and return its path: numbers to the last bit, None empty.
-    ViContactError if it fails."""
+
+    ViContactError if it fails.
+    """
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows([header, *rows])
     try:
@@ -181,8 +195,11 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
-    """Open an unbuffered file beside ``path`` that takes its place at the end; OSError names
-    ``path``."""
+    """Open an unbuffered file beside ``path`` that takes its place at the end.
+
+    Raises:
+        OSError: names ``path``.
+    """
     temporary = temporary_of(path)
     try:
         with open_new(temporary) as file:
@@ -197,8 +214,12 @@ def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
 
 
 def open_hdf5(path: Path) -> StoredFile:
-    """Open an HDF5 file of a run folder to be read; OSError when it is none, InputError when it is
-    a link."""
+    """Open an HDF5 file of a run folder to be read.
+
+    Raises:
+        OSError: it is no HDF5 file.
+        InputError: it is a link.
+    """
     return StoredFile(path)
 
 
@@ -215,8 +236,10 @@ def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
 
 
 class _Kept:
-    """A file for HDF5, which does not survive a full disk: the error is kept, and what comes after
-    it is dropped."""
+    """Hold a file for HDF5, which does not survive a full disk.
+
+    The error is kept, and what comes after it is dropped.
+    """
 
     def __init__(self, file: Any) -> None:
         self._file = file

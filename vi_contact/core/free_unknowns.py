@@ -1,5 +1,7 @@
-"""Solve with a well-conditioned matrix, as mass matrices are, without a factor: conjugate gradients
-to round-off."""
+"""Solve with a well-conditioned matrix, as mass matrices are, without a factor.
+
+The method is conjugate gradients to round-off.
+"""
 
 import numpy as np
 
@@ -12,12 +14,14 @@ PATIENCE = 2000  # iterations; a consistent mass matrix takes some fifty
 
 
 def solve_free(algebra: Algebra, A: Matrix, b: Array, held: Mask, x: Array) -> Array:
-    """Return x of A x = b in the rows that are not held; held unknowns keep the values that ``x``
-    has.
+    """Return x of A x = b in the rows that are not held.
+
+    Held unknowns keep the values that ``x`` has.
 
     A is symmetric and positive definite on the others; it is preconditioned by its diagonal.
     StepFailure when it takes too long. Collective; a product and two reductions of one number an
-    iteration."""
+    iteration.
+    """
     diagonal = A.diagonal()
     inverse = np.divide(1.0, diagonal, out=np.zeros(len(b)), where=~held & (diagonal != 0.0))
     x, d = x.copy(), np.zeros(len(b))

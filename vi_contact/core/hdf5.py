@@ -1,9 +1,11 @@
-"""Read HDF5 files of run folders: numbers that are stored in that very file, and no more than the
-memory can hold.
+"""Read HDF5 files of run folders.
+
+Only numbers that are stored in that very file are read, and no more than the memory can hold.
 
 An HDF5 file may send its reader on: by a soft or external link, by a virtual data set, by external
 storage. It may announce an array that no memory holds. Nothing of this is followed. Writing is in
-``core.files``."""
+``core.files``.
+"""
 
 import os
 from collections.abc import Iterator
@@ -19,10 +21,12 @@ _NUMBERS = "fiub"  # kinds of numpy: floats, whole numbers, truth values
 
 
 class StoredGroup:
-    """Hold a group of an HDF5 file that is open to be read: ``group[name]`` is a group or a data
-    set of numbers.
+    """Hold a group of an HDF5 file that is open to be read.
 
-    KeyError for a name that is not there, InputError for what does not lie in this file."""
+    ``group[name]`` is a group or a data set of numbers.
+
+    KeyError for a name that is not there, InputError for what does not lie in this file.
+    """
 
     def __init__(self, path: Path, group: Any, size: int) -> None:
         self._path, self._group, self._size = path, group, size
@@ -36,7 +40,10 @@ class StoredGroup:
         return found
 
     def _member(self, name: str) -> Any:
-        """A group or data set that lies here; its link is looked at before it is followed."""
+        """Return a group or data set that lies here.
+
+        Its link is looked at before it is followed.
+        """
         import h5py  # late: no step needs it
 
         link = self._group.get(name, getlink=True)
@@ -76,8 +83,10 @@ class StoredGroup:
 
 
 class StoredFile(StoredGroup):
-    """Open an HDF5 file of a run folder to be read. OSError when it is none, InputError when it is
-    a link."""
+    """Open an HDF5 file of a run folder to be read.
+
+    OSError when it is none, InputError when it is a link.
+    """
 
     def __init__(self, path: Path) -> None:
         import h5py  # late: no step needs it

@@ -1,5 +1,7 @@
-"""Give a package its public names, each imported when it is first used: what nobody asks for need
-not be installed."""
+"""Give a package its public names, each imported when it is first used.
+
+What nobody asks for need not be installed.
+"""
 
 import ast
 import sys
@@ -16,12 +18,14 @@ from .renamed import NAMES
 def lazy(
     package: str, file: str
 ) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562) by the stub beside
-    its ``__init__.py``.
+    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562).
+
+    The stub beside its ``__init__.py`` says what they are.
 
     A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module,
     here and for checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a
-    room and hands on all its names."""
+    room and hands on all its names.
+    """
     home: dict[str, str] = {}
     with open(
         splitext(file)[0] + ".pyi", encoding="utf-8"
@@ -47,8 +51,10 @@ def lazy(
         return getattr(import_module(home[name]), name)
 
     class Room(ModuleType):
-        """Keep names when Python binds a module of the same name: ``run.simulate`` stays the
-        function."""
+        """Keep names when Python binds a module of the same name.
+
+        So ``run.simulate`` stays the function.
+        """
 
         def __setattr__(self, name: str, value: Any) -> None:
             if name not in home or not isinstance(value, ModuleType):
@@ -59,8 +65,10 @@ def lazy(
 
 
 def _renamed(package: str, name: str) -> Any:
-    """Return what an old public name of a package is called now, with a warning; None for a name
-    that never was."""
+    """Return what an old public name of a package is called now, with a warning.
+
+    It is None for a name that never was.
+    """
     path = NAMES.get(package, {}).get(name)
     if path is None:
         return None

@@ -1,9 +1,11 @@
-"""Check matrices that a user brings: finite, symmetric, and masses that are not negative, on any
-number of ranks.
+"""Check matrices that a user brings, on any number of ranks.
+
+They must be finite and symmetric, and masses not negative.
 
 A matrix is seen through its products A w and Aᵀ w with a vector made of the numbers of the
 unknowns, in units in which its diagonal is one: nothing is stored, and the answer depends neither
-on the ranks nor on the units."""
+on the ranks nor on the units.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -23,8 +25,10 @@ def probe(numbers: Any, j: int) -> Array:
 
 
 def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
-    """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them; ``numbers`` (n,) are
-    those of the owned unknowns. Collective."""
+    """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them.
+
+    ``numbers`` (n,) are those of the owned unknowns. Collective.
+    """
     size = np.sqrt(np.abs(A.diagonal()))
     size = np.where(size > 0.0, size, largest(comm, max_abs(size)) or 1.0)
     w = probe(numbers, 0) / size
@@ -37,17 +41,26 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
 
 
 def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix) -> Iterator[str]:
-    """Yield a sentence for each matrix that is not finite, and for M that is not symmetric or has
-    masses below zero. Collective: take all of them on every rank."""
+    """Yield a sentence for each matrix that is not as it must be.
+
+    These are matrices that are not finite, and M that is not symmetric or has masses below zero.
+    Collective: take all of them on every rank.
+    """
     for name, A in matrices.items():
         found = asymmetry(A, comm, numbers)
         if not np.isfinite(found):
             yield f"{owner}: {name} has NaN or infinite entries; give finite numbers"
         elif found > SYMMETRIC and name == "M":
-            yield f"{owner}: M is not symmetric, M w and Mᵀ w differ by {found:.1g} of their size; give a symmetric one"
+            yield (
+                f"{owner}: M is not symmetric, M w and Mᵀ w differ by {found:.1g} of their size; "
+                "give a symmetric one"
+            )
     M = matrices["M"]
     own = M.diagonal()
     if largest(comm, -np.min(own, initial=0.0)) > 0.0:
         yield f"{owner}: M has a diagonal entry below zero; give masses that are positive, or zero"
     if largest(comm, np.any((own == 0.0) & (M @ probe(numbers, 0) != 0.0))):
-        yield f"{owner}: M has a zero on its diagonal beside other entries; give positive masses, or empty rows"
+        yield (
+            f"{owner}: M has a zero on its diagonal beside other entries; "
+            "give positive masses, or empty rows"
+        )

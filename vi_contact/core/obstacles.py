@@ -1,5 +1,7 @@
-"""Say where a rigid obstacle lies: contact directions and initial gaps, and what is asked of
-them."""
+"""Say where a rigid obstacle lies.
+
+It does so by contact directions and initial gaps; the module also checks what is asked of them.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,21 +23,25 @@ REMEDY = (
 
 
 class Obstacle(Protocol):
-    """Say where a rigid support lies: the contact direction of each point of a boundary, and its
-    initial gap."""
+    """Say where a rigid support lies.
+
+    It gives the contact direction of each point of a boundary, and its initial gap.
+    """
 
     def directions(self, points: Array, normals: Array) -> Array:
         """Return the unit contact directions (k, d), from the body to the obstacle.
 
         ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d)
         unit outward normals of the body there. Asked before ``gap``, with the same arrays;
-        InputError when body and support do not fit."""
+        InputError when body and support do not fit.
+        """
 
     def gap(self, points: Array, normals: Array) -> Array:
         """Return the initial gaps (k,) [m] along these directions, >= 0 but for round-off.
 
         ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the
-        point moves by u."""
+        point moves by u.
+        """
 
 
 @dataclass(frozen=True)
@@ -43,19 +49,23 @@ class Touching:
     """Fit the boundary exactly: zero initial gap, contact along the body's outward normal."""
 
     def directions(self, points: Array, normals: Array) -> Array:
+        """Return the outward normals of the body."""
         return normals
 
     def gap(self, points: Array, normals: Array) -> Array:
+        """Return zero gaps (k,) [m]."""
         return np.zeros(len(points))
 
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Describe a rigid half-space behind the plane through ``point``, whose ``normal`` points
-    towards the body.
+    """Describe a rigid half-space behind the plane through ``point``.
+
+    Its ``normal`` points towards the body.
 
     The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact
-    direction is -normal."""
+    direction is -normal.
+    """
 
     point: tuple[float, ...]
     normal: tuple[float, ...]
@@ -78,17 +88,21 @@ class HalfSpace:
         return np.asarray(normal / np.linalg.norm(normal))
 
     def directions(self, points: Array, normals: Array) -> Array:
+        """Return -normal at every point, (k, d)."""
         return np.tile(-self.unit_normal, (len(points), 1))
 
     def gap(self, points: Array, normals: Array) -> Array:
+        """Return the distances (k,) [m] of the points from the plane."""
         return np.asarray((points - np.asarray(self.point, dtype=float)) @ self.unit_normal)
 
 
 @dataclass(frozen=True)
 class AnalyticGap:
-    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m], measured along the body's
-    outward normal. It is asked for the points of each rank by themselves: let no gap depend on
-    other points, as on their mean or lowest."""
+    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m].
+
+    It is measured along the body's outward normal. It is asked for the points of each rank by
+    themselves: let no gap depend on other points, as on their mean or lowest.
+    """
 
     function: Callable[[Array], Array]
 
@@ -101,9 +115,11 @@ class AnalyticGap:
         )
 
     def directions(self, points: Array, normals: Array) -> Array:
+        """Return the outward normals of the body."""
         return normals
 
     def gap(self, points: Array, normals: Array) -> Array:
+        """Return the values (k,) [m] of the function at the points."""
         return self.function(points)
 
 
@@ -131,7 +147,11 @@ def facing(
     ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
 
     Args:
+        obstacle: what is asked.
+        points: (m, d) positions of the contact nodes [m].
+        normals: (m, d) outward unit normals of the body there.
         name: of the boundary, for the sentence.
+        angle: how much normals may turn at once [rad].
         alone: whether these are all its points; some of them only are refused where others might
             decide.
 
@@ -177,8 +197,10 @@ def facing(
 
 
 def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> None:
-    """Raise InputError, once for a whole boundary, for unit directions along it or into the
-    body."""
+    """Raise InputError for unit directions along the boundary or into the body.
+
+    It is raised once for a whole boundary.
+    """
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
@@ -200,13 +222,16 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
 
 
 def _of(name: str) -> str:
-    """The name of a boundary in a sentence."""
+    """Return the name of a boundary in a sentence."""
     return f" of '{name}'" if name else ""
 
 
 def _turned_smoothly(cosines: Array, angle: float) -> Mask:
-    """Which normals (m,), by their cosines with the direction, are reached from the one that looks
-    towards it most by turns of no more than ``angle`` from one normal to the next."""
+    """Return which normals (m,) are reached from the one that looks most in the direction.
+
+    They are judged by their cosines with the direction, and reached by turns of no more than
+    ``angle`` from one normal to the next.
+    """
     turns = np.arccos(np.clip(cosines, -1.0, 1.0))
     steps = np.unique(turns)
     wide = np.flatnonzero(np.diff(steps) > angle * (1.0 + 1e-9))
@@ -214,13 +239,16 @@ def _turned_smoothly(cosines: Array, angle: float) -> Mask:
 
 
 def _unit(vector: Array) -> Array:
-    """The vector with length one, zero as it is, without negative zeros."""
+    """Return the vector with length one, zero as it is, without negative zeros."""
     return np.asarray(vector / (np.linalg.norm(vector) or 1.0) + 0.0)
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:
-    """Return the initial gap without round-off (1e-12 of the body's size); InputError where the
-    body penetrates."""
+    """Return the initial gap without round-off (1e-12 of the body's size).
+
+    Raises:
+        InputError: the body penetrates the obstacle.
+    """
     if not np.all(np.isfinite(gap)):
         raise InputError(
             "the initial gap contains NaN or infinite values: check the obstacle's gap function"

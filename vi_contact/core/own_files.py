@@ -1,5 +1,6 @@
-"""Open the files of a run folder: regular files of that very folder, never what a link there points
-at.
+"""Open the files of a run folder.
+
+These are regular files of that very folder, never what a link there points at.
 
 Every file that a run, a report or a study reads or writes in a run folder is opened here (HDF5
 files: ``core.hdf5``).
@@ -41,8 +42,11 @@ DEVICES = (
 
 
 def is_own(path: Path) -> bool:
-    """Return whether there is a regular file of this name; InputError for anything else of this
-    name."""
+    """Return whether there is a regular file of this name.
+
+    Raises:
+        InputError: there is anything else of this name.
+    """
     mode = _mode(path)
     if mode is not None and not stat.S_ISREG(mode):
         raise _foreign(path, mode, "file")
@@ -50,8 +54,11 @@ def is_own(path: Path) -> bool:
 
 
 def inner_folder(folder: Path, *names: str) -> Path:
-    """Return a folder inside a run folder, which need not exist; InputError where it, or one above
-    it, is a link."""
+    """Return a folder inside a run folder, which need not exist.
+
+    Raises:
+        InputError: it, or one above it, is a link.
+    """
     for name in names:
         folder = folder / name
         mode = _mode(folder)
@@ -69,17 +76,21 @@ def make_inner_folder(folder: Path, *names: str) -> Path:
 
 
 def open_to_read(path: Path) -> Any:
-    """Open a regular file, buffered. InputError for anything else of this name; OSError names the
-    file."""
+    """Open a regular file, buffered.
+
+    InputError for anything else of this name; OSError names the file.
+    """
     return os.fdopen(_opened(path, os.O_RDONLY), "rb")
 
 
 def open_to_append(path: Path, *, make: bool = False) -> Any:
-    """Open a regular file, unbuffered, to read it and to write at its end; ``make`` it where there
-    is none.
+    """Open a regular file, unbuffered, to read it and to write at its end.
+
+    ``make`` it where there is none.
 
     A file that has another name too (a hard link) stays as it is under that name: this one gets a
-    copy. InputError for anything but a regular file; OSError names the file."""
+    copy. InputError for anything but a regular file; OSError names the file.
+    """
     flags = os.O_RDWR | os.O_APPEND | (os.O_CREAT if make else 0)
     file = _unbuffered(_opened(path, flags), path, "ab+")
     if names(file) > 1:
@@ -90,20 +101,27 @@ def open_to_append(path: Path, *, make: bool = False) -> Any:
 
 
 def open_lock(path: Path) -> Any:
-    """Open a regular file that processes lock, unbuffered, and make it where there is none;
-    InputError for others."""
+    """Open a regular file that processes lock, unbuffered, and make it where there is none.
+
+    Raises:
+        InputError: there is anything else of this name.
+    """
     return _unbuffered(_opened(path, os.O_RDWR | os.O_CREAT), path, "rb+")
 
 
 def names(file: Any) -> int:
-    """Return how many names an open file has; more than one where there are hard links, 0 when it
-    was removed."""
+    """Return how many names an open file has.
+
+    There are more than one where there are hard links, and 0 when it was removed.
+    """
     return os.fstat(file.fileno()).st_nlink
 
 
 def open_new(path: Path) -> Any:
     """Make a file anew, unbuffered, in the place of whatever has its name, but for a folder.
-    OSError names the file."""
+
+    OSError names the file.
+    """
     for _ in range(TRIES):
         try:
             return _unbuffered(
@@ -115,27 +133,41 @@ def open_new(path: Path) -> Any:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a regular file; InputError for anything else of this name; OSError
-    names the file."""
+    """Return the content of a regular file.
+
+    Raises:
+        InputError: there is anything else of this name.
+        OSError: names the file.
+    """
     with open_to_read(path) as file:
         return bytes(file.read())
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a regular file; ValueError when it is not UTF-8, else as
-    ``read_bytes``."""
+    """Return the text of a regular file.
+
+    It raises what ``read_bytes`` raises, and further:
+
+    Raises:
+        ValueError: it is not UTF-8.
+    """
     return read_bytes(path).decode("utf-8")
 
 
 def remove(path: Path) -> None:
-    """Remove a name, if there is one: of a link the link alone. OSError for a folder, which
-    stays."""
+    """Remove a name, if there is one: of a link the link alone.
+
+    OSError for a folder, which
+    stays.
+    """
     path.unlink(missing_ok=True)
 
 
 def is_stream(path: Path) -> bool:
-    """Return whether a user has named a stream, such as /dev/stdout, as the place of an output:
-    never replace these."""
+    """Return whether a user has named a stream, such as /dev/stdout, as the place of an output.
+
+    Never replace these.
+    """
     path = Path(os.path.abspath(path))
     return path.parent in DEVICES and os.path.lexists(path)
 
@@ -149,7 +181,7 @@ def same_file(path: Path, file: Any) -> bool:
 
 
 def _mode(path: Path) -> int | None:
-    """The mode of what has this name itself; None where there is nothing."""
+    """Return the mode of what has this name itself; None where there is nothing."""
     try:
         return os.lstat(path).st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -157,7 +189,7 @@ def _mode(path: Path) -> int | None:
 
 
 def _opened(path: Path, flags: int) -> int:
-    """The descriptor of a regular file."""
+    """Return the descriptor of a regular file."""
     is_own(
         path
     )  # the sentence says what it is; a link that is made after this is not followed either
@@ -178,13 +210,12 @@ def _copied(path: Path) -> None:
 
 
 def temporary_of(path: Path) -> Path:
-    """Return the name under which this process makes a file that is to take the place of
-    another."""
+    """Return the name under which this process makes a file that is to replace another."""
     return path.with_name(f".{path.name}.{os.getpid()}.tmp")
 
 
 def _unbuffered(descriptor: int, path: Path, mode: str) -> Any:
-    """A file object that knows its name."""
+    """Return a file object that knows its name."""
     return open(path, mode, buffering=0, opener=lambda *_: descriptor)
 
 

@@ -1,7 +1,9 @@
-"""Ask which packages PETSc was built with, without an import of PETSc: rooms that do without it may
-ask too.
+"""Ask which packages PETSc was built with, without an import of PETSc.
 
-Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on somebody's machine."""
+Rooms that do without it may ask too.
+
+Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on somebody's machine.
+"""
 
 import sys
 
@@ -19,8 +21,10 @@ def petsc_is_here() -> bool:
 
 
 def petsc_has(package: str) -> bool:
-    """Say whether PETSc is in this process, and was built with a package, by its name in PETSc's
-    configuration."""
+    """Say whether PETSc is in this process, and was built with a package.
+
+    The package is given by its name in PETSc's configuration.
+    """
     if not petsc_is_here():
         return False
     names = [package, "suitesparse"] if package in OF_SUITESPARSE else [package]

@@ -1,5 +1,7 @@
-"""State the problem that is marched: a semi-discrete system, its contact surface, and the laws of
-both."""
+"""State the problem that is marched.
+
+It is a semi-discrete system, its contact surface, and the laws of both.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -22,14 +24,17 @@ from .system import Load, SemiDiscreteSystem, history_value
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Pose a problem: a semi-discrete system, its contact surface, its excitation, and the laws of
-    friction and impact.
+    """Pose a problem of contact.
+
+    It is a semi-discrete system, its contact surface, its excitation, and the laws of friction and
+    impact.
 
     The system is turned into the nodal frames of the surface here, once. ``impact=None`` leaves
     velocities unchanged. ``mass=None`` leaves the choice of the mass matrix to the time scheme.
     InputError is raised on all ranks for parts of the wrong kind or size, and for a surface of
     another system. A friction law that is a dataclass may hold tuples with a value for every
-    contact point: of this rank, or of all ranks by their numbers. Collective."""
+    contact point: of this rank, or of all ranks by their numbers. Collective.
+    """
 
     system: SemiDiscreteSystem
     surface: ContactSurface
@@ -52,8 +57,10 @@ class ContactProblem:
         object.__setattr__(self, "friction", own)
 
     def __repr__(self) -> str:
-        """Return unknowns, conditions and laws in a few lines, those of all ranks: not the
-        arrays."""
+        """Return unknowns, conditions and laws in a few lines, not the arrays.
+
+        They are those of all ranks.
+        """
         laws = {
             "friction": self.friction,
             "impact": self.impact,
@@ -87,8 +94,10 @@ class ContactProblem:
 
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
-        """Return the system that schemes see: in the rotated basis, with the inertia loads -M r
-        a_g(t)."""
+        """Return the system that schemes see.
+
+        It is in the rotated basis, with the inertia loads -M r a_g(t).
+        """
         system = self.unshaken
         ways = (
             (np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations
@@ -99,9 +108,11 @@ class ContactProblem:
         return system.loaded(shaken.load)
 
     def beside(self, other: "ContactProblem") -> "ContactProblem | None":
-        """Return the same problem with the matrices of another one, and the factors made of them;
-        None where these are not its own: for another system, surface, mass or impact law, or
-        friction where the other has none."""
+        """Return the same problem with the matrices of another one.
+
+        It also has the factors made of them. It is None where these are not its own: for another
+        system, surface, mass or impact law, or friction where the other has none.
+        """
         ours, theirs = ((one.system, one.surface, one.frictional) for one in (self, other))
         if any(a is not b for a, b in zip(ours, theirs, strict=True)):
             return None
@@ -115,14 +126,18 @@ class ContactProblem:
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
-        """Return the system in the basis of the equations, without excitation: the gravity
-        stage."""
+        """Return the system of the gravity stage.
+
+        It is in the basis of the equations, without excitation.
+        """
         return self._relative(self.turned)
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:
-        """Return the system in the nodal frames, every body in its own unknowns: one for all
-        problems on a surface."""
+        """Return the system in the nodal frames, every body in its own unknowns.
+
+        There is one for all problems on a surface.
+        """
         system, basis, dual = self.system, self.surface.basis, self.surface.dual
         if basis is None:
             return system
@@ -148,8 +163,10 @@ class ContactProblem:
         return not isinstance(self.friction, Frictionless)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
-        """Return B_t u plus what the obstacle slides: where the slip of a step is zero; None
-        without friction."""
+        """Return B_t u plus what the obstacle slides; None without friction.
+
+        The slip of a step is zero there.
+        """
         return self.surface.slip_origin(u, start, end) if self.frictional else None
 
     def cartesian(self, x: Array) -> Array:
@@ -169,8 +186,10 @@ class ContactProblem:
 def with_values(
     law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
 ) -> Any:
-    """Return the law with its tuples changed on several ranks, also in the laws that it is made
-    of."""
+    """Return the law with its tuples changed on several ranks.
+
+    So are those of the laws that it is made of.
+    """
     if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
     found: dict[str, Any] = {}
@@ -181,12 +200,14 @@ def with_values(
 
 
 def check_parts(problem: Any) -> None:
-    """Raise InputError, on all ranks, for parts of the wrong kind or size, or made for another
-    system. Collective.
+    """Raise InputError, on all ranks, for parts of the wrong kind or size.
+
+    Parts that were made for another system are refused too. Collective.
 
     Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems
     of that space take it. Sizes are compared on all ranks together, so that all of them raise the
-    same sentence."""
+    same sentence.
+    """
     owner, system, surface, excitations = (
         "ContactProblem",
         problem.system,
@@ -269,13 +290,16 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
 
 
 def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:
-    """What is wrong with the sizes of a system on this rank."""
+    """Return what is wrong with the sizes of a system on this rank."""
     n = system.rows
     d = system.influence.shape[1]
     for name in ("M", "K", "C"):
         matrix = getattr(system, name)
         if matrix is not None and matrix.rows != n:
-            yield f"the system has {n} unknowns in u0 but {matrix.rows} rows in {name}: give matrices of one system"
+            yield (
+                f"the system has {n} unknowns in u0 but {matrix.rows} rows in {name}: "
+                "give matrices of one system"
+            )
     shapes = {"v0": (n,), "influence": (n, d), "base_mass": (n, d), "massless": (n,), "tied": (n,)}
     values = {name: getattr(system, name) for name in shapes} | {
         "load.constant": system.load.constant
@@ -293,8 +317,10 @@ def _sizes(owner: str, values: dict[str, Any], shapes: dict[str, tuple[int, ...]
 
 
 def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int) -> Iterator[str]:
-    """What is wrong with a surface on this rank, and with its places in the unknowns of the
-    system."""
+    """Return what is wrong with a surface on this rank.
+
+    Its places in the unknowns of the system are looked at too.
+    """
     m, d, n = surface.count, system.influence.shape[1], system.rows
     shapes: dict[str, tuple[int, ...]] = {
         "points": (m, d),
@@ -314,8 +340,14 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int)
                 f"{most - 1}: make the surface for this system, which has another size"
             )
     if np.any(np.diff(surface.slots) <= 0):
-        yield "the contact surface has slots that do not ascend: number its conditions in the order of their rows"
+        yield (
+            "the contact surface has slots that do not ascend: "
+            "number its conditions in the order of their rows"
+        )
     if np.isnan(np.sum(surface.gap0)):
         yield "the contact surface has NaN in gap0: check the obstacle's gap function"
     if not (np.all(surface.weights > 0.0) and np.all(surface.compliance >= 0.0)):
-        yield "the contact surface has weights of zero or less, or a compliance below zero: give lengths or areas"
+        yield (
+            "the contact surface has weights of zero or less, or a compliance below zero: "
+            "give lengths or areas"
+        )

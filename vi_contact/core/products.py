@@ -1,8 +1,10 @@
-"""Make nothing twice: several parts of a step ask for products with the same vectors, and for one
-load.
+"""Make no product twice.
+
+Several parts of a step ask for products with the same vectors, and for one load.
 
 Remembered are read-only vectors (``frozen``), each known as the object it is; what is handed out is
-read-only too."""
+read-only too.
+"""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,5 +1,7 @@
-"""Describe what a problem asks of its laws and of what shakes it: the protocols that users' own
-classes satisfy."""
+"""Describe what a problem asks of its laws and of what shakes it.
+
+These are the protocols that users' own classes satisfy.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,24 +19,31 @@ EXCITATION = ("acceleration", "direction", "duration")  # what is asked of one
 
 
 class Excitation(Protocol):
-    """Shake the ground in one direction, or give any motion its history: the contract of every
-    excitation."""
+    """Shake the ground in one direction, or give any motion its history.
+
+    This is the contract of every excitation.
+    """
 
     @property
     def direction(self) -> tuple[float, ...]:
-        """Return the components of the direction, (d,), not all zero; its length is a factor on the
-        acceleration."""
+        """Return the components of the direction, (d,), not all zero.
+
+        Its length is a factor of the acceleration.
+        """
 
     @property
     def duration(self) -> float:
-        """Return the time [s] after which the acceleration stays zero or negligible; infinite if it
-        never does."""
+        """Return the time [s] after which the acceleration stays zero or negligible.
+
+        It is infinite if the acceleration never does.
+        """
 
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] at time ``t`` [s], positive along the direction.
 
         Asked for at any time >= 0, also twice and between the steps; the same on every rank, a
-        finite number."""
+        finite number.
+        """
 
     def __call__(self, t: float) -> Array:
         """Return the vector acceleration(t) · direction [m/s²] at time ``t`` [s], shape (d,)."""
@@ -60,8 +69,11 @@ def check_excitation(
 
 
 def finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
-    """Return `values` as a tuple of floats; InputError naming the first entry that is not a finite
-    number."""
+    """Return `values` as a tuple of floats.
+
+    Raises:
+        InputError: names the first entry that is not a finite number.
+    """
     entries = several(owner, name, values, "give a sequence of numbers")
     return tuple(number(owner, f"{name}[{k}]", value) for k, value in enumerate(entries))
 
@@ -70,11 +82,13 @@ class FrictionLaw(Protocol):
     """Bound the tangential reaction by the normal one: what a solver asks of a friction law.
 
     |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0); r_t = limit along the slip where there is
-    one."""
+    one.
+    """
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return the largest tangential reaction of each condition, (m,), in the unit of ``r_n``;
-        >= 0.
+        """Return the largest tangential reaction of each condition, (m,), >= 0.
+
+        It is in the unit of ``r_n``.
 
         Args:
             r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as
@@ -86,12 +100,15 @@ class FrictionLaw(Protocol):
         """
 
     def slope(self, weights: Array) -> Array:
-        """Return d limit / d r_n >= 0 of each condition under pressure, (m,); ``weights`` as in
-        ``limit``."""
+        """Return d limit / d r_n >= 0 of each condition under pressure, (m,).
+
+        ``weights`` are as in ``limit``.
+        """
 
     def at(self, speed: Array) -> "FrictionLaw":
-        """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0, with limit and slope of
-        its own.
+        """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0.
+
+        That law has a limit and slope of its own.
 
         ``limit`` and ``slope`` of the law itself are those at rest. A law without rates returns
         itself: no iteration.
@@ -119,13 +136,15 @@ class Frictionless:
 
 @dataclass(frozen=True)
 class Impact:
-    """Tell an impact law of the m conditions; springs do not collide, their conditions are never
-    active here.
+    """Tell an impact law of the m conditions.
+
+    Springs do not collide, so their conditions are never active here.
 
     Attributes:
         before: (m,) normal velocities before the step [m/s], > 0 towards the obstacle.
         v_n: (m,) normal velocities that the step left [m/s].
-        active: (m,) which are closed. closing: (m,) which have just closed."""
+        active: (m,) which are closed. closing: (m,) which have just closed.
+    """
 
     before: Array
     v_n: Array
@@ -134,28 +153,34 @@ class Impact:
 
 
 class ImpactLaw(Protocol):
-    """Change velocities after a step in which conditions are closed: a law of ``laws.impact``, or
-    your own. One that says ``by_rows = True`` also gets those of several runs, (k, m) and (k, n),
-    and returns them."""
+    """Change velocities after a step in which conditions are closed.
+
+    It is a law of ``laws.impact``, or your own. One that says ``by_rows = True`` also gets those of
+    several runs, (k, m) and (k, n), and returns them.
+    """
 
     def target(self, impact: Impact) -> Array:
-        """Return the normal velocities (m,) [m/s] after ``impact``; NaN where the law leaves the
-        velocity alone.
+        """Return the normal velocities (m,) [m/s] after ``impact``.
+
+        They are NaN where the law leaves the velocity alone.
 
         > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is
-        active."""
+        active.
+        """
 
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,),
-        where they are not NaN.
+        """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,).
+
+        Velocities are left alone where ``target`` is NaN. Collective.
 
         Args:
             system: the equations that are marched, whose M says what an impulse does.
             surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to
                 change.
-            v: the velocity (n,) [m/s] that the step left; not to be written to. Collective.
+            v: the velocity (n,) [m/s] that the step left; not to be written to.
+            target: normal velocities (m,) [m/s], NaN where the velocity is left alone.
         """
 
 
@@ -165,8 +190,9 @@ class MassLaw(Protocol):
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
-        """Return ``system`` with the wanted mass matrix, as ``system.changed(M=…, massless=…)``, or
-        as it is.
+        """Return ``system`` with the wanted mass matrix.
+
+        It is ``system.changed(M=…, massless=…)``, or ``system`` as it is.
 
         Args:
             system: in the rotated basis of ``surface``, every body in its own unknowns, before the

@@ -1,5 +1,7 @@
-"""Say which problems are small: those that a dense matrix on every rank, or a factor made in
-passing, suits."""
+"""Say which problems are small.
+
+These are those that a dense matrix on every rank, or a factor made in passing, suits.
+"""
 
 from .algebra import Comm, total
 from .errors import InputError
@@ -20,12 +22,14 @@ def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which st
 
 
 def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
-    """Say whether what the package solves beside the steps is small, by unknowns and contact
-    conditions of this rank.
+    """Say whether what the package solves beside the steps is small.
+
+    The unknowns and contact conditions of this rank decide.
 
     Such problems are condensed with a factor of their own, whatever solves the steps; larger ones
     are solved by conjugate gradients. ``worth``: for problems that come again and again, so many
-    times larger. Collective."""
+    times larger. Collective.
+    """
     return (
         total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
     )

@@ -18,8 +18,10 @@ _shown = [False]
 
 
 def stage(name: str) -> Callable[[F], F]:
-    """Return a decorator: the first rank tells how long the function took, and all give back what
-    memory it freed."""
+    """Return a decorator that tells how long a function took.
+
+    The first rank tells it, and all ranks give back what memory it freed.
+    """
 
     def decorate(function: F) -> F:
         @wraps(function)
@@ -52,8 +54,10 @@ def _tell(name: str, seconds: float) -> None:
 
 
 def show(shown: bool) -> None:
-    """Choose whether stages that take longer than a second are told too where standard error is a
-    terminal."""
+    """Choose whether stages that take long are told on a terminal too.
+
+    These are stages of more than a second, where standard error is a terminal.
+    """
     _shown[0] = shown and sys.stderr is not None and sys.stderr.isatty()
 
 

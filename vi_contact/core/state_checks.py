@@ -1,5 +1,7 @@
-"""Make the state a run begins with; check that a state belongs to a problem: its time, its arrays
-on every rank."""
+"""Make the state a run begins with; check that a state belongs to a problem.
+
+The check looks at its time and its arrays on every rank.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -54,14 +56,20 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
             ("b", "True or False") if name == "active" else ("iuf", "finite real numbers")
         )
         if not isinstance(value, np.ndarray) or value.shape != shape:
-            yield f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: give its own state"
+            yield (
+                f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: "
+                "give its own state"
+            )
         elif value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
             yield f"{name} of the state is {shown(value)}: give {wanted}"
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
-    """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is
-    in the obstacle."""
+    """Return u0 and v0 of the system in the rotated basis, without reaction.
+
+    Raises:
+        InputError: u0 is in the obstacle.
+    """
     system, surface = problem.equations, problem.surface
     gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)
     sizes = np.array(

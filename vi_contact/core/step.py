@@ -41,12 +41,14 @@ from .surfaces import ContactSurface
 
 @dataclass(frozen=True)
 class State:
-    """Hold displacement u (n,) [m], velocity v (n,) [m/s] and contact at time t = t_k [s], in the
-    rotated basis.
+    """Hold displacement u, velocity v and contact at time t = t_k [s].
+
+    Both are vectors (n,), in [m] and [m/s], in the rotated basis.
 
     ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here, mean or end
     values as the scheme says. ``active`` (m,) are the closed conditions. ``memory`` holds what a
-    scheme carries besides u and v: vectors (n,), and arrays that are the same on every rank."""
+    scheme carries besides u and v: vectors (n,), and arrays that are the same on every rank.
+    """
 
     t: float
     k: int
@@ -71,12 +73,14 @@ class State:
 
 @dataclass(frozen=True)
 class StepProblem:
-    """Pose one step, as every solver sees it. ``guess`` (n,): predicted x; ``active`` (m,):
-    predicted contact set.
+    """Pose one step, as every solver sees it.
+
+    ``guess`` (n,): predicted x; ``active`` (m,): predicted contact set.
 
     ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for
     velocities, 0 in static problems, where friction is that of rest. ``lower`` (m,): bounds from
-    below too, which ``Volume`` alone knows (``vi``); None in the steps of a scheme."""
+    below too, which ``Volume`` alone knows (``vi``); None in the steps of a scheme.
+    """
 
     A: EffectiveMatrix
     b: Array
@@ -107,8 +111,10 @@ class StepProblem:
 
     def friction_at(self, slip: Array) -> FrictionLaw:
         """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1).
+
         Collective: what a law of the user's own raises on one rank is raised on all. InputError for
-        limits that are negative or no numbers."""
+        limits that are negative or no numbers.
+        """
         speed = self.rate_factor * np.linalg.norm(slip, axis=1)
 
         def law() -> FrictionLaw:
@@ -120,9 +126,11 @@ class StepProblem:
 
 
 def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: float) -> None:
-    """Raise InputError unless limit = cohesion + slope max(r_n, 0) has cohesion and slope >= 0 at
-    every condition of this rank. Laws whose ``never_negative`` is true were checked when they were
-    made."""
+    """Raise InputError unless cohesion and slope are >= 0 at every condition of this rank.
+
+    They are those of limit = cohesion + slope max(r_n, 0). Laws whose ``never_negative`` is true
+    were checked when they were made.
+    """
     if getattr(law, "never_negative", False):
         return
     weights = surface.weights
@@ -149,12 +157,14 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
 
 @dataclass(frozen=True)
 class StepResult:
-    """Answer a step: x (n,), r_n (m,) and r_t (m, d - 1), ``scale`` times newtons, and the closed
-    conditions (m,).
+    """Answer a step by x (n,), the reactions and the closed conditions (m,).
+
+    The reactions are r_n (m,) and r_t (m, d - 1), ``scale`` times newtons.
 
     ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
     ``history``: how the method converged, in a measure of its own. ``aim``: the residual at which
-    an iterative method stopped because it was told to, 0 for one that goes on to round-off."""
+    an iterative method stopped because it was told to, 0 for one that goes on to round-off.
+    """
 
     x: Array
     r_n: Array
@@ -168,9 +178,12 @@ class StepResult:
 
 @dataclass(frozen=True)
 class Answers:
-    """Answer a step of several runs: ``rows`` holds x (k, n), r_n, active (k, m) and r_t (k, m, d -
-    1). Of each run ``iterations`` and, with friction, ``histories``; ``failed``: what those raise
-    that have no answer."""
+    """Answer a step of several runs.
+
+    ``rows`` holds x (k, n), r_n, active (k, m) and r_t (k, m, d - 1). Of each run there are
+    ``iterations`` and, with friction, ``histories``. ``failed`` is what those runs raise that have
+    no answer.
+    """
 
     rows: StepResult
     iterations: Sequence[int]
@@ -188,12 +201,13 @@ class Answers:
 
 @dataclass(frozen=True)
 class Balance:
-    """Hold the equation of motion that the step satisfied, with the scheme's own averages:
+    """Hold the equation of motion that the step satisfied, with the scheme's own averages.
 
         M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
     Multiplying it by the displacement increment gives the energy ledger of any scheme
-    (verify.energy_balance)."""
+    (verify.energy_balance).
+    """
 
     u: Array
     v: Array
@@ -210,19 +224,23 @@ class Scheme(Protocol):
     may lie inside the obstacle, and it goes on from them. A scheme is a value without state of its
     own: what it carries from step to step is in ``State.memory``, so that a checkpoint holds all of
     it. One that says ``by_rows = True`` steps several runs at once: ``step`` and ``finish`` then
-    also get vectors as rows, (k, n) and (k, m), and return them."""
+    also get vectors as rows, (k, n) and (k, m), and return them.
+    """
 
     @property
     def mass(self) -> MassLaw:
         """Return the mass matrix that it takes when the problem does not say which."""
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError unless ``problem`` suits the scheme. Called before anything is computed,
-        on all ranks."""
+        """Raise InputError unless ``problem`` suits the scheme.
+
+        Called before anything is computed, on all ranks.
+        """
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return ``state`` with the memory that steps of ``dt`` [s] need: accelerations or earlier
-        levels, for example.
+        """Return ``state`` with the memory that steps of ``dt`` [s] need.
+
+        This is accelerations or earlier levels, for example.
 
         Called with the first state of a run of ``problem``, on a restart, and whenever dt changes;
         what is in ``state.memory`` already was put there by this scheme, or by none. It may bring
@@ -230,27 +248,33 @@ class Scheme(Protocol):
         """
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return ``state`` with the velocity ``v`` (n,) [m/s] that the impact law of ``problem``
-        gave, same u and t.
+        """Return ``state`` with the velocity ``v`` that the impact law of ``problem`` gave.
+
+        ``v`` is (n,) [m/s]; u and t stay the same.
 
         What the scheme remembers of accelerations has to fit the new velocity before the next step
-        of ``dt`` [s]."""
+        of ``dt`` [s].
+        """
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A (n rows) of ``problem`` for all steps of ``dt`` [s], as a rule
-        ``problem.equations.effective(…)``.
+        """Return A (n rows) of ``problem`` for all steps of ``dt`` [s].
+
+        As a rule it is ``problem.equations.effective(…)``.
 
         A is symmetric positive definite; nothing in it depends on time or state. It is made once
-        for every dt."""
+        for every dt.
+        """
 
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the problem of the step of ``problem`` from ``state`` to state.t + dt, whose
-        matrix ``A`` is.
+        """Return the problem of the step of ``problem`` from ``state`` to state.t + dt.
+
+        ``A`` is the matrix of the step.
 
         ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and
-        ``scale`` fit it, and ``scale`` is the same in all steps of one dt."""
+        ``scale`` fit it, and ``scale`` is the same in all steps of one dt.
+        """
 
     def finish(
         self,
@@ -260,56 +284,72 @@ class Scheme(Protocol):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state of ``problem`` at the end of a step of ``dt`` [s], before the impact
-        law.
+        """Return the state of ``problem`` at the end of a step of ``dt`` [s].
+
+        It is that before the impact law.
 
         ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and
         ``result`` its certified answer: reactions in it are ``scale`` times newtons, those of the
-        new state are newtons."""
+        new state are newtons.
+        """
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new``
-        satisfied, for the ledger.
+        """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new`` met.
+
+        The ledger needs it.
 
         ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a
-        recorder asks."""
+        recorder asks.
+        """
 
 
 class PreparedSolver(Protocol):
-    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns. One
-    with ``solve_many`` answers several at once (``solvers.condensed``)."""
+    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns.
+
+    One with ``solve_many`` answers several at once (``solvers.condensed``).
+    """
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return x, reactions and closed conditions of ``step``, whose A, surface and scale are
-        those it was made for.
+        """Return x, reactions and closed conditions of ``step``.
+
+        The A, surface and scale of ``step`` are those that the solver was made for.
 
         The answer is judged by its certificate, so the method may stop where it finds best.
-        StepFailure, on all ranks, when there is none. Collective."""
+        StepFailure, on all ranks, when there is none. Collective.
+        """
 
 
 class Solver(Protocol):
-    """Hold the settings of a one-step solver; ``prepare`` does the work that is shared by all steps
-    with the same A."""
+    """Hold the settings of a one-step solver.
+
+    ``prepare`` does the work that is shared by all steps with the same A.
+    """
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError unless the solver can treat ``problem``: its friction law, supports and
-        matrices."""
+        """Raise InputError unless the solver can treat ``problem``.
+
+        Its friction law, supports and matrices are looked at.
+        """
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
-        """Return a solver of steps with the matrix ``A`` on ``surface`` whose reactions are
-        ``scale`` times newtons.
+        """Return a solver of steps with the matrix ``A`` on ``surface``.
+
+        Reactions of these steps are ``scale`` times newtons.
 
         Called once for every dt; factors and whatever else depends on A alone belong here.
-        Collective."""
+        Collective.
+        """
 
 
 @dataclass(frozen=True)
 class Report:
-    """Tell recorders what happened in one step. ``new.v`` is after the impact law, ``v_minus``
-    before it.
+    """Tell recorders what happened in one step.
+
+    ``new.v`` is after the impact law, ``v_minus`` before it.
 
     ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was
-    given."""
+    given.
+    """
 
     problem: ContactProblem
     old: State
@@ -328,30 +368,38 @@ class Report:
 
 
 class Recorder(Protocol):
-    """Listen to the loop: name columns once, and fill a row after every step. Numbers are equal on
-    every rank; arrays count on rank 0, and may be empty on the others."""
+    """Listen to the loop: name columns once, and fill a row after every step.
+
+    Numbers are equal on every rank; arrays count on rank 0, and may be empty on the others.
+    """
 
     def columns(self) -> Mapping[str, tuple[str, str]]:
-        """Return what ``start`` and ``row`` fill in: name -> (unit, meaning). Called after
-        ``start``, always the same.
+        """Return what ``start`` and ``row`` fill in: name -> (unit, meaning).
+
+        Called after ``start``, always the same.
 
         Names are made of letters, digits and underscores; no two recorders of a run have one in
-        common."""
+        common.
+        """
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Mapping[str, Any]:
-        """Return the row of the initial ``state`` of ``problem``; forget whatever an earlier run
-        has left.
+        """Return the row of the initial ``state`` of ``problem``.
+
+        Whatever an earlier run has left is forgotten.
 
         ``resumed``: the last row of the run that a restart continues, from which sums over time go
-        on; else None."""
+        on; else None.
+        """
 
     def row(self, report: Report) -> Mapping[str, Any]:
-        """Return the row of the step that ``report`` tells of: numbers, or arrays of one shape (to
-        HDF5 only).
+        """Return the row of the step that ``report`` tells of.
 
-        Called once a step, in order, on all ranks: collective operations are allowed here."""
+        It holds numbers, or arrays of one shape (to HDF5 only).
+
+        Called once a step, in order, on all ranks: collective operations are allowed here.
+        """
 
 
 Columns = Mapping[str, tuple[str, str]]

@@ -5,7 +5,8 @@ the contact direction) the normal displacement u_n of a contact point *is* an en
 a selection of entries. Contact arrays (bounds, reactions, active sets, slips) have one row for
 every condition of this rank, and none of another's: what is asked of all of them (``some``,
 ``everywhere``) is asked on all ranks. Sign: the direction n points from the body to the obstacle,
-u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0."""
+u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
+"""
 
 import logging
 from collections.abc import Callable
@@ -30,15 +31,19 @@ Motion = Callable[[float], float | Array]
 
 
 class WatchedNodes(Protocol):
-    """Say where nodes of a contact boundary are that move as they are prescribed, and have no
-    condition."""
+    """Say where nodes of a contact boundary are that have no condition.
+
+    They move as they are prescribed.
+    """
 
     def smallest(self, t: float) -> float:
         """Return their smallest gap at time t [m]. Collective."""
 
     def refuse_driven(self, t: float) -> None:
         """Raise InputError, on all ranks, for a node that is in what it faces at time t.
-        Collective."""
+
+        Collective.
+        """
 
     def before_moving(self, towards: Motion | None) -> "WatchedNodes":
         """Return the same nodes before an obstacle that moves towards them, t [s] -> [m]."""
@@ -53,15 +58,16 @@ class ContactSurface:
 
     Attributes:
         comm: the ranks that share the surface.
-        points: (m, d) positions [m]; normals: (m, d) unit contact directions (towards the
-            obstacle).
+        points: (m, d) positions [m].
+        normals: (m, d) unit contact directions (towards the obstacle).
         weights: (m,) tributary length [m] times thickness, or area [m²]: pressure = r_n / weights.
         gap0: (m,) initial gap [m], >= 0.
         bilateral: (m,) True where the point is held on the obstacle (u_n = gap0, reaction of either
             sign).
         compliance: (m,) of the support [m/N]; 0 is rigid, more is a spring.
-        owned: (m,) indices in û of the normal unknowns; slots: (m,) the numbers of the conditions
-            among those of all ranks, ascending; they do not depend on the number of ranks.
+        owned: (m,) indices in û of the normal unknowns.
+        slots: (m,) the numbers of the conditions among those of all ranks, ascending; they do not
+            depend on the number of ranks.
         tangents: (m, d-1) indices in û of the tangential unknowns of the same points; -1 where
             prescribed.
         basis: T with u = T û, the turn into nodal frames, or None when they already point along the
@@ -165,8 +171,10 @@ class ContactSurface:
 
     @cached_property
     def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
-        """Return (m, d - 1), where compiled functions find these arrays, None where all is plain,
-        and the arrays."""
+        """Return (m, d - 1), where compiled functions find the arrays, and the arrays.
+
+        The place of an array is None where all is plain.
+        """
         kept = (
             np.ascontiguousarray(self.owned, np.int64),
             np.ascontiguousarray(self.tangents, np.int64),
@@ -175,9 +183,11 @@ class ContactSurface:
         return self.tangents.shape, [None if one is None else at(one) for one in kept], kept
 
     def everywhere(self, values: NDArray[Any]) -> Any:
-        """Return (total, …) the values (m, …) of all conditions, by their numbers and the same on
-        every rank, of one type. Collective; for output, and for small problems that every rank
-        solves."""
+        """Return (total, …) the values (m, …) of all conditions, by their numbers.
+
+        They are the same on every rank, and of one type. Collective; for output, and for small
+        problems that every rank solves.
+        """
         if self.comm.size == 1:
             return np.asarray(values)
         whole = np.zeros((self.total, *np.shape(values)[1:]))
@@ -189,8 +199,10 @@ class ContactSurface:
         return whole if self.comm.size == 1 else whole[self.slots]
 
     def on_first(self, values: NDArray[Any]) -> Any:
-        """Return the values (total, …) on rank 0, and none, (0, …), on the others. Collective; for
-        output."""
+        """Return the values (total, …) on rank 0, and none, (0, …), on the others.
+
+        Collective; for output.
+        """
         return on_first(self.comm, self.slots, values)
 
     @cached_property
@@ -210,7 +222,9 @@ class ContactSurface:
 
     def whole(self) -> "ContactSurface":
         """Return the places and sizes of the conditions of all ranks, by number, everywhere.
-        Collective."""
+
+        Collective.
+        """
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "nodes")
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         arrays = {name: self.everywhere(values) for name, values in known.items()}
@@ -225,20 +239,26 @@ class ContactSurface:
         return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
     def slip(self, u: Array, t: float) -> Array:
-        """Return the tangential displacements on the obstacle (m, d - 1) [m], those of open points
-        too."""
+        """Return the tangential displacements on the obstacle (m, d - 1) [m].
+
+        Those of open points are among them.
+        """
         there = self.tangential_values(u)
         return there if self.slide is None else there - self.slide(t)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array:
-        """Return B_t u plus what the obstacle slides between two times, (m, d - 1): where the slip
-        is zero."""
+        """Return B_t u plus what the obstacle slides between two times, (m, d - 1).
+
+        The slip is zero there.
+        """
         origin, sliding = self.tangential_values(u), self.sliding(start, end)
         return origin if sliding is None else origin + sliding
 
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
-        """Return B_nᵀ r_n + B_tᵀ r_t: the owned part of the contact reaction on the unknowns
-        [N]."""
+        """Return B_nᵀ r_n + B_tᵀ r_t, the contact reaction on the unknowns [N].
+
+        It is the owned part.
+        """
         load = np.zeros((*r_n.shape[:-1], rows))
         load.T[self.owned] = r_n.T
         if r_t is not None:
@@ -247,32 +267,43 @@ class ContactSurface:
         return load
 
     def gap(self, t: float) -> Array:
-        """Return the gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle
-        has moved."""
+        """Return the gap of the undeformed body at time t, (m,) [m].
+
+        It is gap0 less what the obstacle has moved.
+        """
         return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
 
     def refuse_driven(self, t: float) -> None:
         """Raise InputError, on all ranks, where a prescribed node is in what it faces at time t.
-        Collective."""
+
+        Collective.
+        """
         for one in self.watched:
             one.refuse_driven(t)
 
     def advance(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves towards the body between two times, (m,) [m]; None for one
-        at rest."""
+        """Return what the obstacle moves towards the body between two times, (m,) [m].
+
+        It is None for one at rest.
+        """
         return None if self.motion is None else self.motion(end) - self.motion(start)
 
     def sliding(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None
-        for one at rest."""
+        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m].
+
+        It is None for one at rest.
+        """
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
     def moving(
         self, towards: Motion | None = None, along: Motion | None = None
     ) -> "ContactSurface":
-        """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the
-        tangents, t [s] -> [m], one value for all points or arrays of shape (m,) and (m, d-1), in
-        the order of ``points``. A moving obstacle is not turned; its points face the same nodes."""
+        """Return the surface on an obstacle that moves.
+
+        It moves ``towards`` the body and ``along`` the tangents; both are t [s] -> [m], one value
+        for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving
+        obstacle is not turned; its points face the same nodes.
+        """
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
@@ -301,13 +332,15 @@ class ContactSurface:
         return replace(self, bilateral=np.ones(self.count, dtype=bool))
 
     def with_frictionless_corners(self) -> "ContactSurface":
-        """Let nodes, beside friction, with several conditions slide freely over their faces; else
-        they are refused.
+        """Let nodes with several conditions slide freely over their faces beside friction.
+
+        Else they are refused.
 
         What such a node could rub on one face is a force across the other, which the conditions,
         each a bound on one unknown, do not hold. In space it still rubs along its edge, with the
         normal force of its first condition (of one group: that of the face with the lowest node
-        numbers). Collective."""
+        numbers). Collective.
+        """
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
             log.info(
@@ -316,11 +349,13 @@ class ContactSurface:
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> "ContactSurface":
-        """Return the surface on a linearly deformable support of foundation modulus ``stiffness``
-        [Pa/m].
+        """Return the surface on a linearly deformable support.
+
+        ``stiffness`` [Pa/m] is its foundation modulus.
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the
-        unilateral law."""
+        unilateral law.
+        """
         stiffness = number(
             "on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m"
         )
@@ -328,7 +363,11 @@ class ContactSurface:
 
 
 def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
-    """A value for all points, or one for each; InputError for what are no finite metres."""
+    """Return a value for all points, or one for each.
+
+    Raises:
+        InputError: what are no finite metres.
+    """
     found = np.asarray(value)
     alike = all(
         n in (1, m) for n, m in zip(found.shape[::-1], shape[::-1], strict=False)
@@ -343,8 +382,10 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
 
 
 def same_node(nodes: Indices) -> tuple[Indices, ...]:
-    """Return the places of each number that stands several times in ``nodes`` (m,), in the order of
-    the numbers."""
+    """Return the places of each number that stands several times in ``nodes`` (m,).
+
+    They are in the order of the numbers.
+    """
     order = np.argsort(nodes, kind="stable")
     _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
     several = counts > 1
@@ -355,10 +396,12 @@ def same_node(nodes: Indices) -> tuple[Indices, ...]:
 
 
 def nodal_frames(directions: Array) -> Array:
-    """Return orthonormal frames (k, d, d) whose first column is the contact direction n, the others
-    tangential.
+    """Return orthonormal frames (k, d, d) of contact directions.
 
-    2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1."""
+    The first column is the contact direction n, the others are tangential.
+
+    2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1.
+    """
     k, d = directions.shape
     frames = np.empty((k, d, d))
     frames[:, :, 0] = directions
@@ -374,11 +417,13 @@ def nodal_frames(directions: Array) -> Array:
 
 
 def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
-    """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is
-    the normal one.
+    """Return (c, Q), nodal frames (k, d, d) with the contact direction in column c.
+
+    Component c is the normal one.
 
     c is the direction's largest component. Axes at right angles to the direction keep their own
-    columns: these are the components that may be prescribed."""
+    columns: these are the components that may be prescribed.
+    """
     k, d, _ = frames.shape
     directions, every = frames[:, :, 0], np.arange(k)
     size = np.abs(directions)

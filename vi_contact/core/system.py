@@ -1,5 +1,7 @@
-"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t) and the loads on their
-right-hand side."""
+"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t).
+
+The loads on their right-hand side are here too.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,16 +17,20 @@ from .products import Remembered
 
 
 class Companion(Protocol):
-    """Provide a motion among the loads that is marched beside the run: of the ground, or of a free
-    field."""
+    """Provide a motion among the loads that is marched beside the run.
+
+    It is that of the ground, or of a free field.
+    """
 
     def bind(self, scheme: Any, dt: Any) -> None:
-        """Take over ``scheme``, a ``core.step.Scheme``, and the time steps ``dt`` [s] of the run
-        that is about to step.
+        """Take over ``scheme`` and the time steps ``dt`` [s] of the run that is about to step.
+
+        ``scheme`` is a ``core.step.Scheme``.
 
         Called on every rank before each base step, so binding the same again must change nothing;
         another scheme or other steps begin the motion anew, from rest at t = 0. ``dt`` is a number
-        or a plan of ``run.time_steps``. InputError for a plan that the motion cannot follow."""
+        or a plan of ``run.time_steps``. InputError for a plan that the motion cannot follow.
+        """
 
 
 class Space(Protocol):
@@ -32,27 +38,40 @@ class Space(Protocol):
 
     ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component;
     ``coordinates`` (rows, d) [m]; ``hierarchy``: of displacements whose contact conditions need
-    one, else None."""
+    one, else None.
+    """
 
     dimension: int
     unknowns: int
 
     @property
-    def ids(self) -> np.ndarray: ...
+    def ids(self) -> np.ndarray:
+        """Return the numbers of the owned unknowns, node * dimension + component."""
+
     @property
-    def coordinates(self) -> Array: ...
+    def coordinates(self) -> Array:
+        """Return the coordinates (rows, d) [m]."""
+
     @property
-    def bodies(self) -> np.ndarray: ...
+    def bodies(self) -> np.ndarray:
+        """Return the body of every owned unknown."""
+
     @property
-    def hierarchy(self) -> Any: ...
+    def hierarchy(self) -> Any:
+        """Return the hierarchy of displacements whose contact conditions need one, else None."""
 
     def find_nodes(self, points: Array) -> np.ndarray:
-        """Return the node numbers nearest to the points (k, d); InputError for a point outside the
-        body."""
+        """Return the node numbers nearest to the points (k, d).
+
+        Raises:
+            InputError: a point is outside the body.
+        """
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        """Return the values (k, d) at the nodes, on every rank; derivative 0, 1, 2: of the
-        prescribed motion."""
+        """Return the values (k, d) at the nodes, on every rank.
+
+        ``derivative`` 0, 1 or 2 is that of the prescribed motion.
+        """
 
 
 OTHERS = 4  # surfaces and the like of which factors are kept
@@ -67,13 +86,15 @@ PAIR = "give pairs of a vector [N] and a function of the time"
 
 @dataclass(frozen=True)
 class Load:
-    """Hold f(t) = constant + sum vector * history(t) + sum general(t) + sum viscous(t) + sum
-    inertial(t), in newtons.
+    """Hold the load f(t) of a system, in newtons.
+
+    f(t) = constant + sum vector * history(t) + sum general(t) + sum viscous(t) + sum inertial(t).
 
     Separable parts cost one vector update a step; the others are evaluated anew at every time.
     Viscous and inertial parts are the shares in C u' and M u'' of what moves in a given way (a
     base, a free field): a mass law that changes C changes the former alike, and a body at rest
-    feels neither."""
+    feels neither.
+    """
 
     constant: Array
     separable: tuple[tuple[Array, Callable[[float], float]], ...] = ()
@@ -93,6 +114,7 @@ class Load:
                     raise InputError(f"Load: an item of separable has {len(part)} members; {PAIR}")
 
     def __call__(self, t: float) -> Array:
+        """Return f(t) [N]."""
         total = self.at_rest(t)
         for parts in (self.viscous, self.inertial):
             for moving in parts:
@@ -100,8 +122,10 @@ class Load:
         return total
 
     def at_rest(self, t: float) -> Array:
-        """Return the load of a static stage at time t: what moves in a given way stands still where
-        it then is."""
+        """Return the load of a static stage at time t.
+
+        What moves in a given way stands still where it then is.
+        """
         total = self.constant.copy()
         for vector, history in self.separable:
             total += history_value(history, t) * vector
@@ -149,8 +173,9 @@ def _turned(
 
 @dataclass(frozen=True)
 class SemiDiscreteSystem:
-    """Hold M u'' + C u' + K u = f(t) on the free unknowns; prescribed displacements are already
-    eliminated into f.
+    """Hold M u'' + C u' + K u = f(t) on the free unknowns.
+
+    Prescribed displacements are already eliminated into f.
 
     Attributes:
         algebra: how its matrices are combined, factorised and reduced over ranks.
@@ -256,12 +281,14 @@ class SemiDiscreteSystem:
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
     def cached(self, name: str, make: Callable[[], Any], *of: Any) -> Any:
-        """Return what ``make`` returned the first time: factors and the like, which live as long as
-        the system.
+        """Return what ``make`` returned the first time.
+
+        These are factors and the like, which live as long as the system.
 
         ``of``: the objects beside M, C and K that it depends on, as the contact surface; each of
         the last few has its own. What depends on the load does not belong here: systems that differ
-        in it share this memory (``loaded``)."""
+        in it share this memory (``loaded``).
+        """
         known: dict[tuple[int, ...], tuple[Any, Any]] = self._cache.setdefault(name, {})
         key = tuple(map(id, of))
         if key not in known:
@@ -276,8 +303,10 @@ class SemiDiscreteSystem:
         self._products.pop("load", None)
 
     def product(self, name: str, x: Array) -> Array:
-        """Return M x, C x or K x, read-only; made once for each of the last frozen vectors
-        (core.products)."""
+        """Return M x, C x or K x, read-only.
+
+        It is made once for each of the last frozen vectors (core.products).
+        """
         return (self._products.get(name) or self._remembered(name))(x)
 
     def _remembered(self, name: str) -> Remembered:
@@ -285,8 +314,10 @@ class SemiDiscreteSystem:
         return self._products.setdefault(name, Remembered(function, KEPT[name]))
 
     def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Any, Any]) -> None:
-        """Take (name, x, rows), and ("load", t, t): the product with x is a row of that with the
-        rows, when asked."""
+        """Take what makes products of rows: (name, x, rows), and ("load", t, t).
+
+        When asked, the product with x is a row of that with the rows.
+        """
 
         def value(name: str, rows: Any) -> Callable[[], Array]:
             return lambda: np.asarray(many.product(name, rows)[row])
@@ -300,15 +331,19 @@ class SemiDiscreteSystem:
         return self._products["load"].numbers() if "load" in self._products else []
 
     def load_at(self, t: float) -> Array:
-        """Return f(t), read-only; made once for each of the last two times, unless something is
-        marched beside it."""
+        """Return f(t), read-only.
+
+        It is made once for each of the last two times, unless something is marched beside it.
+        """
         if self.companions:
             return self.load(t)
         return (self._products.get("load") or self._remembered("load"))(float(t))
 
     def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
-        """Return (u1 - u0)/dt and (v1 - v0)/dt; the products C and M of them are made of those with
-        their ends."""
+        """Return (u1 - u0)/dt and (v1 - v0)/dt.
+
+        The products of C and M with them are made of those with their ends.
+        """
 
         def change(name: str, x0: Array, x1: Array) -> Array:
             product = self._remembered(name)
@@ -317,16 +352,20 @@ class SemiDiscreteSystem:
         return (u1 - u0) / dt if self.C is None else change("C", u0, u1), change("M", v0, v1)
 
     def changed(self, **values: Any) -> "SemiDiscreteSystem":
-        """Return the same system with other values of the attributes that are named, and no factor
-        of the old one."""
+        """Return the same system with other values of the attributes that are named.
+
+        It has no factor of the old one.
+        """
         return replace(self, **values)
 
     def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
-        """Return A = m M + c C + k K for all steps of one size; its factor is made when it is first
-        needed.
+        """Return A = m M + c C + k K for all steps of one size.
+
+        Its factor is made when it is first needed.
 
         ``shares``: whether the scheme needs M x, C x and K x in its next step, so that A x may be
-        made of them."""
+        made of them.
+        """
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
             terms.append((c, self.C))
@@ -354,8 +393,10 @@ class SemiDiscreteSystem:
         return other
 
     def inertia(self, direction: Array) -> Array:
-        """Return M r: the force [N] that accelerates body and prescribed nodes by one in this
-        direction (d,)."""
+        """Return M r, the force [N] of a unit acceleration in this direction (d,).
+
+        It accelerates body and prescribed nodes by one.
+        """
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 
@@ -363,14 +404,17 @@ class SemiDiscreteSystem:
         """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
         Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is
-        orthogonal (None)."""
+        orthogonal (None).
+        """
         return self._in_unknowns(T, (T if dual is None else dual).transpose_apply)
 
     def in_relative(self, R: Matrix) -> "SemiDiscreteSystem":
-        """Return the same system in the unknowns ǔ of û = R ǔ, in which contact points move
-        relative to the other body.
+        """Return the same system in the unknowns ǔ of û = R ǔ.
 
-        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R."""
+        In these, contact points move relative to the other body.
+
+        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
+        """
         return self._in_unknowns(R, lambda x: 2.0 * x - R @ x)
 
     def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":

@@ -22,23 +22,29 @@ ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certific
 
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
-    """Return how well (x, r_n) satisfies the inequality problem of a step. ``Certificate`` defines
-    the residuals."""
+    """Return how well (x, r_n) satisfies the inequality problem of a step.
+
+    ``Certificate`` defines the residuals.
+    """
     return _judged(step, result, _sizes(step, result)[0])
 
 
 def kkt_residuals(
     many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
 ) -> list[Certificate]:
-    """Return the certificate of each of several steps on one rank, whose rows these hold; ``own``
-    makes one of each."""
+    """Return the certificate of each of several steps on one rank.
+
+    The arguments hold the steps as rows; ``own`` makes one of each.
+    """
     rubs, rows = many.slip0 is not None, enumerate(_sizes(many, result))
     return [_judged(*(own(row) if rubs else (many, result)), sizes) for row, sizes in rows]
 
 
 def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
-    """The largest sizes in the definitions, over all ranks, of each step in rows; infinite for NaN,
-    which would go."""
+    """Return the largest sizes in the definitions, over all ranks, of each step in rows.
+
+    They are infinite for NaN, which would go.
+    """
     comm, functions = step.surface.comm, already()
     Ax = step.A.image(result.x)
     found = (
@@ -62,9 +68,11 @@ def _sizes_compiled(step: StepProblem, result: StepResult, Ax: Array, functions:
 def _places(
     desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...], arrays: tuple[Any, ...]
 ) -> tuple[list[Any], list[Any]]:
-    """Where compiled functions find the arrays, room and sizes, and what lies there, of their types
-    and sizes whatever a solver gave: copies on the desk where they are small, which takes less than
-    to ask numpy where an array lies."""
+    """Return where compiled functions find the arrays, room and sizes, and what lies there.
+
+    What lies there has their types and sizes, whatever a solver gave. These are copies on the desk
+    where they are small, which takes less than to ask numpy where an array lies.
+    """
     shapes = tuple([None if one is None else one.shape for one in arrays])
     if shapes in desk:
         for copy, one in zip(desk[shapes][1], arrays, strict=False):
@@ -116,7 +124,7 @@ def _sizes_in_numpy(step: StepProblem, result: StepResult, Ax: Array) -> Array:
 
 
 def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certificate:
-    """The certificate, of the largest sizes in its definitions."""
+    """Return the certificate, of the largest sizes in its definitions."""
     residual_max, b_max, Ax_max, x_max, guess_max, r_max, apart, open_force, behind, pull = maxima
     x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
     cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)
@@ -132,8 +140,10 @@ def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certi
 
 
 def _maxima(step: StepProblem, *arrays: Array) -> list[float]:
-    """Largest sizes of the entries on all ranks, by one reduction; infinite for NaN, which no
-    reduction keeps."""
+    """Return the largest sizes of the entries on all ranks, by one reduction.
+
+    They are infinite for NaN, which no reduction keeps.
+    """
     sizes = [size if size >= 0.0 else np.inf for size in map(max_abs, arrays)]
     comm = step.surface.comm
     return sizes if comm.size == 1 else comm.max(np.array(sizes)).tolist()
@@ -158,8 +168,10 @@ def _friction_residuals(
 
 
 def _over(value: float, reference: float) -> float:
-    """value/reference, with 0/0 = 0 (nothing happens, nothing is wrong); NaN for infinity over
-    infinity."""
+    """Return value/reference, with 0/0 = 0: nothing happens, nothing is wrong.
+
+    It is NaN for infinity over infinity.
+    """
     if value == 0.0 and reference < np.inf:
         return 0.0
     return value / reference if reference else np.inf
@@ -167,8 +179,10 @@ def _over(value: float, reference: float) -> float:
 
 @dataclass(frozen=True)
 class StepEnergy:
-    """Say where energy went [J]: change = input - damping - contact - friction - algorithmic +
-    defect."""
+    """Say where energy went [J].
+
+    The ledger is change = input - damping - contact - friction - algorithmic + defect.
+    """
 
     change: float
     input: float
@@ -179,8 +193,10 @@ class StepEnergy:
 
     @property
     def defect(self) -> float:
-        """Return what the ledger cannot explain; rounding and the tolerance of the solver when it
-        was solved."""
+        """Return what the ledger cannot explain.
+
+        It is rounding and the tolerance of the solver when the step was solved.
+        """
         return self.change - (
             self.input - self.damping - self.contact - self.friction - self.algorithmic
         )
@@ -188,8 +204,10 @@ class StepEnergy:
 
 @dataclass(frozen=True)
 class Energies:
-    """Hold M v, K u and the energies of a state [J]; a ledger carries them on, so that none is made
-    twice."""
+    """Hold M v, K u and the energies of a state [J].
+
+    A ledger carries them on, so that none is made twice.
+    """
 
     momentum: Array
     elastic: Array
@@ -229,16 +247,18 @@ def energy_balance(
     """Return the ledger of a step before the impact law, for any scheme.
 
     The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``.
-    Times the increment du::
+    Times the increment du:
 
-        input = f·du + work of a moving obstacle,  damping = du·C v
-        contact = r_n·B_n du  (work lost to the support, stored or dissipated there)
+        input = f·du + work of a moving obstacle
+        damping = du·C v
+        contact = r_n·B_n du    (work lost to the support, stored or dissipated there)
         friction = r_t·B_t du
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
+                      (0 for the midpoint rule)
 
-    The last is 0 for the midpoint rule. The change is the difference of the energies themselves, so
-    the defect measures the equation of motion. ``before``, ``after``: the energies of both states,
-    when known; one product (two with damping) is left then.
+    and change is the difference of the energies themselves, so the defect measures the equation of
+    motion. ``before``, ``after``: the energies of both states, when known; one product (two with
+    damping) is left then.
     """
     system, surface = problem.equations, problem.surface
     before = before or energies(system, old.u, old.v)
@@ -276,8 +296,10 @@ def energy_balance(
 def _obstacle_work(
     problem: ContactProblem, start: float, end: float, balance: Balance
 ) -> tuple[float, float]:
-    """Work that a moving obstacle does on the body on this rank, (normal, tangential): r_n·advance
-    and -r_t·sliding."""
+    """Return the work that a moving obstacle does on the body on this rank.
+
+    It is (normal, tangential): r_n·advance and -r_t·sliding.
+    """
     advance, sliding = problem.surface.advance(start, end), problem.surface.sliding(start, end)
     pushed = 0.0 if advance is None else float(balance.r_n @ advance)
     dragged = (

@@ -1,10 +1,13 @@
-"""Assemble the semi-discrete system of a linear elastic body: M u'' + C u' + K u = f(t) (boundary
-method, eqs. 7-10a).
+"""Assemble the semi-discrete system of a linear elastic body.
 
-    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
+It is M u'' + C u' + K u = f(t) (boundary method, eqs. 7-10a).
+
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
+    K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u =
-P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'')."""
+P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -80,25 +83,26 @@ def assemble(
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
             where they have no mass, and the wave speeds that dashpots and free fields need.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
-        space: the user's own DOLFINx space V of the displacement, which sets the degree. bcs:
-            ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
+        space: the user's own DOLFINx space V of the displacement, which sets the degree.
+        bcs: ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
             values; where two meet, the last one counts.
-        clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some
-            components.
+        clamped: facets with u = 0.
+        prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts
             as damping.
-        tied: boundaries whose opposite nodes move together; damping: NoDamping() by default,
-            MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or DampingRatio, which alone reads
-            the xi of materials.
+        tied: boundaries whose opposite nodes move together.
+        damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or
+            DampingRatio, which alone reads the xi of materials.
         loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
         base_inertia: whether the inertia load of a ground motion counts the mass that elements
             share with prescribed nodes. True is right for motions relative to the ground; False is
             the load of docs/start/first_wall.md.
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
             hexahedra, where each cell has one mean value of tr eps (``fem.dilatation``).
-        initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a),
-            or (cells, value) pairs for several bodies. Where cells meet, the later pair counts;
-            cells without a pair start from zero.
+        initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
+            pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
+            start from zero.
+        initial_velocity: the like for the velocity.
         quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with
             parallel sides.
 
@@ -206,7 +210,10 @@ def _stated(
     *,
     selective: bool,
 ) -> ElasticForms:
-    """The forms of the materials, or the user's own with those of the materials beside them."""
+    """Return the forms of the materials, or the user's own.
+
+    The user's own have those of the materials beside them.
+    """
     materials = [] if material is None else cell_materials(space.mesh, material)
     if forms is None:
         body = ElasticForms(space, materials, section, damping, selective=selective)
@@ -218,8 +225,10 @@ def _stated(
 
 
 def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
-    """C of materials and absorbing boundaries, before elimination (PETSc); None where nothing
-    damps."""
+    """Return C of materials and absorbing boundaries, before elimination (PETSc).
+
+    It is None where nothing damps.
+    """
     terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     if not terms:
         return None
@@ -231,8 +240,10 @@ def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
 def _reduced(
     full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
-    """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is
-    destroyed."""
+    """Return (Pᵀ A P as the algebra stores it, the load of prescribed motions).
+
+    The full matrix is destroyed.
+    """
     pull: tuple[Callable[[float], Array], ...] = ()
     if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
         matrix, held = (
@@ -246,8 +257,10 @@ def _reduced(
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
-    """Assemble f(t) on the free unknowns: tractions, body forces, linear forms and initial
-    strains."""
+    """Assemble f(t) on the free unknowns.
+
+    It is that of tractions, body forces, linear forms and initial strains.
+    """
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
@@ -265,8 +278,10 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 
 
 def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
-    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its
-    own."""
+    """Return t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here.
+
+    Of a form it is its own.
+    """
     if isinstance(load, InitialStrain):
         return lambda t: space.forms.initial.forces(t, only=load)
     if isinstance(load, LinearForm):
@@ -284,7 +299,7 @@ def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
 
 
 def _initial(space: FemSpace, name: str, value: Initial) -> Array:
-    """Initial values on the free unknowns."""
+    """Return initial values on the free unknowns."""
     if value is None:
         return np.zeros(len(space.ids))
     if isinstance(value, Sequence) and value and isinstance(value[0], tuple):

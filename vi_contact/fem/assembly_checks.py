@@ -1,5 +1,7 @@
-"""Check what a body is assembled of: kinds of objects, groups of this mesh, conditions that do not
-contradict."""
+"""Check what a body is assembled of.
+
+These are kinds of objects, groups of this mesh, conditions that do not contradict.
+"""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -54,8 +56,11 @@ def check_body(
     degree: Any = 1,
     integration: Any = "full",
 ) -> tuple[Section, Damping]:
-    """Return (section, damping), the usual for None; InputError for objects of another kind, cells
-    of another mesh."""
+    """Return (section, damping), the usual for None.
+
+    Raises:
+        InputError: objects of another kind, cells of another mesh.
+    """
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(
@@ -73,6 +78,29 @@ def check_body(
         Forms,
         "give fem.Forms(stiffness=…, mass=…), or leave them out",
     )
+    _check_material(mesh, material, forms)
+    if section is None:
+        section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
+    damping = NoDamping() if damping is None else damping
+    _check_section(section, mesh.geometry.dim)
+    _check_damping(damping, section, forms)
+    flag(OWNER, "base_inertia", base_inertia)
+    found = (
+        [material]
+        if material is None or isinstance(material, KINDS)
+        else [one for _, one in material]
+    )
+    _check_integration(
+        mesh, found if forms is None else [forms], section, damping, degree, integration
+    )
+    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
+    if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
+        _tell_locking([one for one in found if isinstance(one, LinearElastic)])
+    return section, damping
+
+
+def _check_material(mesh: Any, material: Any, forms: Any) -> None:
+    """Raise InputError unless there are forms, a material, or pairs of cells and materials."""
     if material is None and forms is None:
         raise InputError("assemble: neither a material nor forms are given; give one of them")
     if material is not None and not isinstance(material, KINDS):
@@ -81,9 +109,10 @@ def check_body(
             cells, one = _pair("material", pair, remedy)
             cells_of(OWNER, "the cells of a material", cells, mesh)
             instance(OWNER, "material", one, KINDS, remedy)
-    if section is None:
-        section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
-    damping = NoDamping() if damping is None else damping
+
+
+def _check_section(section: Any, dimension: int) -> None:
+    """Raise InputError unless the section is one of a body of this dimension."""
     provides(
         OWNER,
         "section",
@@ -91,17 +120,21 @@ def check_body(
         ("thickness", "elastic_constants"),
         "give PlaneStrain(), PlaneStress() or None",
     )
-    if mesh.geometry.dim == 3 and isinstance(section, PlaneStrain | PlaneStress):
+    if dimension == 3 and isinstance(section, PlaneStrain | PlaneStress):
         raise InputError(
             f"assemble: {section} is a section of a plane body and this one has three dimensions; "
             "give "
             "Solid(), or leave it out"
         )
-    if mesh.geometry.dim == 2 and isinstance(section, Solid):
+    if dimension == 2 and isinstance(section, Solid):
         raise InputError(
             "assemble: Solid() is for a body in space and this one is plane; give PlaneStrain() or "
             "PlaneStress(thickness)"
         )
+
+
+def _check_damping(damping: Any, section: Any, forms: Any) -> None:
+    """Raise InputError unless the damping is one, and goes with the forms and the section."""
     provides(
         OWNER,
         "damping",
@@ -122,27 +155,16 @@ def check_body(
             "would "
             "need its own motion; give Rayleigh(0, beta), or another section"
         )
-    flag(OWNER, "base_inertia", base_inertia)
-    found = (
-        [material]
-        if material is None or isinstance(material, KINDS)
-        else [one for _, one in material]
-    )
-    _check_integration(
-        mesh, found if forms is None else [forms], section, damping, degree, integration
-    )
-    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
-    if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
-        _tell_locking([one for one in found if isinstance(one, LinearElastic)])
-    return section, damping
 
 
 def check_ratios(body: ElasticForms, of_materials: bool) -> None:
-    """Raise InputError, on all ranks, for a damping law that damps nothing, and for damping ratios
-    that no law reads.
+    """Raise InputError, on all ranks, for a damping law that damps nothing.
+
+    So it does for damping ratios that no law reads.
 
     body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
-    those of materials, and not the user's own forms."""
+    those of materials, and not the user's own forms.
+    """
     law, ratio = body.damping, body.largest_ratio
     if isinstance(law, DampingRatio) and not any(
         callable(one.xi) or one.xi for _, one in body.materials
@@ -170,8 +192,10 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
 
 
 def _refuse_ratio_behind(body: ElasticForms) -> None:
-    """Raise InputError for a ratio of a material that only dashpots have: they have no damping but
-    their own."""
+    """Raise InputError for a ratio of a material that only dashpots have.
+
+    They have no damping but their own.
+    """
     inside = [one for _, one in body.materials]
     for boundary in body.boundaries:
         behind = boundary.material
@@ -184,8 +208,10 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
 
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:
-    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell, as parts of
-    meshes may leave."""
+    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell.
+
+    Parts of meshes may leave such nodes.
+    """
     own = np.arange(mesh.geometry.index_map().size_local)
     lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
     if lonely:
@@ -198,8 +224,10 @@ def _refuse_lonely_nodes(mesh: Mesh) -> None:
 
 
 def _check_degree(mesh: Mesh, degree: Any) -> None:
-    """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not
-    folded. Collective."""
+    """Raise InputError unless the degree is 1 or 2 and suits the cells. Collective.
+
+    Curved cells must not be folded.
+    """
     if isinstance(degree, bool) or degree not in (1, 2):
         raise InputError(
             f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
@@ -241,8 +269,10 @@ def _check_integration(
     degree: int,
     integration: Any,
 ) -> None:
-    """Raise InputError for a word that is none, and where cells cannot or need not be integrated
-    selectively."""
+    """Raise InputError for a word of integration that is none.
+
+    So it does where cells cannot or need not be integrated selectively.
+    """
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":
         return
@@ -283,9 +313,11 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
 def check_boundaries(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
-    """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of
-    another mesh, and for prescribed displacements that contradict each other on the same facets.
-    Collective. All are tuples."""
+    """Raise InputError, on all ranks, for conditions and loads that do not fit. Collective.
+
+    They are of another kind or on groups of another mesh, or prescribed displacements that
+    contradict each other on the same facets. All are tuples.
+    """
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
@@ -323,8 +355,10 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
 def _refuse_empty(
     mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and
-    loads nothing."""
+    """Raise InputError, on all ranks, for a boundary group without facets on any rank.
+
+    It holds and loads nothing.
+    """
     own = {
         "clamped": clamped,
         "prescribed": prescribed,
@@ -354,8 +388,10 @@ def _refuse_empty(
 def _contradictions(
     held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
 ) -> Iterator[str]:
-    """Pairs of conditions on the same facets of this rank: other values of one component, ties and
-    dashpots."""
+    """Return pairs of conditions on the same facets of this rank that contradict.
+
+    These are other values of one component, ties and dashpots.
+    """
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
             yield (

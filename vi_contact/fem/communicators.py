@@ -1,5 +1,7 @@
-"""Offer collective operations, communicators that last, and what frees PETSc objects that wait on
-them."""
+"""Offer collective operations and communicators that last.
+
+What frees PETSc objects that wait on them is here too.
+"""
 
 from typing import Any
 
@@ -27,24 +29,30 @@ class MpiComm:
         return total
 
     def sum(self, x: Array) -> Array:
+        """Return the sum of x over the ranks, entry by entry."""
         return self._reduce(x, MPI.SUM)
 
     def max(self, x: Array) -> Array:
+        """Return the largest x of the ranks, entry by entry."""
         return self._reduce(x, MPI.MAX)
 
     def bcast(self, value: Any) -> Any:
+        """Return the value of rank 0 on every rank."""
         return self.mpi.bcast(value, root=0)
 
     def gather(self, value: Any) -> list[Any] | None:
+        """Return the values of all ranks on rank 0; None on the others."""
         return self.mpi.gather(value, root=0)
 
 
 def kept(comm: Any) -> Any:
     """Return the communicator of the ranks of ``comm`` that lasts as long as the program.
+
     Collective the first time.
 
     PETSc objects that Python drops wait on their communicator for ``give_back``. A mesh frees its
-    own at its end: what waits there would wait for ever."""
+    own at its end: what waits there would wait for ever.
+    """
     alike = (MPI.IDENT, MPI.CONGRUENT)
     found = next((one for one in _KEPT if MPI.Comm.Compare(one, comm) in alike), None)
     if found is None:
@@ -57,8 +65,10 @@ _KEPT: list[Any] = []
 
 
 def give_back(comm: Any) -> None:
-    """Free the PETSc objects that nobody holds any more: PETSc keeps them until all ranks ask it
-    to. Collective."""
+    """Free the PETSc objects that nobody holds any more. Collective.
+
+    PETSc keeps them until all ranks ask it to.
+    """
     for _ in range(2):  # what one held may be free only after it
         PETSc.garbage_cleanup(comm)
     trim()

@@ -1,10 +1,12 @@
-"""Store the symmetric matrices of large systems compactly: one half, and after a change of basis
-what it changed.
+"""Store the symmetric matrices of large systems compactly.
+
+This is one half, and after a change of basis what it changed.
 
 Half of K in blocks of nodes takes 0.2 kB an unknown on tetrahedra where AIJ takes 0.53, and its
 product half the time; of M, whose components are not coupled along the axes, only what is not zero
 is stored. A change of basis that is the identity but for the contact nodes changes few rows: the
-others are shared with the matrix it was made from."""
+others are shared with the matrix it was made from.
+"""
 
 from typing import Any
 
@@ -29,21 +31,26 @@ class Half(PetscMatrix):
 
     @property
     def mat(self) -> Any:
+        """Return the whole matrix, made anew."""
         whole = self.stored.convert("aij", PETSc.Mat())
         whole.setBlockSize(1)
         return whole
 
     @property
     def bytes(self) -> float:
+        """Return the bytes of the half that is stored."""
         return super().bytes * (2.0 + self.stored.getBlockSize() ** -2) / 3.0
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return A x, which is Aᵀ x."""
         return self @ x
 
 
 class Replaced(PetscMatrix):
-    """Hold a symmetric matrix that is another but for ``part``, some owned rows; ``alike``: same
-    places."""
+    """Hold a symmetric matrix that is another but for ``part``, some owned rows.
+
+    ``alike``: same places.
+    """
 
     def __init__(self, base: PetscMatrix, rows: Indices, part: Any, alike: bool) -> None:
         super().__init__(part)
@@ -51,10 +58,12 @@ class Replaced(PetscMatrix):
 
     @property
     def rows(self) -> int:
+        """Return how many rows this rank owns."""
         return self._base.rows
 
     @property
     def mat(self) -> Any:
+        """Return the whole matrix, made anew."""
         whole, part, kind = self._base.mat, rows_of(self.stored), PETSc.IntType
         whole = whole.copy() if whole is self._base.stored else whole
         if self._alike:
@@ -77,9 +86,11 @@ class Replaced(PetscMatrix):
         return y
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return A x, which is Aᵀ x."""
         return self @ x
 
     def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
         values, part = self._base.diagonal(), rows_of(self.stored)
         row = np.repeat(self._rows, np.diff(part.indptr))
         own = part.indices == self.stored.getOwnershipRangeColumn()[0] + row
@@ -96,6 +107,7 @@ class CompactAlgebra(PetscAlgebra):
         self._dimension = dimension
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Return Tᵀ K T."""
         P, A = as_petsc(T).mat, as_petsc(K).mat
         rows = self._changed(P, A)
         if total(self.comm, len(rows)) > 0.5 * A.getSize()[0]:
@@ -113,6 +125,7 @@ class CompactAlgebra(PetscAlgebra):
         return Replaced(as_petsc(K), rows, part, alike=not largest(self.comm, not alike))
 
     def held(self, mat: Any) -> PetscMatrix:
+        """Return the matrix stored compactly; the given one is destroyed."""
         give_back(self.comm.mpi)
         rows, first, width = rows_of(mat), mat.getOwnershipRange()[0], self._dimension
         (n, size), kind = rows.shape, PETSc.IntType
@@ -144,7 +157,7 @@ class CompactAlgebra(PetscAlgebra):
         return Half(made)
 
     def _changed(self, P: Any, A: Any) -> Indices:
-        """The owned rows in which PᵀAP may differ from A, ascending. Collective."""
+        """Return the owned rows in which PᵀAP may differ from A, ascending. Collective."""
         rows, first = rows_of(P), P.getOwnershipRange()[0]
         changed = np.flatnonzero(np.diff(sp.csr_matrix(rows - sp.eye(*rows.shape, k=first)).indptr))
         reached = [self.entries(PetscMatrix(one), changed).indices for one in (P, A)]

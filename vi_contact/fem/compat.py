@@ -1,10 +1,12 @@
-"""Settle the differences between versions of DOLFINx, every one that this package meets, here and
-nowhere else.
+"""Settle the differences between versions of DOLFINx.
+
+Every one that this package meets is settled here and nowhere else.
 
 Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version.
 What changed: dofmaps became two-dimensional arrays and the ghost mode went to the partitioner
 (0.6), UFL elements became Basix elements and function spaces take tuples (0.7), `create_mesh`
-swapped two arguments (0.10), the geometry has one dofmap per cell type (0.11)."""
+swapped two arguments (0.10), the geometry has one dofmap per cell type (0.11).
+"""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -47,7 +49,7 @@ _defaults = (
 _defaults["timeout"] = (120, "Timeout for JIT compilation [s]")
 
 # What compiles
-# --------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 # errors that DOLFINx raises on all ranks when the first one could not compile; all but one are of
 # others
@@ -59,8 +61,11 @@ TOGETHER = (
 
 
 def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
-    """Return make(), for which DOLFINx may have to compile; InputError, on all ranks, where no C
-    compiler works."""
+    """Return make(), for which DOLFINx may have to compile.
+
+    Raises:
+        InputError: on all ranks, where no C compiler works.
+    """
     try:
         return make()
     except (RuntimeError, VerificationError) as error:
@@ -80,7 +85,7 @@ def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
 
 
 # Meshes
-# ---------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def create_mesh(
@@ -96,7 +101,8 @@ def create_mesh(
     `cells` (n_cells, n_nodes) holds rows of `x` in DOLFINx's order of vertices and mid-points, `x`
     (n_points, gdim) the points [m], `destinations` the ranks each cell goes to, its owner first,
     and the offsets of the cells in that list. A rank without input passes arrays of the right width
-    and no rows. Collective."""
+    and no rows. Collective.
+    """
 
     def told(
         *_: Any,
@@ -122,8 +128,10 @@ def create_mesh(
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
-    """Return the local geometry nodes of each local cell (owned, then ghosts), (n_cells, n_nodes),
-    vertices first."""
+    """Return the local geometry nodes of each local cell (owned, then ghosts).
+
+    The shape is (n_cells, n_nodes), vertices first.
+    """
     if _DOFMAP_PER_CELL_TYPE:
         return mesh.geometry.dofmaps[0]
     rows = mesh.geometry.dofmap
@@ -136,14 +144,18 @@ def sub_entities(mesh: Mesh, dim: int) -> list[list[int]]:
 
 
 def gmsh_order(cell: str, nodes: int) -> Any:
-    """Return the places in Gmsh's row of a cell of the nodes in DOLFINx's order; `cell` is a UFL
-    name."""
+    """Return the places in Gmsh's row of a cell of the nodes in DOLFINx's order.
+
+    `cell` is a UFL name.
+    """
     return dolfinx.cpp.io.perm_gmsh(getattr(_mesh.CellType, cell), nodes)
 
 
 def vtk_order(mesh: Mesh, nodes: int) -> Any:
-    """Return the places in DOLFINx's row of a cell of the nodes in VTK's order, which is that of
-    XDMF."""
+    """Return the places in DOLFINx's row of a cell of the nodes in VTK's order.
+
+    It is that of XDMF.
+    """
     return np.argsort(dolfinx.cpp.io.perm_vtk(mesh.topology.cell_type, nodes))
 
 
@@ -159,7 +171,9 @@ def mesh_bytes(mesh: Mesh) -> int:
 
 def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     """Return local geometry nodes of the vertices of each entity, (n_entities, n_vertices).
-    Collective."""
+
+    Collective.
+    """
     tdim, cell = mesh.topology.dim, mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
@@ -175,15 +189,20 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
 
 
 def tags_of(tags: Any, mesh: Mesh) -> bool:
-    """Return whether MeshTags are those of this mesh; what they refer to, a mesh or a topology,
-    changed in 0.7."""
+    """Return whether MeshTags are those of this mesh.
+
+    What they refer to, a mesh or a topology, changed in 0.7.
+    """
     if hasattr(tags, "topology"):
         return _bare(tags.topology) is _bare(mesh.topology)
     return _bare(tags.mesh) is _bare(mesh)
 
 
 def _bare(wrapped: Any) -> Any:
-    """What DOLFINx's C++ part knows of an object of its Python part; other objects as they are."""
+    """Return what DOLFINx's C++ part knows of an object of its Python part.
+
+    Other objects are returned as they are.
+    """
     return getattr(wrapped, "_cpp_object", getattr(wrapped, "_mesh", wrapped))
 
 
@@ -193,8 +212,10 @@ def is_on(space: Any, mesh: Mesh) -> bool:
 
 
 def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indices:
-    """Return the local cells, or facets of the boundary, whose vertices ``marker`` (x (3, n) ->
-    (n,)) all marks."""
+    """Return the local cells, or facets of the boundary, whose vertices are all marked.
+
+    ``marker`` is x (3, n) -> (n,).
+    """
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, mesh.topology.dim)
     locate = _mesh.locate_entities if dim == mesh.topology.dim else _mesh.locate_entities_boundary
@@ -202,8 +223,10 @@ def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indice
 
 
 def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Return numbers of the owned cells: those of the input, which any ranks leave as they are,
-    where there are any."""
+    """Return numbers of the owned cells.
+
+    They are those of the input, which any ranks leave as they are, where there are any.
+    """
     cells, given = mesh.topology.index_map(mesh.topology.dim), ()
     with suppress(RuntimeError):  # a part of a mesh has none: an empty array in 0.5, an error since
         given = mesh.topology.original_cell_index
@@ -213,8 +236,10 @@ def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 
 
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
-    """Return dx (dim = topological dimension) or ds (one less) on these local entities; ds skips
-    inner facets."""
+    """Return dx (dim = topological dimension) or ds (one less) on these local entities.
+
+    ds skips inner facets.
+    """
     kind = "dx" if dim == mesh.topology.dim else "ds"
     tags = meshtags(
         mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32)
@@ -223,12 +248,14 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
 
 
 # Function spaces
-# ------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def vector_space(mesh: Mesh, degree: int = 1) -> Any:
-    """Make the space of continuous vector fields (P1, Q1, P2, Q2) with gdim components; the block
-    size is gdim."""
+    """Make the space of continuous vector fields (P1, Q1, P2, Q2) with gdim components.
+
+    The block size is gdim.
+    """
     return lagrange(mesh, degree, (mesh.geometry.dim,))
 
 
@@ -260,7 +287,8 @@ def dof_to_node(space: Any) -> Indices:
     second-order cells.
 
     Unknown c of block i (index bs*i + c) is component c at the point
-    `mesh.geometry.x[dof_to_node(space)[i]]`."""
+    `mesh.geometry.x[dof_to_node(space)[i]]`.
+    """
     index_map = space.dofmap.index_map
     nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
     nodes[cell_blocks(space)] = geometry_dofmap(space.mesh)
@@ -268,14 +296,18 @@ def dof_to_node(space: Any) -> Indices:
 
 
 def cell_blocks(space: Any) -> Indices:
-    """Return the local blocks of unknowns of each cell (owned, then ghosts), (n_cells, n_nodes),
-    vertices first."""
+    """Return the local blocks of unknowns of each cell (owned, then ghosts).
+
+    The shape is (n_cells, n_nodes), vertices first.
+    """
     return _as_table(space.dofmap.list, space.dofmap.dof_layout)
 
 
 def blocks_of_cells(space: Any) -> Indices:
-    """Return the same of the space of a ``dirichletbc``, of V or of V.sub(i): in C++ up to 0.11, in
-    Python since."""
+    """Return the same of the space of a ``dirichletbc``, of V or of V.sub(i).
+
+    The space is in C++ up to 0.11, in Python since.
+    """
     rows = getattr(space.dofmap, "map", None) or space.dofmap.list
     table = _as_table(rows() if callable(rows) else rows, space.dofmap.dof_layout)
     return (
@@ -286,8 +318,10 @@ def blocks_of_cells(space: Any) -> Indices:
 
 
 def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
-    """Return (local unknowns that a ``dirichletbc`` holds, ghosts too; their values) on a space
-    with so many."""
+    """Return (local unknowns that a ``dirichletbc`` holds, ghosts too; their values).
+
+    The space has so many unknowns.
+    """
     values = np.zeros(count)
     bc.set(values, None, 1.0) if hasattr(bc, "set") else fem.set_bc(values, [bc])
     dofs = bc.dof_indices()[0]
@@ -300,35 +334,43 @@ def _as_table(rows: Any, layout: Any) -> Indices:
 
 
 # Assembly
-# -------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def compile_form(ufl_form: ufl.Form) -> Any:
-    """Generate, compile and load the code of a variational form; collective, cached on disk by its
-    signature."""
+    """Generate, compile and load the code of a variational form. Collective.
+
+    The code is cached on disk by the form's signature.
+    """
     comm = ufl_form.ufl_domain().ufl_cargo().comm
     return _compiling(comm, lambda: fem.form(ufl_form))
 
 
 def assemble_matrix(form: Any) -> PETSc.Mat:
-    """Assemble the matrix of a compiled bilinear form, without boundary conditions, ready to
-    use."""
+    """Assemble the matrix of a compiled bilinear form, without boundary conditions.
+
+    It is ready to use.
+    """
     matrix = fem_petsc.assemble_matrix(form)
     matrix.assemble()
     return matrix
 
 
 def assemble_vector(form: Any) -> PETSc.Vec:
-    """Assemble a compiled linear form, contributions of all ranks added on the owner; ghost entries
-    are left stale."""
+    """Assemble a compiled linear form, contributions of all ranks added on the owner.
+
+    Ghost entries are left stale.
+    """
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
 
 
 def assemble_scalar(form: Any) -> float:
-    """Assemble a compiled functional over the cells and facets of this rank; the ranks' values are
-    not added."""
+    """Assemble a compiled functional over the cells and facets of this rank.
+
+    The ranks' values are not added.
+    """
     return float(fem.assemble_scalar(form))
 
 
@@ -338,8 +380,10 @@ def cell_space(mesh: Mesh) -> Any:
 
 
 def expression(expr: Any, space: Any) -> Any:
-    """Make what ``Function.interpolate`` takes of an expression of UFL; the points became a
-    property in 0.10."""
+    """Make what ``Function.interpolate`` takes of an expression of UFL.
+
+    The points became a property in 0.10.
+    """
     points = space.element.interpolation_points
     there = points() if callable(points) else points
     return _compiling(space.mesh.comm, lambda: fem.Expression(expr, there))
@@ -356,8 +400,10 @@ def function(space: Any) -> Any:
 
 
 def facet_dofs(space: Any, facets: Indices) -> Indices:
-    """Return the local blocks of unknowns on the facets, found on every rank that owns or ghosts
-    them; collective."""
+    """Return the local blocks of unknowns on the facets. Collective.
+
+    They are found on every rank that owns or ghosts them.
+    """
     mesh = space.mesh
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
@@ -365,8 +411,10 @@ def facet_dofs(space: Any, facets: Indices) -> Indices:
 
 
 def nodal(space: Any) -> bool:
-    """Say whether the unknowns of a space are values at points, of one field: not moments, and no
-    mixed element."""
+    """Say whether the unknowns of a space are values at points, of one field.
+
+    They are not moments, and there is no mixed element.
+    """
     element = space.element
     return (
         element.num_sub_elements in (0, space.dofmap.index_map_bs) and element.interpolation_ident

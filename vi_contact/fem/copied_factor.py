@@ -1,5 +1,7 @@
-"""Factorise PETSc matrices with contact unknowns last: by CHOLMOD, a whole copy of the factor on
-every rank."""
+"""Factorise PETSc matrices with contact unknowns last.
+
+This is done by CHOLMOD, with a whole copy of the factor on every rank.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,8 +16,11 @@ from .petsc_rows import rows_of
 
 
 def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
-    """Return the factor of an AIJ matrix on an MpiComm; None without CHOLMOD, and where it cannot:
-    not positive definite, which PETSc says better, or too large. Collective."""
+    """Return the factor of an AIJ matrix on an MpiComm. Collective.
+
+    It is None without CHOLMOD, and where it cannot: not positive definite, which PETSc says better,
+    or too large.
+    """
     functions = cholmod(comm)
     if functions is None:
         return None
@@ -37,8 +42,10 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
 
 
 def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
-    """Return what multiplies a matrix on one rank with every row of x, and reads it once for eight
-    of them."""
+    """Return what multiplies a matrix on one rank with every row of x.
+
+    It reads the matrix once for eight of them.
+    """
     functions, A, n = library(SerialComm()), rows_of(matrix.mat), matrix.rows
     if functions is None or A.indices.dtype != np.int32:
         return lambda x: np.stack([matrix @ row for row in x])
@@ -54,7 +61,7 @@ def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
 
 
 def _gathering(mpi: Any, mat: Any) -> Callable[[Array], Array]:
-    """What gathers the owned entries of a vector, into one array again and again."""
+    """Return what gathers the owned entries of a vector, into one array again and again."""
     ends = mat.getOwnershipRanges()
     counts, x = np.diff(ends), np.empty(ends[-1])
 

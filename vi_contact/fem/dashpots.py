@@ -1,5 +1,6 @@
-"""Let the ground go on behind boundaries: dashpots that absorb waves, and a base that lets waves in
-from below.
+"""Let the ground go on behind boundaries.
+
+There are dashpots that absorb waves, and a base that lets waves in from below.
 
 Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877: on facets with outward normal n
 
@@ -13,7 +14,8 @@ whatever its direction:
     sigma_n += 2 rho c_P v_up_n,    tau += 2 rho c_S v_up_t.
 
 The wave that comes back down passes through the dashpots: the record of the base is not the input,
-but up + down."""
+but up + down.
+"""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -52,8 +54,9 @@ class BoundaryLoads:
 
 @dataclass(frozen=True)
 class Dashpots:
-    """Put absorbing dashpots on facets. ``material``: of the adjacent cells when None, or of the
-    half-space behind.
+    """Put absorbing dashpots on facets.
+
+    ``material``: of the adjacent cells when None, or of the half-space behind.
 
     ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out.
     InputError when negative.
@@ -81,8 +84,10 @@ class Dashpots:
         attributes(self, not_negative=("normal", "tangential"))
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
-        """Return what acts on the body here besides the dashpots: nothing. ``forms``:
-        ``ElasticForms``. Collective."""
+        """Return what acts on the body here besides the dashpots: nothing.
+
+        ``forms``: ``ElasticForms``. Collective.
+        """
         return BoundaryLoads()
 
     @property
@@ -93,8 +98,10 @@ class Dashpots:
 
 @dataclass(frozen=True, kw_only=True)
 class CompliantBase(Dashpots):
-    """Put dashpots and an upgoing wave ``motion``: t [s] -> v_up (d,) [m/s], half the outcrop's
-    (``upgoing``)."""
+    """Put dashpots and an upgoing wave ``motion`` on a boundary.
+
+    It is t [s] -> v_up (d,) [m/s], half the outcrop's (``upgoing``).
+    """
 
     motion: Callable[[float], Array] = field(repr=False)
     lets_waves_in: ClassVar[bool] = True
@@ -116,6 +123,7 @@ class CompliantBase(Dashpots):
 
     @property
     def expects(self) -> str:
+        """Return which motion the boundary expects, in words."""
         return (
             "expects the upgoing motion, half the velocity of an outcrop (not the within "
             "motion of its depth)"
@@ -126,7 +134,8 @@ class DashpotMatrix:
     """Assemble the full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
 
     InputError for facets that are not on the outer boundary, or prescribed in a direction that the
-    dashpots resist."""
+    dashpots resist.
+    """
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
         self.space, self.dashpots = space, dashpots
@@ -210,8 +219,11 @@ class DashpotMatrix:
 def impedances(
     dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any
 ) -> tuple[Any, Any]:
-    """Return thickness · (normal rho c_P, tangential rho c_S): of the ground beside the dashpots,
-    whose constants given here hold the thickness already, or of their own material."""
+    """Return thickness · (normal rho c_P, tangential rho c_S).
+
+    They are those of the ground beside the dashpots, whose constants given here hold the thickness
+    already, or of their own material.
+    """
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho
         lame, shear = (

@@ -1,5 +1,6 @@
-"""Take the volumetric strain of every cell as its mean, so that first-order quadrilaterals and
-hexahedra do not lock.
+"""Take the volumetric strain of every cell as its mean.
+
+So first-order quadrilaterals and hexahedra do not lock.
 
     K = ∫ 2 mu eps(u):eps(v) + sum over cells of  lambda / |cell| ∫ tr eps(u) ∫ tr eps(v)
 
@@ -7,7 +8,8 @@ All else is integrated as usual, so that an element has no other zero-energy mod
 motions. On quadrilaterals and parallelepipeds the mean is the value in the middle: selective
 reduced integration, the volumetric term by one point (Hughes, Int. J. Numer. Methods Eng. 15
 (1980), 1413-1418; Nagtegaal, Parks and Rice, Comput. Methods Appl. Mech. Eng. 4 (1974), 153-177).
-On other hexahedra the mean passes the patch test, which one point does not."""
+On other hexahedra the mean passes the patch test, which one point does not.
+"""
 
 from typing import Any
 
@@ -22,7 +24,9 @@ from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
 
 class MeanDilatation:
     """Compute the mean of tr eps over each cell of a vector space, and what it adds to a stiffness.
-    Collective."""
+
+    Collective.
+    """
 
     def __init__(self, V: Any) -> None:
         self._cells = compat.cell_space(V.mesh)
@@ -36,8 +40,11 @@ class MeanDilatation:
         self._means: list[tuple[Any, Any]] = []
 
     def add(self, matrix: Any, *moduli: Any) -> None:
-        """Add sum of modulus / |cell| ∫ tr eps(u) ∫ tr eps(v) to a PETSc matrix of all unknowns;
-        the modulus [Pa] is the product of cellwise Functions, None for 1."""
+        """Add sum of modulus / |cell| ∫ tr eps(u) ∫ tr eps(v) to a PETSc matrix.
+
+        The matrix is of all unknowns; the modulus [Pa] is the product of cellwise Functions, None
+        for 1.
+        """
         density = 1.0 / self._volume
         for modulus in (one for one in moduli if one is not None):
             density = density * modulus.x.array[: len(density)]

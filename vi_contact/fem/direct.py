@@ -2,7 +2,8 @@
 
 PETSc's own factorisation is always there. MUMPS, SuiteSparse and others are packages, which a PETSc
 may lack: whoever assumes one asks ``core.packages`` first. A cause is named only where PETSc or the
-matrix tells it."""
+matrix tells it.
+"""
 
 import logging
 from typing import Any
@@ -27,14 +28,19 @@ MUMPS_MEMORY = (-8, -9, -11, -13, -14, -15, -17, -18, -19, -20)
 
 
 def ordering() -> str:
-    """Return the order of elimination that PETSc's own factorisation takes: minimum degree, which
-    is of SuiteSparse, or without it nested dissection, which is PETSc's."""
+    """Return the order of elimination that PETSc's own factorisation takes.
+
+    It is minimum degree, which is of SuiteSparse, or without it nested dissection, which is
+    PETSc's.
+    """
     return "amd" if packages.petsc_has("amd") else "nd"
 
 
 def own_serves(mat: Any) -> bool:
-    """Say whether PETSc's own factorisation is the better one: sparse rows (2D), or few; on several
-    ranks not too many. Collective."""
+    """Say whether PETSc's own factorisation is the better one. Collective.
+
+    It is for sparse rows (2D), or few; on several ranks not too many.
+    """
     rows = max(mat.getSize()[0], 1)
     if mat.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > FULL_ROW * rows:
         return bool(rows <= FEW_ROWS)
@@ -42,8 +48,11 @@ def own_serves(mat: Any) -> bool:
 
 
 def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
-    """Say whether MUMPS factorises: where it is the better one, if PETSc has it. The log says what
-    is taken instead of what is missing, unless options of the user choose (``own``). Collective."""
+    """Say whether MUMPS factorises: where it is the better one, if PETSc has it.
+
+    The log says what is taken instead of what is missing, unless options of the user choose
+    (``own``). Collective.
+    """
     serves = symmetric and own_serves(mat)
     mumps = packages.petsc_has("mumps") and not serves
     missing = (
@@ -63,8 +72,11 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
 
 
 def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
-    """Return what to raise of a factorisation that failed: PETSc raised ``error``, or solved to
-    numbers that are not finite. Collective where nothing was raised."""
+    """Return what to raise of a factorisation that failed.
+
+    PETSc raised ``error``, or solved to numbers that are not finite. Collective where nothing was
+    raised.
+    """
     rows = mat.getSize()[0]
     said = "" if error is None else str(error).splitlines()[-1].split("] ", 1)[-1].strip()
     code = 0 if error is None else error.ierr
@@ -91,8 +103,10 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
 
 
 def _reason(pc: Any, mat: Any) -> str:
-    """Why a factor gives numbers that are not finite: memory, or the matrix, or what MUMPS says of
-    neither."""
+    """Return why a factor gives numbers that are not finite.
+
+    It is memory, or the matrix, or what MUMPS says of neither.
+    """
     found = [_failed(pc)] if mat.comm.size == 1 else mat.comm.tompi4py().allgather(_failed(pc))
     return next((one for one in found if one != "singular"), "singular")
 

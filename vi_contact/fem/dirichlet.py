@@ -1,5 +1,7 @@
-"""Take Dirichlet data as a user of DOLFINx has them: ``dirichletbc`` objects on the displacement's
-space, or parts."""
+"""Take Dirichlet data as a user of DOLFINx has them.
+
+They are ``dirichletbc`` objects on the displacement's space, or parts.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,11 +25,13 @@ REMEDY = (
 
 @dataclass(frozen=True, eq=False)
 class GivenValues:
-    """Hold components of nodes as a ``Prescribed`` at rest does: those of a ``dirichletbc``, as
-    they were when given.
+    """Hold components of nodes as a ``Prescribed`` at rest does.
+
+    They are those of a ``dirichletbc``, as they were when given.
 
     mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not
-    zero."""
+    zero.
+    """
 
     name: str
     mask: Mask
@@ -50,8 +54,10 @@ class GivenValues:
 
 
 def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any, int]:
-    """Return (the user's space, or that of the conditions without one; its degree); (None, degree)
-    without both."""
+    """Return (the user's space, or that of the conditions without one; its degree).
+
+    It is (None, degree) without both.
+    """
     counts = mesh.comm.allgather(len(bcs)) if hasattr(mesh, "comm") else [0]
     if min(counts) < max(counts):
         raise InputError(
@@ -100,8 +106,11 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
 
 
 def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
-    """Return what conditions hold of a displacement's space. InputError, on all ranks, for one of
-    another space, one that holds nothing, and values that are not finite. Collective."""
+    """Return what conditions hold of a displacement's space.
+
+    InputError, on all ranks, for one of another space, one that holds nothing, and values that are
+    not finite. Collective.
+    """
     comm, d, found = MpiComm(mesh.comm), mesh.geometry.dim, []
     for k, bc in enumerate(bcs):
         name, block = f"bcs[{k}]", _block_of(V, bc.function_space)
@@ -132,9 +141,12 @@ def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
 
 
 def refuse_contradictions(space: Any) -> None:
-    """Raise InputError, on all ranks, where a dirichletbc and a ``Prescribed`` hold the same
-    components of nodes, or one those of the other and more, at different values, as every function
-    of time may become. Conditions that only meet do not contradict. Collective."""
+    """Raise InputError, on all ranks, where conditions contradict. Collective.
+
+    A dirichletbc and a ``Prescribed`` then hold the same components of nodes, or one those of the
+    other and more, at different values, as every function of time may become. Conditions that only
+    meet do not contradict.
+    """
     given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
     held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
     for values, one in zip(held, space.prescribed, strict=False):
@@ -154,9 +166,11 @@ def refuse_contradictions(space: Any) -> None:
 
 
 def _block_of(V: Any, S: Any) -> Indices | None:
-    """The block of V that each block of a space is, of S = V or V.sub(i), -1 without cells; None,
-    on all ranks, where S is of another kind. Spaces made twice may be numbered differently.
-    Collective."""
+    """Return the block of V that each block of a space is, -1 without cells. Collective.
+
+    The space is S = V or V.sub(i). It is None, on all ranks, where S is of another kind. Spaces
+    made twice may be numbered differently.
+    """
     d, theirs, mine, rows = (
         V.mesh.geometry.dim,
         S.dofmap.index_map,

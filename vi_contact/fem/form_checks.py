@@ -1,5 +1,7 @@
-"""Check the forms that a user gives for a body: functions, bilinear, of this mesh; matrices finite,
-masses positive."""
+"""Check the forms that a user gives for a body.
+
+They are functions, bilinear, of this mesh; matrices are finite, masses positive.
+"""
 
 from collections.abc import Callable
 from inspect import signature
@@ -23,8 +25,10 @@ PROBES = 4
 
 
 def refuse_complex(owner: str) -> None:
-    """Raise InputError where PETSc computes with complex numbers: inequalities have no meaning
-    there."""
+    """Raise InputError where PETSc computes with complex numbers.
+
+    Inequalities have no meaning there.
+    """
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
         raise InputError(
             f"{owner}: this PETSc computes with complex numbers, of which none is less than "
@@ -48,8 +52,11 @@ def takes(name: str, call: Any, *arguments: str) -> None:
 
 
 def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
-    """Return call(*arguments), a form linear in all of them on the mesh of the space; InputError,
-    which begins with ``said``, on all ranks otherwise. Collective."""
+    """Return call(*arguments), a form linear in all of them on the mesh of the space. Collective.
+
+    Raises:
+        InputError: on all ranks otherwise; it begins with ``said``.
+    """
     form = on_all(space.comm, said, lambda: call(*arguments))
     instance(
         said,
@@ -115,8 +122,10 @@ def is_symmetric(matrix: Any, space: FemSpace) -> bool:
 
 
 def refuse_masses(matrix: Any, space: FemSpace) -> None:
-    """Raise InputError unless a full mass matrix is symmetric and positive, as its diagonal and
-    some products tell."""
+    """Raise InputError unless a full mass matrix is symmetric and positive.
+
+    Its diagonal and some products tell.
+    """
     M = PetscMatrix(matrix)
     if not is_symmetric(matrix, space):
         raise InputError(
@@ -139,7 +148,9 @@ def _numbers(space: FemSpace) -> Any:
 
 def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
     """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3).
-    Collective."""
+
+    Collective.
+    """
     d, u = space.dimension, compat.function(space.V)
     stress = on_all(space.comm, "Forms: stress", lambda: call(u))
     shape = getattr(stress, "ufl_shape", None)

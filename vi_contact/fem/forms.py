@@ -1,8 +1,10 @@
 """State the variational forms of a linear elastic body from its materials.
 
-    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
+    K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
-Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C."""
+Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -29,22 +31,24 @@ KINDS = (LinearElastic, Orthotropic, Heterogeneous)
 
 
 class ElasticForms:
-    """Hold the variational forms of one body; constants are cellwise: one compiled form serves all
-    materials.
+    """Hold the variational forms of one body.
+
+    Constants are cellwise: one compiled form serves all materials.
 
     Attributes:
         fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta:
             functions of DG0, of DG1 where a material changes inside of cells. Lamé constants are
             NaN in orthotropic cells.
-        damping: the law of C, as it was given; largest_ratio: the largest xi of the materials, on
-            all ranks.
-        damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping,
-            cell by cell.
+        damping: the law of C, as it was given.
+        largest_ratio: the largest xi of the materials, on all ranks.
+        damped: whether there is a C.
+        densities: whether ``fields`` tell the mass and its damping, cell by cell.
         materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in
             K, in C = beta K and in stresses (``fem.dilatation``); None otherwise.
-        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what
-            comes from where;
+        tells_stress: whether ``stress`` is known.
+        symmetric: whether all matrices are.
+        notes: what comes from where.
         own_damping: whether the user gave a form of C.
     """
 
@@ -107,29 +111,37 @@ class ElasticForms:
         return np.asarray(field.x.array[compat.cell_blocks(field.function_space)].mean(axis=1))
 
     def own(self, system: SemiDiscreteSystem) -> None:
-        """Remember the matrices of a system as made of these materials; the forms are then those of
-        its space."""
+        """Remember the matrices of a system as made of these materials.
+
+        The forms are then those of its space.
+        """
         self.space.forms = self
         for name, known in self._matrices.items():
             if getattr(system, name) is not None:
                 known.add(getattr(system, name))
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
-        """Return the letters of ``names`` whose matrices in a system were not made of these
-        materials."""
+        """Return the letters of ``names`` whose matrices are not of these materials.
+
+        The matrices of a system were not made of these.
+        """
         return "".join(
             name for name in names if getattr(system, name) not in (None, *self._matrices[name])
         )
 
     def stress(self, u: Any) -> Any:
         """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains.
+
         With these, or with selective integration: ``follow`` when its values or the time have
-        changed since."""
+        changed since.
+        """
         return self.stresses(u)[0]
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
-        """Return the stress and sigma_zz(u) times the thickness of a body in the plane, 0 in plane
-        stress and else."""
+        """Return the stress and sigma_zz(u) times the thickness of a body in the plane.
+
+        sigma_zz = 0 in plane stress and else.
+        """
         eps, trace = ufl.sym(ufl.grad(u)), self._trace(u)
         if self.initial is None or u is self.u:
             return self.hooke(eps, 0.0, trace)
@@ -137,8 +149,10 @@ class ElasticForms:
         return self.hooke(eps - own, -across, trace - ufl.tr(own))
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        """Return (sigma (d, d), sigma_zz) times the thickness of a strain, that across the plane,
-        and its trace."""
+        """Return (sigma (d, d), sigma_zz) times the thickness of a strain.
+
+        Given are the strain, that across the plane, and its trace.
+        """
         d, fields = self.space.dimension, self.fields
         if self._anisotropic is None:
             sigma = fields["lame"] * trace * ufl.Identity(d) + 2 * fields["shear"] * eps
@@ -153,23 +167,29 @@ class ElasticForms:
         return sigma, flat[3] if d == 2 else 0.0 * trace
 
     def _trace(self, u: Any) -> Any:
-        """tr eps or, of a Function, its mean over each cell; none in bilinear forms where
-        ``dilatation`` adds it."""
+        """Return tr eps or, of a Function, its mean over each cell.
+
+        There is none in bilinear forms where ``dilatation`` adds it.
+        """
         if self.dilatation is None:
             return ufl.tr(ufl.sym(ufl.grad(u)))
         return 0.0 if u is self.u else self.dilatation.of(u)
 
     def follow(self, u: Any, t: float | None = None) -> None:
         """Bring stresses of a Function up to its values, and initial strains up to a time.
-        Collective."""
+
+        Collective.
+        """
         if self.dilatation is not None:
             self.dilatation.update(u)
         if self.initial is not None and t is not None:
             self.initial.follow(t)
 
     def bilinear(self, name: str) -> Any:
-        """Return the form of M, K, or C of the materials in the trial function ``u`` and the test
-        function ``v``."""
+        """Return the form of M, K, or C of the materials.
+
+        It is in the trial function ``u`` and the test function ``v``.
+        """
         u, v, fields = self.u, self.v, self.fields
         if name == "M":  # forms=… without a stress take the mass from here
             return fields["rho"] * ufl.inner(u, v) * ufl.dx
@@ -180,8 +200,11 @@ class ElasticForms:
         return form + self._viscous_form() if self.viscous else form
 
     def against(self, name: str, r: Any, inside: Any) -> Any:
-        """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r
-        as test function. ``follow`` when the values of the Function r have changed since."""
+        """Return rᵀA of the cells inside, A = M, K or C, as a linear form.
+
+        It is the bilinear form with r as test function. Call ``follow`` when the values of the
+        Function r have changed since.
+        """
         form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
         if self.dilatation is None or name == "M":
             return form
@@ -209,7 +232,9 @@ class ElasticForms:
 
 def cell_constants(space: Any, material: Materials) -> Array:
     """Return E, nu, rho and xi of the local cells, (4, cells), NaN where Orthotropic has none; DG0.
-    Collective."""
+
+    Collective.
+    """
     place = compat.cell_blocks(space)[:, 0]
     found = np.empty((4, len(place)))
     for where, one in cell_materials(space.mesh, material):
@@ -220,8 +245,10 @@ def cell_constants(space: Any, material: Materials) -> Array:
 
 
 def _constants(space: Any, cells: Any, material: Material) -> Any:
-    """The material, or its values at all unknowns of the space where it is given by functions or
-    has no Lamé constants. Collective."""
+    """Return the material, or its values at all unknowns of the space. Collective.
+
+    It is the values where it is given by functions or has no Lamé constants.
+    """
     if isinstance(material, Heterogeneous):
         return material.at(space, cells)
     if isinstance(material, Orthotropic):
@@ -252,7 +279,10 @@ def _anisotropic(
     section: Section,
     d: int,
 ) -> Any:
-    """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
+    """Return the matrix of all cells times the thickness, as a function.
+
+    See ``Orthotropic.matrix``.
+    """
     if d == 1:
         raise InputError(
             "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"
@@ -281,8 +311,11 @@ def _anisotropic(
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:
-    """Return (local cells, material) pairs that cover every local cell once; InputError for cells
-    with none or two."""
+    """Return (local cells, material) pairs that cover every local cell once.
+
+    Raises:
+        InputError: cells with none or two.
+    """
     cell_map = mesh.topology.index_map(mesh.topology.dim)
     count = cell_map.size_local + cell_map.num_ghosts
     if isinstance(material, KINDS):

@@ -1,8 +1,10 @@
-"""Check groups of facets and cells where they are given: the right kind, of the mesh they are used
-on.
+"""Check groups of facets and cells where they are given.
+
+They must be of the right kind, and of the mesh they are used on.
 
 Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would
-name other places."""
+name other places.
+"""
 
 from typing import Any, cast
 
@@ -16,14 +18,20 @@ KINDS: dict[type[Group], str] = {Facets: "boundary group", Cells: "cell group"}
 
 
 def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
-    """Return the boundary group, of this mesh if one is given; InputError, with the remedy, for
-    anything else."""
+    """Return the boundary group, of this mesh if one is given.
+
+    Raises:
+        InputError: anything else; it tells the remedy.
+    """
     return cast(Facets, _group(owner, meaning, group, mesh, Facets))
 
 
 def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
-    """Return the cell group, of this mesh if one is given; InputError, with the remedy, for
-    anything else."""
+    """Return the cell group, of this mesh if one is given.
+
+    Raises:
+        InputError: anything else; it tells the remedy.
+    """
     return cast(Cells, _group(owner, meaning, group, mesh, Cells))
 
 
@@ -53,8 +61,10 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
 
 
 def field_given(owner: str, meaning: str, value: Any) -> None:
-    """Raise InputError unless it is a function or a vector of numbers (size and NaN are told where
-    it is used)."""
+    """Raise InputError unless it is a function or a vector of numbers.
+
+    Size and NaN are told where it is used.
+    """
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
         return
@@ -66,8 +76,11 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
 
 
 def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -> tuple[int, ...]:
-    """Return the components that are given, all of them for None; InputError for one that does not
-    exist."""
+    """Return the components that are given, all of them for None.
+
+    Raises:
+        InputError: one does not exist.
+    """
     for c in given or ():
         if not 0 <= c < dimension:
             raise InputError(
@@ -77,8 +90,10 @@ def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -
 
 
 def components_given(owner: str, value: Any) -> None:
-    """Raise InputError unless it is None or a tuple of whole numbers (whose range is told where
-    they are used)."""
+    """Raise InputError unless it is None or a tuple of whole numbers.
+
+    Their range is told where they are used.
+    """
     for one in (
         ()
         if value is None

@@ -32,8 +32,9 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
 
 @dataclass(frozen=True)
 class Heterogeneous:
-    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³], and xi(x), which
-    DampingRatio damps by.
+    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³].
+
+    There is also xi(x), which DampingRatio damps by.
 
     Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there,
     or a function of points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes
@@ -48,7 +49,8 @@ class Heterogeneous:
 
     Raises InputError: neither number nor function; and when a body is assembled, values outside E >
     0, -1 < nu < 1/2, rho > 0, 0 <= xi < 1, with the first place of them, and Functions or
-    expressions of another mesh."""
+    expressions of another mesh.
+    """
 
     E: Values
     nu: Values
@@ -80,8 +82,10 @@ class Heterogeneous:
         )
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
-        """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for
-        values on these cells that no material has. Collective."""
+        """Return the constants at all unknowns of a DG0 or DG1 space.
+
+        InputError, on all ranks, for values on these cells that no material has. Collective.
+        """
         comm = MpiComm(space.mesh.comm)
         mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
         mine[compat.cell_blocks(space)[cells]] = True
@@ -133,9 +137,10 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
 
 
 def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
-    """What is wrong with the values of this rank."""
+    """Return what is wrong with the values of this rank."""
     for name, (words, low, high, remedy) in RANGES.items():
         wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
         if len(wrong):
             place = space.tabulate_dof_coordinates()[wrong[0], : space.mesh.geometry.dim]
-            yield f"Heterogeneous: {words} is {values[name][wrong[0]]:g} at {at(place)}; give {remedy}"
+            found = values[name][wrong[0]]
+            yield f"Heterogeneous: {words} is {found:g} at {at(place)}; give {remedy}"

@@ -1,5 +1,6 @@
-"""Give tetrahedra of second order unknowns of a hierarchy, so that contact and mass may live at
-their vertices.
+"""Give tetrahedra of second order unknowns of a hierarchy.
+
+Contact and mass may then live at their vertices.
 
     u_m = e_m + (v_a + v_b) / 2   at the mid-point m of every edge a-b
 
@@ -7,7 +8,8 @@ v are displacements of vertices, e what edges bend beside them: a field is that 
 one bubble an edge. Rigid translations have e = 0, so that row sums of a mass matrix in these
 unknowns are those of first order, positive, where nodal ones of vertices are negative (tetrahedra)
 or zero (triangles). Rotations have e = 0 too where edges are straight. The nodal unknowns are u = H
-û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H."""
+û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H.
+"""
 
 from typing import Any
 
@@ -24,18 +26,21 @@ TETRAHEDRON = 10  # nodes of one of degree 2
 
 
 def needs_hierarchy(V: Any) -> bool:
-    """Say whether vertices have no weight of their own in a pressure on the sides of cells: P2
-    tetrahedra."""
+    """Say whether vertices have no weight of their own in a pressure on the sides of cells.
+
+    This is so for P2 tetrahedra.
+    """
     return V.mesh.topology.dim == 3 and len(supports(V)) == TETRAHEDRON
 
 
 class Hierarchy:
-    """Hold the edges of a space of P2 fields and the change of its unknowns. Collective, as all it
-    does.
+    """Hold the edges of a space of P2 fields and the change of its unknowns.
+
+    Collective, as all it does.
 
     Attributes:
-        vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H and H⁻¹ =
-            2 - H.
+        vertices: the P1 space, and the owned blocks of ``V`` that its own are.
+        H, back: H and H⁻¹ = 2 - H.
     """
 
     def __init__(self, space: Any) -> None:
@@ -66,8 +71,10 @@ class Hierarchy:
         return every[: len(nodal)]
 
     def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
-        """Return owned nodal values (k, c), with a ``mean`` of the ends of edges at mid-points that
-        are known."""
+        """Return owned nodal values (k, c)at mid-points too.
+
+        They are given with a ``mean`` of the ends of edges at mid-points that are known.
+        """
         every, found = (
             self.with_ghosts(nodal),
             self.with_ghosts(known[:, None])[self._mids, 0] > 0.0,
@@ -76,14 +83,16 @@ class Hierarchy:
         return every[: len(nodal)]
 
     def around(self, turn: Matrix | None, dual: Matrix | None) -> tuple[Matrix, Matrix]:
-        """Return (T, T⁻ᵀ) of u = T û, the nodal unknowns of û being turned by ``turn`` and forces
-        by ``dual``."""
+        """Return (T, T⁻ᵀ) of u = T û.
+
+        The nodal unknowns of û are turned by ``turn`` and forces by ``dual``.
+        """
         return _product(self.H, turn), _product(
             PetscMatrix(self.back.mat.transpose(PETSc.Mat())), dual
         )
 
     def _shares(self, share: float) -> PetscMatrix:
-        """The identity and, in rows of mid-points, so much at the ends of their edges."""
+        """Return the identity and, in rows of mid-points, so much at the ends of their edges."""
         space, algebra = self._space, PetscAlgebra(self._space.comm.mpi)
         n, d, owned = len(space.ids), space.dimension, self._mids < len(space.nodes)
         own = space.free_index.reshape(-1, d)[self._mids[owned]]
@@ -102,5 +111,8 @@ class Hierarchy:
 
 
 def _product(A: PetscMatrix, B: Matrix | None) -> Matrix:
-    """A B, or A; a copy: what PETSc makes holds both for as long as it lives."""
+    """Return A B, or A; a copy.
+
+    What PETSc makes holds both for as long as it lives.
+    """
     return A if B is None else PetscMatrix(A.mat.matMult(as_petsc(B).mat).duplicate(copy=True))

@@ -1,5 +1,7 @@
-"""Strain a body before it has stresses: temperature, swelling, given dislocations (boundary method,
-eq. 25)."""
+"""Strain a body before it has stresses.
+
+This is by temperature, swelling, given dislocations (boundary method, eq. 25).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,8 +24,9 @@ from .mesh import Cells
 
 @dataclass(frozen=True)
 class InitialStrain(ActingLoad):
-    """Apply an initial strain eps_0(x, t): sigma = C (eps(u) - eps_0), as the load ∫ C eps_0 :
-    eps(v).
+    """Apply an initial strain eps_0(x, t) as the load ∫ C eps_0 : eps(v).
+
+    sigma = C (eps(u) - eps_0).
 
     Warming by T - T_0 is alpha (T - T_0) in all directions. A dislocation, a given jump b [m]
     across a surface with the normal n, is the tensor b⊗n / h in a layer of cells of height h (Mura,
@@ -38,14 +41,16 @@ class InitialStrain(ActingLoad):
             and the time [s] -> (k,), (k, d, d) or in the plane (k, 3, 3), which is asked at t = 0 s
             when a body is assembled. A bar is held sideways: warming then lengthens it by (1 +
             nu)/(1 - nu) alpha (T - T_0); nu = 0 is a bar with free sides.
-        history: factor s(t) of the value at t = 0 s; cells: the part of the body that is strained.
+        history: factor s(t) of the value at t = 0 s.
+        cells: the part of the body that is strained.
 
     Raises:
         InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell
             C.
     """
 
-    value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]  # as given
+    # the value as it is given
+    value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]
     history: Callable[[float], float] | None = None
     cells: Cells | None = None
 
@@ -63,8 +68,10 @@ class InitialStrain(ActingLoad):
             _tensors("InitialStrain", self.value, (), dimensions)
 
     def at(self, points: Array, room: Array, t: float) -> Array:
-        """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the
-        room."""
+        """Return the tensors at points (k, d), less the history.
+
+        They are in the shape (k, 9) of the room.
+        """
         value: Any = (
             self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
         )
@@ -84,8 +91,11 @@ class InitialStrain(ActingLoad):
 def _tensors(
     owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
 ) -> Array:
-    """Return strains, one or one at each point, as tensors; InputError unless one of these
-    dimensions has the shape."""
+    """Return strains, one or one at each point, as tensors.
+
+    Raises:
+        InputError: none of these dimensions has the shape.
+    """
     shape = shape_of(value)
     if shape != leading and shape not in {
         (*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)
@@ -102,8 +112,10 @@ def _tensors(
 
 
 class InitialStrains:
-    """Hold the sum of the initial strains of a body at a time, as tensors (3, 3), its load and
-    energy. Collective."""
+    """Hold the sum of the initial strains of a body at a time. Collective.
+
+    This is the sum as tensors (3, 3), its load and energy.
+    """
 
     def __init__(self, body: ElasticForms, given: Sequence[InitialStrain]) -> None:
         self._space, self._body, self._given, mesh = body.space, body, given, body.space.mesh
@@ -126,9 +138,9 @@ class InitialStrains:
         """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
         d, panel = self._space.dimension, isinstance(self._body.section, PlaneStress)
         free = d != 2 or panel
-        if (
-            d == 1
-        ):  # a bar cannot strain sideways, as its stiffness says: what is held there presses along it
+        if d == 1:
+            # A bar cannot strain sideways, as its stiffness says: what is held there presses along
+            # it.
             lame, shear = self._body.fields["lame"], self._body.fields["shear"]
             sides = eps[1, 1] if panel else eps[1, 1] + eps[2, 2]
             return ufl.as_tensor([[eps[0, 0] + lame / (lame + 2 * shear) * sides]]), 0.0
@@ -137,8 +149,10 @@ class InitialStrains:
         ), 0.0 if free else eps[2, 2]
 
     def against(self, r: Any, inside: Any) -> Any:
-        """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what
-        ``follow`` returns."""
+        """Return -rᵀf_0 of the cells inside as a linear form.
+
+        Its products are with what ``follow`` returns.
+        """
         own, across = self._split(ufl.TestFunction(self.tensors))
         return (
             -inside
@@ -147,8 +161,10 @@ class InitialStrains:
         )
 
     def follow(self, t: float, *, only: InitialStrain | None = None) -> Array:
-        """Sum up the strains at a time, or one of them less its history; return the owned
-        values."""
+        """Sum up the strains at a time, or one of them less its history.
+
+        Returned are the owned values.
+        """
         points, blocks = self.tensors.tabulate_dof_coordinates(), compat.cell_blocks(self.tensors)
         values = self._field.x.array.reshape(-1, 9)
         values[:] = 0.0

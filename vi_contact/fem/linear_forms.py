@@ -1,5 +1,7 @@
-"""Take loads as a user of UFL writes them: as linear forms, the virtual work of the load on a
-displacement v."""
+"""Take loads as a user of UFL writes them.
+
+They are linear forms, the virtual work of the load on a displacement v.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -23,8 +25,9 @@ NAME = "LinearForm"
 
 @dataclass(frozen=True)
 class LinearForm:
-    """Apply the load whose virtual work is L(v), as UFL with measures: v -> ufl.Form, such as ∫ f·v
-    dx + ∫ g·v ds.
+    """Apply the load whose virtual work is L(v), as UFL with measures.
+
+    It is v -> ufl.Form, such as ∫ f·v dx + ∫ g·v ds.
 
     f in N/m³ and g in Pa push along +v; what the form gives is multiplied by the section's
     thickness, as other loads are. The form may hold DOLFINx Functions and Constants of this mesh,
@@ -79,7 +82,9 @@ class LinearForm:
 
     def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
         """Return t -> the forces (owned full,), less the history; without update as once assembled.
-        Collective."""
+
+        Collective.
+        """
         if space in self._once:
             return lambda t: np.asarray(self._once[space])
         name, v = f"{NAME}: form", ufl.TestFunction(space.V)

@@ -1,9 +1,11 @@
-"""Describe what acts on a body: prescribed displacements, tractions and body forces (boundary
-method, eqs. 3, 4, 6).
+"""Describe what acts on a body.
+
+It is prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values
 (k, d). They are interpolated at the nodes and then integrated exactly, so a load costs one sparse
-product a step."""
+product a step.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,16 +26,20 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """Evaluate the value at this rank's points, (k, d). InputError on all ranks for NaN, other
-    shapes. Collective."""
+    """Evaluate the value at this rank's points, (k, d).
+
+    InputError on all ranks for NaN, other shapes. Collective.
+    """
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
     return result
 
 
 def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
-    """Return (values at the points, what is wrong with them or an empty text); zeros where
-    something is wrong."""
+    """Return (values at the points, what is wrong with them or an empty text).
+
+    The values are zeros where something is wrong.
+    """
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
     try:
@@ -71,7 +77,8 @@ class Prescribed:
     ``components``: which displacement components are prescribed (all when None); the others stay
     free (rollers). The mass and damping of the boundary nodes enter the equations, so all three
     time functions are needed; left out they are zero (a clamped part, or a displacement constant in
-    time)."""
+    time).
+    """
 
     facets: Facets
     displacement: Value = _zero
@@ -101,14 +108,18 @@ class Prescribed:
         return any(value is not _zero for value in self.motions)
 
     def places(self, space: Any) -> tuple[Any, Any]:
-        """Return (owned blocks, components) of a FemSpace that are held, as indices of an array of
-        nodal values."""
+        """Return (owned blocks, components) of a FemSpace that are held.
+
+        They are indices of an array of nodal values.
+        """
         held = components_of("prescribed", self.components, space.dimension)
         return space.facet_blocks(self.facets.indices)[:, None], held
 
     def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
-        """Return (values of the motion or a rate at the places, what is wrong with them or an empty
-        text)."""
+        """Return (values of the motion or a rate at the places, what is wrong with them).
+
+        What is wrong is an empty text where nothing is.
+        """
         name = f"prescribed motion on '{self.facets.name}'"
         motion, defect = evaluate_here(
             name, self.motions[derivative], space.points[places[0][:, 0]], t
@@ -122,8 +133,10 @@ class Prescribed:
 
     @property
     def companions(self) -> tuple[Any, ...]:
-        """Return the motions that are marched beside the run: objects whose methods are given, as
-        ``BaseMotion``."""
+        """Return the motions that are marched beside the run.
+
+        They are objects whose methods are given, as ``BaseMotion``.
+        """
         owners = {
             id(owner): owner
             for owner in (getattr(value, "__self__", None) for value in self.motions)
@@ -179,11 +192,13 @@ class ActingLoad:
 
 @dataclass(frozen=True)
 class Traction(ActingLoad):
-    """Apply the traction S_i = F_i(x, t) [Pa] on facets. ``history`` is a factor f(t) of a value
-    constant in time.
+    """Apply the traction S_i = F_i(x, t) [Pa] on facets.
+
+    ``history`` is a factor f(t) of a value constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is
-    evaluated every step."""
+    evaluated every step.
+    """
 
     facets: Facets
     value: Value
@@ -194,28 +209,34 @@ class Traction(ActingLoad):
         super().__post_init__()
 
     def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of the facets."""
         return compat.measure(mesh, mesh.topology.dim - 1, self.facets.indices)
 
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """Apply the tangential traction S_T = C_T(x, t) on the contact boundary: ``value`` less its
-    normal part."""
+    """Apply the tangential traction S_T = C_T(x, t) on the contact boundary.
+
+    It is ``value`` less its normal part.
+    """
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the traction less its normal part."""
         n = ufl.FacetNormal(mesh)
         return g - ufl.dot(g, n) * n
 
 
 @dataclass(frozen=True)
 class Pressure(Traction):
-    """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets:
-    water, uplift in a joint.
+    """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets.
+
+    Such are water, uplift in a joint.
 
     ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all
     nodes of the body; it is kept as the first component of a vector field. p is interpolated at
     nodes: resultants of one that is linear between them are exact, so let a node lie at the water
-    level. ``history``: as of ``Traction``."""
+    level. ``history``: as of ``Traction``.
+    """
 
     value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
 
@@ -238,13 +259,16 @@ class Pressure(Traction):
         super().__post_init__()
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the traction -p n."""
         return -g[0] * ufl.FacetNormal(mesh)
 
 
 @dataclass(frozen=True)
 class BodyForce(ActingLoad):
-    """Apply a volume force f_i(x, t) [N/m³]. The weight of a material is BodyForce((0, -rho *
-    9.80665))."""
+    """Apply a volume force f_i(x, t) [N/m³].
+
+    The weight of a material is BodyForce((0, -rho * 9.80665)).
+    """
 
     value: Value
     history: Callable[[float], float] | None = None

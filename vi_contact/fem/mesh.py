@@ -2,7 +2,8 @@
 
 Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError.
 Groups are recognised on each rank by the vertices of their members, numbered as in the input: a
-facet may be in several."""
+facet may be in several.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -66,10 +67,12 @@ class Group:
     @classmethod
     def tagged(cls, name: str, meshtags: Any, value: int, mesh: Mesh) -> Self:
         """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags.
+
         Collective.
 
         InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
-        any rank has."""
+        any rank has.
+        """
         owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
         instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
@@ -102,11 +105,13 @@ class Group:
 
     @classmethod
     def where(cls, name: str, mesh: Mesh, marker: Callable[[npt.NDArray[np.float64]], Any]) -> Self:
-        """Return the group of the facets of the boundary, or of the cells, whose vertices are all
-        marked. Collective.
+        """Return the group of the facets of the boundary, or of the cells, in a region. Collective.
+
+        Their vertices are all marked.
 
         ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
-        it fails or marks none on any rank."""
+        it fails or marks none on any rank.
+        """
         owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
         instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
         function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
@@ -135,11 +140,13 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Facets(Group):
-    """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept
-    ascending. Collective.
+    """Name a part of the boundary or of an inner surface. Collective.
+
+    It is local facets, ghosts included; kept ascending.
 
     ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks
-    points. InputError, on all ranks, for numbers that are no facets of this mesh."""
+    points. InputError, on all ranks, for numbers that are no facets of this mesh.
+    """
 
     codimension: ClassVar[int] = 1
 
@@ -149,7 +156,8 @@ class Cells(Group):
     """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
     ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks
-    points. InputError, on all ranks, for numbers that are no cells of this mesh."""
+    points. InputError, on all ranks, for numbers that are no cells of this mesh.
+    """
 
     codimension: ClassVar[int] = 0
 
@@ -163,8 +171,13 @@ def local_count(mesh: Mesh, codimension: int) -> int:
 
 
 class Tags(dict[str, Any]):
-    """Hold the groups of a mesh by name: `Cells` or `Facets`, the same names on all ranks;
-    InputError for others."""
+    """Hold the groups of a mesh by name.
+
+    They are `Cells` or `Facets`, the same names on all ranks.
+
+    Raises:
+        InputError: other names.
+    """
 
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
@@ -185,22 +198,26 @@ def alone() -> MPI.Comm:
 
 
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Read a mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical
-    groups.
+    """Read a mesh and its physical groups.
+
+    Cells are intervals, triangles, quadrilaterals, tetrahedra or hexahedra.
 
     Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in
     metres. The file is in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on
     every rank if the file is missing, is a script, or is not a usable mesh
-    (`vi_contact.meshes.extract.extract` lists the reasons). Collective."""
+    (`vi_contact.meshes.extract.extract` lists the reasons). Collective.
+    """
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
 
 
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with
-    `build(gmsh)`.
+    """Build a mesh without a file from a script of ``vi_contact.meshes``.
 
-    It raises the errors of `read_mesh`. Collective."""
+    Any object with `build(gmsh)` serves too.
+
+    It raises the errors of `read_mesh`. Collective.
+    """
     if isinstance(comm, MPI.Comm):
         agree(MpiComm(comm), "build_mesh", {"mesh": Parts(mesh)})
     provides(
@@ -214,11 +231,13 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among
-    the nodes in use.
+    """Return the numbers of local geometry nodes (owned, then ghosts) as in the input.
+
+    They count from 0, the rank among the nodes in use.
 
     Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is
-    numbered in their order."""
+    numbered in their order.
+    """
     instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
     if (

@@ -1,5 +1,7 @@
-"""Say what unknowns mean that are displacements of nodes: where the nodes are, which rank has them,
-what is a body."""
+"""Say what unknowns mean that are displacements of nodes.
+
+This is where the nodes are, which rank has them, what is a body.
+"""
 
 from typing import Any
 
@@ -16,18 +18,22 @@ MEANT = (
 
 
 class NodalSpace:
-    """Hold nodes, of which every rank owns some, and the unknowns that are components of their
-    displacements.
+    """Hold nodesand the unknowns that are components of their displacements.
+
+    Every rank owns some of the nodes.
 
     Attributes:
-        algebra: of the matrices of its systems; comm: its ranks; dimension: d; size: diagonal of
-            the bounding box [m].
-        nodes: (k,) numbers of the owned nodes; points: their coordinates (k, d) [m].
-        free_index: (k d,) the owned unknown that a component is, -1 where it is none; numbers: (k,
-            d) the same among those of all ranks, also of a component that follows another; held:
-            (k, d) components that are given.
-        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how
-            many on all ranks.
+        algebra: of the matrices of its systems.
+        comm: its ranks.
+        dimension: d.
+        size: diagonal of the bounding box [m].
+        nodes: (k,) numbers of the owned nodes.
+        points: their coordinates (k, d) [m].
+        free_index: (k d,) the owned unknown that a component is, -1 where it is none.
+        numbers: (k, d) the same among those of all ranks, also of a component that follows another.
+        held: (k, d) components that are given.
+        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component).
+        unknowns: how many on all ranks.
     """
 
     algebra: Algebra
@@ -44,19 +50,25 @@ class NodalSpace:
 
     @property
     def hierarchy(self) -> Any:
-        """Return the change to unknowns of a hierarchy, where contact conditions need one; None
-        elsewhere."""
+        """Return the change to unknowns of a hierarchy, where contact conditions need one.
+
+        It is None elsewhere.
+        """
         return None
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
-        """Expand a vector of unknowns (n,) at time t -> displacements of owned nodes (k, d), or
-        their derivatives."""
+        """Expand a vector of unknowns (n,) at time t to displacements of owned nodes (k, d).
+
+        Or to the derivatives of these.
+        """
         where = self.free_index.reshape(-1, self.dimension)
         return np.where(where >= 0, u.take(where, mode="clip") if len(u) else 0.0, 0.0)
 
     def leaders(self, nodes: Indices) -> Indices:
-        """Return these node numbers, of nodes that follow another that of the other; -1 for those
-        tied in part."""
+        """Return these node numbers, of nodes that follow another that of the other.
+
+        It is -1 for those tied in part.
+        """
         return nodes
 
     def blocks_of(self, nodes: Indices) -> Indices:
@@ -68,8 +80,10 @@ class NodalSpace:
         return np.where(self.nodes[blocks] == nodes, blocks, -1)
 
     def at_nodes(self, numbers: Indices, values: Array) -> Array:
-        """Return owned nodal values (k, c) at node numbers, on every rank; zero for nodes of
-        nobody. Collective."""
+        """Return owned nodal values (k, c) at node numbers, on every rank. Collective.
+
+        They are zero for nodes of nobody.
+        """
         found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
@@ -80,10 +94,12 @@ class NodalSpace:
 
     def find_nodes(self, points: Array) -> Indices:
         """Find the numbers of the nodes nearest to the points (k, d), equal on all ranks.
+
         Collective.
 
         InputError for a point farther from every node than the body is large (5 % of its
-        diagonal)."""
+        diagonal).
+        """
         found = np.empty(len(points), dtype=np.int64)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
@@ -113,10 +129,12 @@ def bounding_box(comm: Comm, points: Array) -> float:
 
 
 def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indices) -> Indices:
-    """Return the part (0, 1, ..., in the order of least numbers) that each of the numbers (n,) of
-    this rank belongs to when ``first`` and ``second``, places among them, are joined; ``shared``:
-    places of those that other ranks have too, where parts of different ranks meet and are one.
-    Collective."""
+    """Return the part that each of the numbers (n,) of this rank belongs to. Collective.
+
+    Parts are 0, 1, ..., in the order of least numbers, when ``first`` and ``second``, places among
+    the numbers, are joined; ``shared``: places of those that other ranks have too, where parts of
+    different ranks meet and are one.
+    """
     part = _smallest(first, second, numbers)
     meeting = np.column_stack([numbers[shared], part[shared]])
     meeting = np.unique(np.concatenate(from_each(comm, meeting)), axis=0)
@@ -128,7 +146,7 @@ def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indi
 
 
 def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
-    """The smallest number (n,) among those that edges first-second join each one to."""
+    """Return the smallest number (n,) among those that edges first-second join each one to."""
     part = connected(len(numbers), first, second)
     smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, part, numbers)

@@ -4,7 +4,8 @@ Nodes of P1 and Q1 are those of the mesh and have its numbers; so have those of 
 second-order cells. On first-order cells P2 and Q2 have the mid-points of edges too, Q2 also those
 of quadrilateral sides and of cells. They are numbered after the vertices: those of edges, of sides,
 of cells, each in the order of the numbers of the vertices around them. Every rank sorts a share of
-them, so that none holds them all."""
+them, so that none holds them all.
+"""
 
 from typing import Any
 
@@ -23,10 +24,12 @@ def is_curved(mesh: Any) -> bool:
 
 
 def supports(V: Any) -> list[list[int]]:
-    """Return, for every node of a cell, the local vertices whose mean it is: one, or those of its
-    edge, side or cell.
+    """Return, for every node of a cell, the local vertices whose mean it is.
 
-    ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``."""
+    This is one vertex, or those of its edge, side or cell.
+
+    ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``.
+    """
     dim, count = V.mesh.topology.dim, V.dofmap.dof_layout.num_dofs
     return [vertices for one in range(dim + 1) for vertices in compat.sub_entities(V.mesh, one)][
         :count
@@ -34,8 +37,10 @@ def supports(V: Any) -> list[list[int]]:
 
 
 def numbered(V: Any) -> tuple[Indices, Array]:
-    """Return (numbers, points (k, gdim)) of the local blocks of unknowns of a space, owned, then
-    ghosts. Collective."""
+    """Return (numbers, points (k, gdim)) of the local blocks of a space. Collective.
+
+    They are blocks of unknowns, owned, then ghosts.
+    """
     mesh = V.mesh
     if compat.cell_blocks(V).shape[1] == compat.geometry_dofmap(mesh).shape[1]:
         nodes = compat.dof_to_node(V)
@@ -66,11 +71,13 @@ def _with_mid_points(V: Any) -> tuple[Indices, Array]:
 
 
 def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
-    """(place of each of this rank's rows among the different ones of all ranks in order, how many
-    those are).
+    """Return (place of each of this rank's rows, how many different ones there are).
+
+    The places are among the different rows of all ranks in order.
 
     Members are less than ``count`` and ascend in a row: its first one tells which rank sorts it.
-    Collective."""
+    Collective.
+    """
     sorts = keys[:, 0] * comm.size // count
     order = np.argsort(sorts, kind="stable")
     received = comm.alltoall(
@@ -86,10 +93,12 @@ def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
 
 
 def facet_rows(V: Any, facets: Any) -> Indices:
-    """Return the local blocks (k, n) on each of these local facets: of its vertices first, then of
-    mid-points.
+    """Return the local blocks (k, n) on each of these local facets.
 
-    Collective."""
+    Those of its vertices come first, then those of mid-points.
+
+    Collective.
+    """
     mesh, tdim = V.mesh, V.mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     mesh.topology.create_connectivity(tdim, tdim - 1)

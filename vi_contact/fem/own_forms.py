@@ -20,8 +20,9 @@ ROLES = {"K": "stiffness", "C": "damping", "M": "mass"}
 
 @dataclass(frozen=True, kw_only=True)
 class Forms:
-    """State a body by weak forms: functions (u, v) -> UFL form, u the trial and v the test
-    function.
+    """State a body by weak forms.
+
+    They are functions (u, v) -> UFL form, u the trial and v the test function.
 
         M_ij = mass(phi_j, phi_i),   K_ij = stiffness(phi_j, phi_i),   C_ij = damping(phi_j, phi_i)
 
@@ -60,10 +61,12 @@ class Forms:
 
 
 class OwnForms(ElasticForms):
-    """Hold the user's forms of one body; ``fields`` are those of the material beside them, empty
-    where there is none.
+    """Hold the user's forms of one body.
 
-    Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective."""
+    ``fields`` are those of the material beside them, empty where there is none.
+
+    Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective.
+    """
 
     def __init__(
         self,
@@ -108,7 +111,7 @@ class OwnForms(ElasticForms):
         self.notes = self._notes(bool(materials))
 
     def _own(self, name: str) -> Any:
-        """The form that was given for a matrix, or None."""
+        """Return the form that was given for a matrix, or None."""
         call = getattr(self._given, ROLES[name])
         return (
             None
@@ -141,11 +144,13 @@ class OwnForms(ElasticForms):
         return tuple(notes)
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
+        """Return the stress and sigma_zz(u) times the thickness."""
         sigma, d, h = self._stress(u), self.space.dimension, self.section.thickness
         across = h * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
         return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
+        """Raise InputError: the forms do not tell the C of a material."""
         raise InputError(
             "InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0"
         )
@@ -156,6 +161,7 @@ class OwnForms(ElasticForms):
         return self._given.stress(u)
 
     def bilinear(self, name: str) -> Any:
+        """Return the form of M, K or C."""
         return self._forms[name]
 
     def matrix(self, name: str) -> Any:

@@ -1,5 +1,6 @@
-"""Make the system of matrices that come from anywhere: a user's own elements, another program,
-beams and frames.
+"""Make the system of matrices that come from anywhere.
+
+This is a user's own elements, another program, beams and frames.
 
     M u'' + C u' + K u = f(t),   M symmetric and positive (semi)definite
 
@@ -46,16 +47,19 @@ def system_from_arrays(
     u0: Any = None,
     v0: Any = None,
 ) -> SemiDiscreteSystem:
-    """Make the system M u'' + C u' + K u = f of scipy or dense matrices, on one process, by numpy
-    and scipy alone.
+    """Make the system M u'' + C u' + K u = f of scipy or dense matrices.
+
+    It is made on one process, by numpy and scipy alone.
 
     ``contact_points`` makes contact for it. All that asks for no material works: every scheme and
     impact law, friction, solvers, static stages, ``Energy``, ``Contact``, ``Probe``, checkpoints,
     ``fem.XDMF``. Bodies are what K joins.
 
     Args:
-        M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None;
-            stiffness [N/m]. C and K that are not symmetric are for Volume() and Condensed(Lemke()).
+        M: (n, n), symmetric: mass [kg], also (n,) where lumped.
+        C: (n, n), symmetric: damping [N s/m] or None. C and K that are not symmetric are for
+            Volume() and Condensed(Lemke()).
+        K: (n, n), symmetric: stiffness [N/m].
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
         unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no
             displacement of a point (a rotation); None: row node * d + c is component c of the node.
@@ -64,7 +68,8 @@ def system_from_arrays(
             ``system.rows`` entries.
         load: f, a Load or (n,) constant forces [N]; histories also by ``system.with_load``. Ground
             motion acts on the unit translation of all displacements.
-        u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
+        u0: (n,) initial displacement [m], zero when None.
+        v0: (n,) initial velocity [m/s], zero when None.
 
     Raises:
         InputError: matrices that are not real, finite, square and of one size, M that is not
@@ -96,7 +101,7 @@ def system_from_arrays(
 
 
 def _serial(name: str, value: Any) -> SerialMatrix:
-    """A copy of a matrix, of a vector as its diagonal."""
+    """Return a copy of a matrix, of a vector as its diagonal."""
     if not sp.issparse(value):
         lumped = name == "M" and np.ndim(value) == 1
         found = array(OWNER, name, value, (None,) if lumped else (None, None))
@@ -113,9 +118,11 @@ def own_system(
     matrices: Mapping[str, Matrix],
     given: Mapping[str, Any],
 ) -> SemiDiscreteSystem:
-    """Return the system of matrices M, K and perhaps C of one size and of what is given of this
-    rank's rows and nodes, which is checked here. ``unsymmetric``: the algebra for C or K that are
-    not symmetric. Collective."""
+    """Return the system of matrices M, K and perhaps C of one size. Collective.
+
+    What is given of this rank's rows and nodes is checked here. ``unsymmetric``: the algebra for C
+    or K that are not symmetric.
+    """
     comm, n = algebra.comm, matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
@@ -223,19 +230,23 @@ def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array,
 
 
 class MatrixSpace(NodalSpace):
-    """Say what the unknowns of a user's matrices mean: a component of a node each, or no
-    displacement of a point.
+    """Say what the unknowns of a user's matrices mean.
+
+    Each is a component of a node, or no displacement of a point.
 
     Attributes:
-        coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1 for what
-            is no displacement; bodies: (n,) body of each.
+        coordinates: (n, d) position of the node of each unknown [m].
+        component: (n,), -1 for what is no displacement.
+        bodies: (n,) body of each.
     """
 
     def __init__(
         self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix
     ) -> None:
         """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks.
-        Collective."""
+
+        Collective.
+        """
         self.algebra, self.comm, self.points = algebra, algebra.comm, points
         (k, d), n, first = points.shape, len(block), algebra.first(len(block))
         self.dimension, self.unknowns = d, round(total(self.comm, n))
@@ -252,8 +263,11 @@ class MatrixSpace(NodalSpace):
 
 
 def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
-    """Return the body (0, 1, ..., in the order of least numbers) of each owned unknown: K or a node
-    joins those of one body. ``block``: (n,) the node of each, all on one rank. Collective."""
+    """Return the body (0, 1, ..., by least numbers) of each owned unknown. Collective.
+
+    Bodies are in the order of least numbers; K or a node joins those of one body. ``block``: (n,)
+    the node of each, all on one rank.
+    """
     n, first = K.rows, algebra.first(K.rows)
     entries, own = algebra.entries(K, np.arange(n)), first + np.arange(n)
     entries.eliminate_zeros()

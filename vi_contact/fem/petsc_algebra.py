@@ -1,5 +1,7 @@
-"""Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises,
-vectors are of numpy."""
+"""Implement the algebra protocol on PETSc matrices, on any number of ranks.
+
+MUMPS factorises, vectors are of numpy.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -30,8 +32,10 @@ RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the d
 
 
 def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
-    """Room that all matrices share, as a product needs it only for as long as it takes, and a
-    vector in it."""
+    """Return room that all matrices share, and a vector in it.
+
+    A product needs it only for as long as it takes.
+    """
     room = _ROOM.get((size, way))
     if room is None:
         _ROOM[size, way] = room = np.zeros(size)
@@ -42,8 +46,11 @@ _ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
 
 
 class PetscMatrix:
-    """Hold an AIJ matrix behind the ``Matrix`` protocol; ``stored`` is the PETSc object, ``mat``
-    too unless it is stored otherwise: then it is made anew (``fem.compact``)."""
+    """Hold an AIJ matrix behind the ``Matrix`` protocol.
+
+    ``stored`` is the PETSc object, ``mat`` too unless it is stored otherwise: then it is made anew
+    (``fem.compact``).
+    """
 
     def __init__(self, mat: Any) -> None:
         self.stored = mat
@@ -54,10 +61,12 @@ class PetscMatrix:
 
     @property
     def mat(self) -> Any:
+        """Return the PETSc matrix."""
         return self.stored
 
     @property
     def rows(self) -> int:
+        """Return how many rows this rank owns."""
         return int(self.stored.getLocalSize()[0])
 
     @property
@@ -77,11 +86,13 @@ class PetscMatrix:
         return product_of_rows(self)
 
     def transpose_apply(self, x: Array) -> Array:
+        """Return Aᵀ x."""
         self._out[:] = x
         self.stored.multTranspose(self._y, self._x)
         return self._in.copy()
 
     def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
         return np.array(self.stored.getDiagonal().array_r)
 
 
@@ -95,7 +106,8 @@ class PetscFactor:
     large 3D matrices on several ranks, and what is too large to be copied. Where PETSc has no MUMPS
     its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log
     says so. Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix
-    cannot be factorised. ``symmetric`` False: LU of MUMPS."""
+    cannot be factorised. ``symmetric`` False: LU of MUMPS.
+    """
 
     def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
         mat = matrix.mat
@@ -144,8 +156,10 @@ class PetscFactor:
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell
-        nothing, as copies."""
+        """Return the bytes of the entries, an equal share on each rank.
+
+        They are 0 for factors that tell nothing, as copies.
+        """
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
         count = self._pc.getFactorMatrix().getInfo()[
@@ -154,6 +168,7 @@ class PetscFactor:
         return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b."""
         self._b.array[:] = b
         self._pc.apply(self._b, self._x)
         return np.array(self._x.array_r)
@@ -161,6 +176,7 @@ class PetscFactor:
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
+        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says."""
         size = self._x.getLocalSize()
         rows = np.arange(size) if rows is None else rows
         columns = np.zeros((len(rows), m))
@@ -194,8 +210,10 @@ class PetscFactor:
 
 @contextmanager
 def _default_options(values: Mapping[str, object]) -> Iterator[None]:
-    """PETSc options of the factor that hold while it is made, unless the user has given them:
-    others may differ."""
+    """Set PETSc options of the factor that hold while it is made.
+
+    They do not where the user has given them: others may differ.
+    """
     database = PETSc.Options(PREFIX)
     added = [name for name in values if not database.hasName(name)]
     for name in added:
@@ -208,8 +226,10 @@ def _default_options(values: Mapping[str, object]) -> Iterator[None]:
 
 
 class PetscAlgebra:
-    """Make and combine PETSc matrices on one communicator; ``symmetric``: whether those of its
-    system are."""
+    """Make and combine PETSc matrices on one communicator.
+
+    ``symmetric``: whether those of its system are.
+    """
 
     symmetric = True
 
@@ -217,6 +237,7 @@ class PetscAlgebra:
         self.comm = MpiComm(comm)
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        """Return the sum of factor times matrix over the terms (factor, matrix)."""
         total = None
         give_back(self.comm.mpi)
         for factor, matrix in terms:
@@ -240,16 +261,20 @@ class PetscAlgebra:
         return PetscMatrix(mat)
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Return Tᵀ K T."""
         return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        """Return the matrix of entries between the n unknowns of one rank."""
         places, every = (rows, self.first(n) + np.asarray(columns)), int(self.comm.mpi.allreduce(n))
         return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, every)), self.comm.mpi))
 
     def first(self, n: int) -> int:
+        """Return the number of the first of the n unknowns that this rank owns."""
         return int(self.comm.mpi.exscan(n) or 0)
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
+        """Return these owned rows of A, their columns numbered over all ranks."""
         mat = as_petsc(A).mat
         (start, _), (first, last) = mat.getOwnershipRange(), mat.getOwnershipRangeColumn()
         chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
@@ -260,11 +285,13 @@ class PetscAlgebra:
         return found
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        """Return the identity of n owned rows with some of them replaced."""
         return PetscMatrix(
             aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi)
         )
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
         every = np.arange(len(mask))
         ones = self.local(
             every, every, mask.astype(float), len(mask)
@@ -275,15 +302,18 @@ class PetscAlgebra:
         return PetscMatrix(mat)
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return the rows and columns of A of the masked unknowns."""
         mat = as_petsc(A).mat
         rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
         chosen = PETSc.IS().createGeneral(rows, comm=mat.comm)
         return PetscMatrix(mat.createSubMatrix(chosen, chosen))
 
     def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
         return PetscFactor(as_petsc(A))
 
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
+        """Return a factor with these unknowns last, or None where there is none."""
         mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
         chosen = any(
             not name.startswith(TUNING) for name in given
@@ -292,6 +322,7 @@ class PetscAlgebra:
         return contact_last(self.comm, mat, last) if serves else None
 
     def dot(self, x: Array, y: Array) -> float:
+        """Return x·y over all ranks."""
         return total(self.comm, x @ y)
 
 
@@ -301,15 +332,19 @@ class UnsymmetricAlgebra(PetscAlgebra):
     symmetric = False
 
     def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
         return PetscFactor(as_petsc(A), symmetric=False)
 
     def contact_last(self, A: Matrix, last: Indices) -> None:
+        """Return None: there is no factor with these unknowns last."""
         return None
 
 
 def triple_product(K: Any, P: Any) -> Any:
-    """Return PᵀKP of PETSc matrices, a copy: what PETSc makes holds K and P for as long as it
-    lives."""
+    """Return PᵀKP of PETSc matrices, a copy.
+
+    What PETSc makes holds K and P for as long as it lives.
+    """
     give_back(K.comm)
     product = K.PtAP(P)
     made = product.duplicate(copy=True)

@@ -13,16 +13,21 @@ def rows_of(mat: Any) -> sp.csr_matrix:
 
 
 def moved(mat: Any, comm: Any) -> Any:
-    """Return a copy of a PETSc AIJ matrix on another communicator of the same ranks; the matrix is
-    destroyed."""
+    """Return a copy of a PETSc AIJ matrix on another communicator of the same ranks.
+
+    The matrix is destroyed.
+    """
     rows, columns = rows_of(mat), mat.getLocalSize()[1]
     mat.destroy()
     return aij_of(rows, comm, columns)
 
 
 def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
-    """Return the PETSc matrix with these rows of this rank, columns numbered over all ranks;
-    ``columns``: how many this rank owns, as many as rows unless given. Collective."""
+    """Return the PETSc matrix with these rows of this rank. Collective.
+
+    Columns are numbered over all ranks; ``columns``: how many this rank owns, as many as rows
+    unless given.
+    """
     entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
     csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
     mat = PETSc.Mat().createAIJ(

@@ -40,11 +40,16 @@ def system_from_matrices(
     ``system.space.find_nodes`` finds them, and restarts keep that number.
 
     Args:
-        M, C, K: AIJ matrices of one layout; M also a Vec or (n,) where lumped, C may be None.
+        M: mass, an AIJ matrix of the layout of K; also a Vec or (n,) where lumped.
+        C: damping, an AIJ matrix of the layout of K, or None.
+        K: stiffness, an AIJ matrix.
         coordinates: (nodes of this rank, d) [m], or a DOLFINx function space of displacements, of
             any degree.
         unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each of its rows.
         clamped: its rows that stand still, counted from 0 on every rank.
+        load: as of ``system_from_arrays``, on its rows.
+        u0: initial displacement [m] on its rows, zero when None.
+        v0: initial velocity [m/s] on its rows, zero when None.
 
     Raises:
         InputError: matrices of another type, layout or communicator; what ``system_from_arrays``
@@ -74,8 +79,11 @@ def system_from_matrices(
 
 
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
-    """A copy of this rank's rows of a matrix with the layout of K; InputError for another type or
-    layout."""
+    """Return a copy of this rank's rows of a matrix with the layout of K.
+
+    Raises:
+        InputError: another type or layout.
+    """
     (n, _), (_, columns), first = K.getLocalSize(), K.getSize(), K.getOwnershipRangeColumn()[0]
     if name == "M" and not isinstance(A, PETSc.Mat):
         masses = array(OWNER, name, A.array_r if isinstance(A, PETSc.Vec) else A, (n,), unit="kg")

@@ -1,5 +1,6 @@
-"""Go from a static stage to one on other supports: reactions of removed ones become forces, added
-ones hold the body.
+"""Go from a static stage to one on other supports.
+
+Reactions of removed ones become forces, added ones hold the body.
 
 Dashpots hold no static load. A gravity stage therefore stands on rollers or clamps; where the
 dynamic stage has dashpots or free sides instead, what these supports carried goes on as the
@@ -9,7 +10,8 @@ constant load
 
 so that u_0, its stresses and its contact are an equilibrium of the new problem too. A support that
 is added holds the body where the stage before has left it: its own displacement counts from there.
-Staging as in PLAXIS, LS-DYNA (INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC)."""
+Staging as in PLAXIS, LS-DYNA (INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC).
+"""
 
 import logging
 from collections.abc import Sequence
@@ -37,14 +39,16 @@ def release(
     *,
     earlier: Sequence[ContactProblem] = (),
 ) -> tuple[ContactProblem, State]:
-    """Return (problem with the reactions of removed supports as forces, its first state at rest)
-    after a static stage.
+    """Return (problem with the reactions of removed supports as forces, its first state).
+
+    The state is at rest, after a static stage.
 
     ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same
     materials, loads and contact points, and a motion that starts from rest. t = 0. ``earlier``:
     problems of the stages before ``static``, whose supports may be released already. The space of
     ``problem`` notes where added supports hold it. InputError for another mesh or other contact
-    points, or when forces are missing where nothing was released."""
+    points, or when forces are missing where nothing was released.
+    """
     stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
     for one in (static, problem, *stages):
         check_problem_given("release", one)
@@ -79,8 +83,13 @@ def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, 
 
 
 def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
-    """Say whether two problems of one mesh and contact hold and tie the same; the later one stands
-    where the earlier one does then. InputError for other contact points. Collective."""
+    """Say whether two problems of one mesh and contact hold and tie the same. Collective.
+
+    The later one stands where the earlier one does then.
+
+    Raises:
+        InputError: other contact points.
+    """
     one, other = _spaces(before, problem)
     if largest(
         one.comm,
@@ -94,8 +103,10 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
 def started(
     problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
 ) -> tuple[ContactProblem, State]:
-    """Return the problem that begins with u0, v0 (its own unknowns) and has a constant force [N]
-    more; that beginning with the contact of another state."""
+    """Return the problem that begins with u0, v0 and has a constant force [N] more.
+
+    u0 and v0 are on its own unknowns. That beginning has the contact of another state.
+    """
     surface, system, load = problem.surface, problem.system, problem.system.load
 
     def turned(x: Array) -> Array:
@@ -109,8 +120,11 @@ def started(
 
 
 def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
-    """F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t; InputError where it is not zero and nothing was
-    held."""
+    """Return F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t.
+
+    Raises:
+        InputError: it is not zero and nothing was held.
+    """
     elastic = problem.system.K @ u0
     force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
     missing = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
@@ -130,9 +144,11 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
 def removed_support(
     before: ContactProblem, after: ContactProblem, force: Array
 ) -> tuple[str, float]:
-    """Return (name, reaction [N]) of the support that ``after`` does without and that carries most
-    of this force; "" for none. The reaction is its resultant, or its largest nodal force where this
-    is larger. Collective."""
+    """Return (name, reaction [N]) of the removed support with most of a force. Collective.
+
+    It is the support that ``after`` does without and that carries most of this force; "" for none.
+    The reaction is its resultant, or its largest nodal force where this is larger.
+    """
     (old, new), found = _spaces(before, after), [("", 0.0)]
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
@@ -151,8 +167,10 @@ def removed_support(
 
 
 def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
-    """Let what ``after`` holds in addition stay where the body is; (k, d) mask of what stays off
-    its own place."""
+    """Let what ``after`` holds in addition stay where the body is.
+
+    Returned is the (k, d) mask of what stays off its own place.
+    """
     stays = np.where(after.held & ~before.held, nodal, 0.0)
     if before.stands is not None:
         stays = np.where(after.held & before.held, before.stands, stays)
@@ -161,8 +179,10 @@ def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
 
 
 def _beside(space: FemSpace, chosen: Mask) -> Mask:
-    """All components of the owned nodes that share a cell, of any rank, with nodes of chosen
-    components (k, d)."""
+    """Return all components of the owned nodes that share a cell with chosen ones.
+
+    The cell is of any rank, the nodes are those of chosen components (k, d).
+    """
     numbers = np.concatenate(from_each(space.comm, space.nodes[chosen.any(axis=1)]))
     cells = space.node_of_block[compat.cell_blocks(space.V)]
     near = np.concatenate(
@@ -174,8 +194,10 @@ def _beside(space: FemSpace, chosen: Mask) -> Mask:
 def _refuse_moved(
     static: ContactProblem, state: State, nodal: Array, problem: ContactProblem, begun: State
 ) -> None:
-    """The new supports must hold the body, and what its contact points face, where the static stage
-    has left it."""
+    """Raise InputError unless the new supports hold the body where it is.
+
+    They must hold it, and what its contact points face, where the static stage has left it.
+    """
     there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
     before = static.surface.gap(state.t) - static.surface.normal_values(state.u)
     after = problem.surface.gap(0.0) - problem.surface.normal_values(begun.u)

@@ -1,5 +1,7 @@
-"""Say what the unknowns of a finite element system mean: nodes, bodies, free and prescribed parts,
-points, output."""
+"""Say what the unknowns of a finite element system mean.
+
+This is nodes, bodies, free and prescribed parts, points, output.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -30,8 +32,10 @@ from .ties import PLACE_TOLERANCE, Links, Tied, linked
 
 
 def body_numbers(mesh: Any) -> Indices:
-    """Return the body (0, 1, ..., in the order of their least node number) of each local geometry
-    node. Collective."""
+    """Return the body (0, 1, ...) of each local geometry node. Collective.
+
+    Bodies are in the order of their least node number.
+    """
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     ghosts = numbers[
@@ -56,10 +60,12 @@ def space_of(owner: str, system: Any) -> "FemSpace":
 
 def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     """Return the numbers of the bodies that a cell group is, parts of the mesh that share no node.
+
     Collective.
 
     They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part
-    of a body."""
+    of a body.
+    """
     space = space_of("bodies_of", system)
     cells_of("bodies_of", "cells", cells, space.mesh)
     body = body_numbers(space.mesh)[compat.geometry_dofmap(space.mesh)[:, 0]]
@@ -77,10 +83,12 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
 
 
 def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
-    """Warn when M, C or K of a system is not what fem.assemble made, for outputs that go by the
-    materials given there.
+    """Warn when M, C or K of a system is not what fem.assemble made.
 
-    Springs added to K leave the stresses of the elements as they are; another material does not."""
+    It is for outputs that go by the materials given there.
+
+    Springs added to K leave the stresses of the elements as they are; another material does not.
+    """
     found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
     if found and system.algebra.comm.rank == 0:
         log.warning(
@@ -93,24 +101,26 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
 
 
 class FemSpace(NodalSpace):
-    """Number the nodal unknowns of a displacement space, with the prescribed and the tied ones
-    eliminated.
+    """Number the nodal unknowns of a displacement space.
+
+    The prescribed and the tied ones are eliminated.
 
     "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations
     solve for.
 
     Attributes:
-        V: the DOLFINx function space, the user's if given; dimension d; free: (owned full,) mask of
-            free components.
+        V: the DOLFINx function space, the user's if given; dimension d.
+        free: (owned full,) mask of free components.
         held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of
-            another node; tied_nodes: numbers of all nodes that move together with another, on every
-            rank.
+            another node.
+        tied_nodes: numbers of all nodes that move together with another, on every rank.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
             -1 where held.
         degree: 1 for P1 and Q1, 2 for P2 and Q2.
         nodes: numbers of the nodes of the owned blocks, those of the mesh (``fem.numbering``: of
-            mid-points too); points: their coordinates (k, d); node_of_block: the numbers, those of
-            ghosts too.
+            mid-points too).
+        points: their coordinates (k, d).
+        node_of_block: the numbers, those of ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
     """
@@ -161,8 +171,10 @@ class FemSpace(NodalSpace):
         )
 
     def compiled(self, form: Any) -> Any:
-        """Return a form compiled, its integrals with the degree of the space, if any, unless they
-        say their own."""
+        """Return a form compiled.
+
+        Its integrals have the degree of the space, if any, unless they say their own.
+        """
         degree = self.quadrature_degree
         if degree is None:
             return compat.compile_form(form)
@@ -190,8 +202,11 @@ class FemSpace(NodalSpace):
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
 
     def corners_of_facets(self, facets: Any) -> Indices:
-        """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too, that
-        may have contact conditions: all, in a hierarchy the vertices. Collective."""
+        """Return the numbers (k, n) of the contact nodes on each of these facets. Collective.
+
+        The facets are local, ghosts' too; the nodes are those that may have contact conditions:
+        all, in a hierarchy the vertices.
+        """
         if self.degree == 1:
             return node_numbers(self.mesh)[
                 compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
@@ -202,8 +217,11 @@ class FemSpace(NodalSpace):
 
     @cached_property
     def hierarchy(self) -> Hierarchy | None:
-        """Return the hierarchy of P2 tetrahedra, None of other cells. Collective when first
-        asked."""
+        """Return the hierarchy of P2 tetrahedra, None of other cells.
+
+        Collective when first
+        asked.
+        """
         return Hierarchy(self) if needs_hierarchy(self.V) else None
 
     def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
@@ -215,8 +233,11 @@ class FemSpace(NodalSpace):
         return numbers[order], points[order]
 
     def _followers(self, links: Links) -> Mask:
-        """Which owned components follow another node; InputError where some of those that move as
-        one are held."""
+        """Return which owned components follow another node.
+
+        Raises:
+            InputError: some of those that move as one are held.
+        """
         held = [
             self._of_unknowns(numbers, self.held) > 0.0
             for numbers in (links.followers, links.leaders)
@@ -231,14 +252,18 @@ class FemSpace(NodalSpace):
         return np.isin(ids, links.followers[~held[0]])
 
     def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
-        """Return owned nodal values (k, d) of unknowns, node number * d + component, on every
-        rank."""
+        """Return owned nodal values (k, d) of unknowns, on every rank.
+
+        An unknown is node number * d + component.
+        """
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
 
     def leaders(self, nodes: Indices) -> Indices:
-        """Return these node numbers, of nodes that follow another that of the other; -1 for those
-        tied in part."""
+        """Return these node numbers, of nodes that follow another that of the other.
+
+        It is -1 for those tied in part.
+        """
         return (
             np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
             if self._leader
@@ -246,7 +271,7 @@ class FemSpace(NodalSpace):
         )
 
     def _numbers(self, links: Links) -> Indices:
-        """The unknown of every owned component, numbered over all ranks."""
+        """Return the unknown of every owned component, numbered over all ranks."""
         d, first = self.dimension, int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
         numbers = np.where(self.free, first + self.free_index, -1)
         leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
@@ -267,8 +292,10 @@ class FemSpace(NodalSpace):
 
     @property
     def tied_unknowns(self) -> Mask | None:
-        """Return the free unknowns of nodes that move together with others; None when no boundaries
-        are tied."""
+        """Return the free unknowns of nodes that move together with others.
+
+        It is None when no boundaries are tied.
+        """
         if self._P is None:
             return None
         return np.repeat(np.isin(self.nodes, self.tied_nodes), self.dimension)[self.free]
@@ -280,8 +307,10 @@ class FemSpace(NodalSpace):
 
     @cached_property
     def body_of_node(self) -> Indices:
-        """Return the body of every owned node: parts of the mesh that share no node, in the order
-        of node numbers."""
+        """Return the body of every owned node.
+
+        Bodies are parts of the mesh that share no node, in the order of node numbers.
+        """
         body = np.empty_like(self.node_of_block)
         body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[
             compat.geometry_dofmap(self.mesh)[:, :1]
@@ -294,13 +323,14 @@ class FemSpace(NodalSpace):
         return np.asarray(np.repeat(self.body_of_node, self.dimension)[self.free])
 
     # Vectors
-    # ---------------------------------------------------------------------------------------------------------
+    # ----------------------------------------------------------------------------------------------
 
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:
         """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
 
         Where conditions meet, the later one counts; what they say is added to where an earlier
-        stage left the nodes."""
+        stage left the nodes.
+        """
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
         for condition, places in zip(self.prescribed, self._where_held, strict=True):
@@ -322,8 +352,11 @@ class FemSpace(NodalSpace):
         return full.reshape(-1, self.dimension)
 
     def pull(self, force: Array) -> Array:
-        """Pull back by Pᵀ: forces on all owned components -> on the free ones; tied nodes count at
-        their partners."""
+        """Pull back by Pᵀ.
+
+        This takes forces on all owned components -> on the free ones; tied nodes count at their
+        partners.
+        """
         return force[self.free] if self._P is None else self._P.transpose_apply(force)
 
     def reduced(self, full: Any) -> Any:

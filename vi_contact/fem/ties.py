@@ -1,5 +1,6 @@
-"""Tie boundaries whose opposite nodes move together: tied sides of a soil layer, one period of a
-periodic body.
+"""Tie boundaries whose opposite nodes move together.
+
+Such are tied sides of a soil layer, one period of a periodic body.
 
     u(x) = u(x + a),  x on the first boundary, a the distance between the two
 
@@ -7,7 +8,8 @@ The nodes of the second boundary are eliminated: P of u_full = P u_free + U gets
 ones of their partners, and Pᵀ adds their forces to them. Exact, no penalty. Tied sides reproduce
 the one-dimensional motion of a layered soil exactly and send every other wave through: what leaves
 on the right comes back in from the left. Source: Zienkiewicz, Bicanic and Shen (1988); compared
-with others by Kontoe et al. (2007)."""
+with others by Kontoe et al. (2007).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -32,7 +34,9 @@ NodesOf = Callable[
 @dataclass(frozen=True)
 class Tied:
     """Tie the nodes of ``second`` to those of ``first`` that face them, in all or given components.
-    Ties may meet."""
+
+    Ties may meet.
+    """
 
     first: Facets
     second: Facets
@@ -46,15 +50,19 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """Hold unknowns, node number * d + component, that move as others do; the same arrays on every
-    rank."""
+    """Hold unknownsthat move as others do, the same arrays on every rank.
+
+    An unknown is node number * d + component.
+    """
 
     followers: Indices
     leaders: Indices
 
     def of_nodes(self, d: int) -> dict[int, int]:
-        """Return whom tied nodes follow: one other in all d components, or themselves; -1 for those
-        tied in part."""
+        """Return whom tied nodes follow.
+
+        This is one other in all d components, or themselves; -1 for those tied in part.
+        """
         nodes = np.column_stack([self.followers, self.leaders]) // d
         found, count = np.unique(nodes, axis=0, return_counts=True)
         whole = found[count == d]
@@ -67,11 +75,13 @@ class Links:
 
 def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> Links:
     """Join the unknowns of every tie; partners are ``near`` [m] to the place that they should have.
+
     Collective.
 
     What several ties join moves as one: of the four vertical edges of a box whose sides are tied
     both ways, three follow the one that is on no second boundary. InputError for nodes without a
-    partner, boundaries that share nodes, and a component that does not exist."""
+    partner, boundaries that share nodes, and a component that does not exist.
+    """
     if not tied:
         return Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     pairs = [_pairs(tie, dimension, near, nodes) for tie in tied]
@@ -86,7 +96,7 @@ def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) ->
 
 
 def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indices, Indices]:
-    """The unknowns of the first boundary, and those of the second that move alike."""
+    """Return the unknowns of the first boundary, and those of the second that move alike."""
     first, second = nodes(tie.first), nodes(tie.second)
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):

@@ -5,7 +5,8 @@ components) and `duration` (the time [s] after which it is zero, or negligible, 
 it returns the vector a(t) · direction of shape (d,). The direction is used as given, never
 normalised: (1, 0.5) shakes the second axis half as much. The vector is the acceleration of the
 ground; in the frame that moves with the ground it loads the body with -M r a(t). Horizontal and
-vertical motion together are a sequence of excitations."""
+vertical motion together are a sequence of excitations.
+"""
 
 import math
 from bisect import bisect_right
@@ -24,7 +25,8 @@ class Harmonic:
     """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
 
     amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or
-    not finite."""
+    not finite.
+    """
 
     amplitude: float
     frequency: float
@@ -44,13 +46,15 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ricker:
-    """Shake with a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))² (Ricker,
-    Geophysics 18, 1953).
+    """Shake with a Ricker wavelet (Ricker, Geophysics 18, 1953).
+
+    a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))².
 
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the
     time of the peak, by default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller
     one starts with a jump. Velocity and displacement both return to zero. Raises InputError for
-    values out of range or not finite."""
+    values out of range or not finite.
+    """
 
     amplitude: float
     frequency: float
@@ -81,8 +85,11 @@ class Ricker:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Hold what one-sided and two-sided pulses share; amplitude [m/s²] is finite and duration [s] >
-    0 (InputError)."""
+    """Hold what one-sided and two-sided pulses share.
+
+    Raises:
+        InputError: the amplitude [m/s²] is not finite, or the duration [s] not > 0.
+    """
 
     amplitude: float
     duration: float
@@ -92,8 +99,10 @@ class Pulse:
         check_excitation(self, finite=("amplitude",), positive=("duration",))
 
     def acceleration(self, t: float) -> float:
-        """Return the acceleration [m/s²] inside the pulse, 0 outside; the value at a jump is the
-        one after it."""
+        """Return the acceleration [m/s²] inside the pulse, 0 outside.
+
+        The value at a jump is the one after it.
+        """
         return self.amplitude * self._shape(t) if 0.0 <= t < self.duration else 0.0
 
     def _shape(self, t: float) -> float:
@@ -104,8 +113,10 @@ class Pulse:
 
 @dataclass(frozen=True)
 class HalfSine(Pulse):
-    """Shake with a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero
-    elsewhere."""
+    """Shake with half a period of a sine.
+
+    a(t) = amplitude · sin(pi t / duration) for 0 <= t < duration [s], zero elsewhere.
+    """
 
     def _shape(self, t: float) -> float:
         return math.sin(math.pi * t / self.duration)
@@ -113,8 +124,10 @@ class HalfSine(Pulse):
 
 @dataclass(frozen=True)
 class FullSine(Pulse):
-    """Shake with a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity
-    ends at zero."""
+    """Shake with a period of a sine.
+
+    a(t) = amplitude · sin(2 pi t / duration) for 0 <= t < duration [s]; the velocity ends at zero.
+    """
 
     def _shape(self, t: float) -> float:
         return math.sin(2.0 * math.pi * t / self.duration)
@@ -127,11 +140,13 @@ class Rectangular(Pulse):
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before
-    and after them.
+    """Shake with accelerations [m/s²] at given times [s].
+
+    There are straight lines between them, and zero before and after them.
 
     times: strictly increasing, at least two; values: as many, kept as tuples. InputError for
-    others, NaN, infinity."""
+    others, NaN, infinity.
+    """
 
     times: Sequence[float]
     values: Sequence[float]

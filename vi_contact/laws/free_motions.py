@@ -18,8 +18,10 @@ SOFT = 1e-12  # of a diagonal entry: lets unknowns be solved for that nothing ho
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """Hold a body's owned unknowns, its free motions w (rows, k) of size one, and orthonormal in m
-    = diag M; m w."""
+    """Hold a body's owned unknowns and its free motions w (rows, k).
+
+    The motions are of size one, and also held orthonormal in m = diag M; m w is held too.
+    """
 
     rows: Indices
     unit: Array
@@ -29,14 +31,18 @@ class FreeMotions:
 
 def floating(system: SemiDiscreteSystem) -> SemiDiscreteSystem:
     """Return the system, told whether some rigid motion of a body of it meets no stiffness.
-    Collective."""
+
+    Collective.
+    """
     return system.changed(floating=any(body.motions.shape[1] for body in free_motions(system)))
 
 
 def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     """Yield every body: its rigid motions w with K w = 0, those of a mass without a stiffness too.
+
     Unknowns that are no displacements, such as rotations, which no ``influence`` moves, take the
-    values that cost the least energy. Collective."""
+    values that cost the least energy. Collective.
+    """
     comm, bodies = system.algebra.comm, rows_of_bodies(system)
     motions = _rigid(system, bodies)
     stiffness, mass = np.abs(system.K.diagonal())[:, None], system.M.diagonal()[:, None]
@@ -61,7 +67,9 @@ def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
 
 def _rigid(system: SemiDiscreteSystem, bodies: list[Indices]) -> Array:
     """Rigid motions of all bodies about their middles, in one vector each: bodies share no unknown.
-    Each moves by another amount, so that what K ties to another body does not go with it."""
+
+    Each moves by another amount, so that what K ties to another body does not go with it.
+    """
     comm, points = system.algebra.comm, system.space.coordinates
     place, amount = np.zeros_like(points), np.zeros((system.rows, 1))
     for rows, factor in zip(
@@ -87,8 +95,11 @@ def _factor(system: SemiDiscreteSystem, stiffness: Array, other: Mask) -> Factor
 
 
 def _kernel(form: Array, size: Array) -> Array:
-    """Columns whose form is round-off: axes of that kind, so that sums of forces stay apart, and
-    others between the rest. ``size``: the sum of each axis without its signs."""
+    """Return the columns whose form is round-off.
+
+    They are axes of that kind, so that sums of forces stay apart, and others between the rest.
+    ``size`` is the sum of each axis without its signs.
+    """
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))
     form = form / np.outer(scale, scale)
     free = np.abs(form.diagonal()) <= ROUNDED
@@ -99,8 +110,10 @@ def _kernel(form: Array, size: Array) -> Array:
 
 
 def _orthonormal(form: Array) -> Array:
-    """Columns c with cᵀ form c = 1, by Gram and Schmidt; none of motions along a component that is
-    held everywhere."""
+    """Return columns c with cᵀ form c = 1, by Gram and Schmidt.
+
+    There are none of motions along a component that is held everywhere.
+    """
     columns: list[Array] = []
     for column in np.eye(len(form)):
         for c in columns:

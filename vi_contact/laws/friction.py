@@ -8,7 +8,8 @@ components), every law says
 and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0).
 Reactions are forces [N] for displacement schemes and impulses [N s] for velocity schemes; `scale`
 (1 or the time step [s]) is the factor between the two, so that a stress times a nodal weight
-becomes either. The slope may depend on the slip rate: `at`."""
+becomes either. The slope may depend on the slip rate: `at`.
+"""
 
 import math
 from collections.abc import Callable
@@ -24,11 +25,13 @@ from ..core.errors import InputError
 
 @dataclass(frozen=True)
 class Tresca:
-    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches: limit = threshold ·
-    weight · scale.
+    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches.
+
+    limit = threshold · weight · scale.
 
     ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when
-    one is negative or not a finite number, and, when used, for a wrong count."""
+    one is negative or not a finite number, and, when used, for a wrong count.
+    """
 
     never_negative: ClassVar[bool] = True  # it has checked its values
     threshold: float | Array | tuple[float, ...]
@@ -61,7 +64,8 @@ class Coulomb:
 
     ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised
     when one is negative or not a finite number, and, when the law is used, if their count is
-    wrong."""
+    wrong.
+    """
 
     never_negative: ClassVar[bool] = True  # it has checked its values
     mu: float | Array | tuple[float, ...]
@@ -70,8 +74,10 @@ class Coulomb:
         object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu · max(r_n, 0), shape (n,): tension, of a held point or on the way to an answer,
-        rubs on nothing."""
+        """Return mu · max(r_n, 0), shape (n,).
+
+        Tension, of a held point or on the way to an answer, rubs on nothing.
+        """
         return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
     def slope(self, weights: Array) -> Array:
@@ -92,7 +98,8 @@ class SlipRateCoulomb:
     negative or infinite coefficient.
 
     Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the
-    static coefficient."""
+    static coefficient.
+    """
 
     mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"
 
@@ -134,8 +141,10 @@ class SlipRateCoulomb:
 
 @dataclass(frozen=True)
 class TwoCoefficients:
-    """Hold static and kinetic coefficients: numbers >= 0, or one per contact point. InputError for
-    other values."""
+    """Hold static and kinetic coefficients: numbers >= 0, or one per contact point.
+
+    InputError for other values.
+    """
 
     mu_s: float | Array | tuple[float, ...]
     mu_k: float | Array | tuple[float, ...]
@@ -167,10 +176,13 @@ class TwoCoefficients:
 
 @dataclass(frozen=True)
 class ExponentialDecay(TwoCoefficients):
-    """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed
-    v_c [m/s] > 0.
+    """Give a friction coefficient that decays with the slip rate.
 
-    mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values."""
+    mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c
+    [m/s] > 0.
+
+    mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
+    """
 
     v_c: float
 
@@ -183,17 +195,19 @@ class ExponentialDecay(TwoCoefficients):
             )
 
     def __call__(self, speed: Array) -> Array:
-        """mu of each speed."""
+        """Return mu of each speed."""
         static, kinetic = self._nodal(len(speed))
         return np.asarray(kinetic + (static - kinetic) * np.exp(-speed / self.v_c))
 
 
 @dataclass(frozen=True)
 class StaticKinetic(TwoCoefficients):
-    """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both
-    hold, rest is chosen.
+    """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0.
 
-    mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values."""
+    Where both hold, rest is chosen.
+
+    mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -203,18 +217,20 @@ class StaticKinetic(TwoCoefficients):
             )
 
     def __call__(self, speed: Array) -> Array:
-        """mu of each speed."""
+        """Return mu of each speed."""
         static, kinetic = self._nodal(len(speed))
         return np.where(speed == 0.0, static, kinetic)
 
 
 def project(r_t: Array, limit: Array) -> Array:
-    """Return the nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|),
-    node by node.
+    """Return the nearest point of the friction disks |r_t| <= limit, node by node.
+
+    It is r_t · min(1, limit / |r_t|).
 
     r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node
     that cannot slip. Returns a new array of the shape of r_t. Raises InputError when the shapes do
-    not match."""
+    not match.
+    """
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
         raise InputError(
             f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
@@ -226,7 +242,7 @@ def project(r_t: Array, limit: Array) -> Array:
 
 
 def _checked(law: str, meaning: str, value: Any) -> Any:
-    """The value, or those of a field as a tuple (frozen, comparable)."""
+    """Return the value, or those of a field as a tuple (frozen, comparable)."""
     field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
     for one in value if field else [value]:
         if not 0.0 <= real(one) < math.inf:
@@ -239,7 +255,7 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
 
 
 def _nodal(law: str, name: str, value: Any, count: int) -> Array:
-    """The value as an array that broadcasts over the nodes."""
+    """Return the value as an array that broadcasts over the nodes."""
     if isinstance(value, tuple) and len(value) != count:
         raise InputError(
             f"{law}: {name} has {len(value)} values but there are {count} contact points: give one "

@@ -14,7 +14,8 @@ A law sees the velocity before the contact (the old state's) and the one the ste
 refers to the former: what the step leaves of the approach depends on when in the step the gap
 closed. The step's contact work and the impact loss are therefore to be read together: what the step
 took beyond the collision, the law gives back. Restitution here is a nodal law; on a fine mesh it
-has no macroscopic effect."""
+has no macroscopic effect.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -47,8 +48,10 @@ class VelocityUpdate(Protocol):
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they
-        are not NaN."""
+        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,).
+
+        They stay where ``target`` is NaN.
+        """
 
 
 @dataclass(frozen=True)
@@ -57,13 +60,15 @@ class ComponentReset:
 
     At a corner with oblique faces of which some only are closed the velocity of the node changes
     along the normals of these, and with it the normal components on its other faces, as at any
-    other node."""
+    other node.
+    """
 
     by_rows: ClassVar[bool] = True
 
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
+        """Return v with the normal velocities ``target`` set, where they are not NaN."""
         target, after = with_open_faces(surface, v, target), v.copy()
         after.T[surface.owned] = np.where(np.isnan(target), surface.normal_values(v), target).T
         return after
@@ -71,18 +76,21 @@ class ComponentReset:
 
 @dataclass(frozen=True)
 class ImpulseUpdate:
-    """Apply an impulse on the chosen contact unknowns: the M-orthogonal projection onto the wanted
-    velocities.
+    """Apply an impulse on the chosen contact unknowns.
+
+    It is the M-orthogonal projection onto the wanted velocities.
 
     The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it
     decays to round-off within thirty elements; else an impact costs half a substitution
     (``core.condensation``). Large systems, from 50 000 unknowns in space and 300 000 in the plane,
     are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to round-off
-    at every impact."""
+    at every impact.
+    """
 
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
+        """Return v after the impulse that gives it the normal velocities ``target``."""
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
         is_small = system.cached(
             "small impacts",
@@ -145,6 +153,7 @@ class ByUpdate:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
+        """Return v changed by ``update``."""
         return self.update(system, surface, v, target)
 
 
@@ -158,16 +167,19 @@ class Inelastic(ByUpdate):
         function("Inelastic", "update", self.update, UPDATE)
 
     def target(self, impact: Impact) -> Array:
+        """Return zero at active conditions, NaN elsewhere."""
         return np.where(impact.active, 0.0, np.nan)
 
 
 @dataclass(frozen=True)
 class Newton(ByUpdate):
-    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed
-    are left to the step.
+    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed.
+
+    Points that stay closed are left to the step.
 
     v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed
-    at every dt."""
+    at every dt.
+    """
 
     e: float
     update: VelocityUpdate = field(default_factory=ComponentReset)
@@ -183,6 +195,7 @@ class Newton(ByUpdate):
         function("Newton", "update", self.update, UPDATE)
 
     def target(self, impact: Impact) -> Array:
+        """Return -e v_n⁻ at conditions that have just closed, NaN elsewhere."""
         return np.where(impact.closing, -self.e * np.maximum(impact.before, 0.0), np.nan)
 
 

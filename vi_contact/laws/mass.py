@@ -1,10 +1,12 @@
-"""Choose the mass matrix of the equations of motion: consistent, or without inertia at the contact
-nodes.
+"""Choose the mass matrix of the equations of motion.
+
+It is consistent, or without inertia at the contact nodes.
 
 With mass at the contact nodes every closure is an impact of that mass: forces ring and, with
 contact in the acceleration balance, energy grows. Without it the contact unknowns follow the body
 statically (Khenous, Laborde and Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete
-problem has a unique energy-conserving solution, and contact forces are those of the waves alone."""
+problem has a unique energy-conserving solution, and contact forces are those of the waves alone.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -32,13 +34,15 @@ class ConsistentMass:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
+        """Return the system as it is."""
         return system
 
 
 @dataclass(frozen=True)
 class Redistributed:
-    """Take the mass from the normal unknowns of all contact nodes; with friction also from
-    ``tangential`` ones.
+    """Take the mass from the normal unknowns of all contact nodes.
+
+    With friction it is also taken from ``tangential`` ones.
 
     M* = Pᵀ M_l P + D with M_l = (1 - lumping) M + lumping diag(row sums of M). P gives every
     contact node the velocity of the rigid motion that fits its neighbours behind the surface best:
@@ -56,7 +60,8 @@ class Redistributed:
     negative on curved ones: those want lumping 0. P2 tetrahedra are not lumped: their vertices
     would bear it all, and frequencies fall by per cents. InputError for lumping outside [0, 1] or
     above 0 with negative row sums, a contact node with no material behind it, or a mesh too coarse
-    to hold the inertia."""
+    to hold the inertia.
+    """
 
     lumping: float = 0.4
 
@@ -66,6 +71,7 @@ class Redistributed:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
+        """Return the system without mass at the contact unknowns."""
         if surface.total == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
@@ -111,7 +117,7 @@ class Redistributed:
 
 
 def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
-    """The unknowns of every body that has inner ones. Collective."""
+    """Return the unknowns of every body that has inner ones. Collective."""
     comm, numbers = system.algebra.comm, np.asarray(system.space.bodies)
     last = int(largest(comm, np.max(numbers, initial=0)))
     for number in range(last + 1):
@@ -141,8 +147,11 @@ def _contact_unknowns(
 def _inertia_correction(
     system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array
 ) -> Matrix:
-    """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d)
-    matrix of polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
+    """Return D of one body.
+
+    D holds the smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d) matrix of
+    polynomials of degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R.
+    """
     comm, d = system.algebra.comm, system.influence.shape[1]
     points = system.space.coordinates
     high = comm.max(np.max(points[body], axis=0, initial=-np.inf))
@@ -193,9 +202,11 @@ def _inertia_correction(
 
 
 def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
-    """Columns c such that the polynomials powers @ c are orthonormal with the nodal masses as
-    weights: with them the smallest coefficients are the smallest changes of nodal masses. Dependent
-    polynomials are left out."""
+    """Return columns c such that the polynomials powers @ c are orthonormal.
+
+    The weights are the nodal masses. With these columns the smallest coefficients are the smallest
+    changes of nodal masses. Dependent polynomials are left out.
+    """
     values, vectors = np.linalg.eigh(comm.sum(powers.T @ (nodal[:, None] * powers)))
     kept = values > 1e-10 * values[-1]
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
@@ -204,8 +215,10 @@ def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
 def _pairs_of_components(
     system: SemiDiscreteSystem, inner: Mask
 ) -> Iterator[tuple[Indices, Indices]]:
-    """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c
-    <= e."""
+    """Return (unknowns of direction c, of direction e) of the inner nodes that have both.
+
+    There is one pair for each c <= e.
+    """
     d = system.influence.shape[1]
     mine = np.flatnonzero(inner)
     numbers, component = np.divmod(np.asarray(system.space.ids)[mine], d)

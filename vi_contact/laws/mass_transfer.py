@@ -1,12 +1,15 @@
-"""Give contact nodes the velocity of the nodes behind them: how redistributed mass leaves the
-contact surface.
+"""Give contact nodes the velocity of the nodes behind them.
+
+This is how redistributed mass leaves the contact surface.
 
 A massless unknown i at node c, with direction q_i, gets the velocity of the rigid motion a that
 fits its neighbours J best, weighted with their entries w_J of the mass matrix:
 
-    v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J,   R = (q, q·(e_k x (X - X_c)) for rotations k)
+    v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J
+    R = (q, q·(e_k x (X - X_c)) for rotations k)
 
-so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour."""
+so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,8 +29,9 @@ NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 def from_neighbours(
     system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array
 ) -> list[Matrix]:
-    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those
-    of contact nodes.
+    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns.
+
+    ``contact``: all unknowns of contact nodes.
 
     Contact nodes with neighbours behind the surface come last in the product; those in corners,
     with contact nodes around, follow them, and tied ones, which are in two places. InputError for
@@ -60,8 +64,10 @@ def from_neighbours(
 def _rows(
     system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
 ) -> tuple[Indices, sp.csr_matrix]:
-    """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors;
-    ``exact``: enough of them to keep every rigid motion. Collective."""
+    """Return (numbers, rows of P) of unknowns ``left`` that have neighbours among the donors.
+
+    ``exact``: there are enough of them to keep every rigid motion. Collective.
+    """
     asked = np.flatnonzero(left)
     entries = system.algebra.entries(system.M, asked)
     neighbours = _neighbours(system, donors, entries.indices)
@@ -92,7 +98,7 @@ def _rows(
 
 
 def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
-    """The chosen rows, in batches of those with the same count."""
+    """Return the chosen rows, in batches of those with the same count."""
     for count in np.unique(counts[chosen]):
         rows = np.flatnonzero(chosen & (counts == count))
         yield from np.split(rows, range(BATCH, len(rows), BATCH))
@@ -100,10 +106,12 @@ def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
 
 @dataclass(frozen=True)
 class _Neighbours:
-    """Unknowns of all donor nodes next to the contact nodes of this rank, and some others, sorted
-    by column.
+    """Hold the unknowns of all donor nodes next to the contact nodes of this rank.
 
-    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d)."""
+    There are some others too; all are sorted by column.
+
+    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d).
+    """
 
     columns: Indices
     node: Indices
@@ -140,9 +148,11 @@ class _Neighbours:
     def fit(
         self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
     ) -> tuple[Array, Array]:
-        """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid
-        motion each loses); with ``turning`` False of translations only, which a single neighbour
-        can tell."""
+        """Return (rows R_i G⁻¹ w_J R_Jᵀ (n, k), how much of a rigid motion each loses).
+
+        The rows are on the ``used`` neighbours (n, k). With ``turning`` False they are of
+        translations only, which a single neighbour can tell.
+        """
         offset = self.points[used] - points[:, None, :]
         size = np.max(np.abs(offset), axis=(1, 2))[:, None, None]
         R = rigid_motions(self.directions[used], offset / size)
@@ -162,8 +172,10 @@ class _Neighbours:
 
 
 def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
-    """What this rank needs of the donor nodes in these columns; what other ranks own is told to
-    all. Collective."""
+    """Return what this rank needs of the donor nodes in these columns.
+
+    What other ranks own is told to all. Collective.
+    """
     d, first = system.influence.shape[1], system.algebra.first(system.rows)
     node, every = np.asarray(system.space.ids) // d, system.space.coordinates
 
@@ -196,8 +208,10 @@ def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
-    """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions
-    (…, d) at offsets."""
+    """Return rows R of rigid motions (…, modes) of directions (…, d) at offsets.
+
+    The modes are d translations and the rotations.
+    """
     d = directions.shape[-1]
     turns = [
         directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]

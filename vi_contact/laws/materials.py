@@ -1,8 +1,10 @@
-"""Describe what a body is made of: isotropic elasticity, the section it is cut to, and the damping
-of its motion.
+"""Describe what a body is made of.
+
+It is isotropic elasticity, the section it is cut to, and the damping of its motion.
 
 Everything here is a frozen value checked when it is built; SI units throughout; no finite element
-is needed."""
+is needed.
+"""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +29,8 @@ class LinearElastic:
 
     E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0;
     xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads it.
-    InputError is raised when one of them is outside its range or not finite."""
+    InputError is raised when one of them is outside its range or not finite.
+    """
 
     E: float
     nu: float
@@ -65,11 +68,13 @@ class LinearElastic:
     def from_wave_speeds(
         cls, c_p: float, c_s: float, rho: float, xi: float = 0.0
     ) -> "LinearElastic":
-        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s], with the
-        damping ratio xi.
+        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
+
+        Its damping ratio is xi.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 +
-        nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1."""
+        nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
+        """
         for name, speed in (("c_p [m/s]", c_p), ("c_s [m/s]", c_s), ("rho [kg/m³]", rho)):
             number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
@@ -87,14 +92,18 @@ class LinearElastic:
 
     @property
     def shear_modulus(self) -> float:
-        """Return the second Lamé constant E / (2 (1 + nu)) [Pa]; never called mu here, mu is
-        friction."""
+        """Return the second Lamé constant E / (2 (1 + nu)) [Pa].
+
+        It is never called mu here: mu is friction.
+        """
         return self.E / (2.0 * (1.0 + self.nu))
 
     @property
     def c_p(self) -> float:
-        """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s], also in
-        plane strain."""
+        """Return the pressure wave speed [m/s], which is also that in plane strain.
+
+        It is sqrt((lame_lambda + 2 shear_modulus) / rho).
+        """
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
     @property
@@ -105,8 +114,10 @@ class LinearElastic:
 
 @dataclass(frozen=True)
 class ElasticValues:
-    """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points, (k,) each or one for all;
-    sections and damping take them alike."""
+    """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points.
+
+    Each is (k,) or one for all; sections and damping take them alike.
+    """
 
     E: Any
     nu: Any
@@ -117,21 +128,28 @@ class ElasticValues:
 
 
 class Section(Protocol):
-    """Say how the body is cut out of space: integrals over the mesh are multiplied by `thickness`
-    [m] (solids: 1)."""
+    """Say how the body is cut out of space.
+
+    Integrals over the mesh are multiplied by `thickness` [m] (solids: 1).
+    """
 
     @property
-    def thickness(self) -> float: ...
+    def thickness(self) -> float:
+        """Return the thickness [m] that integrals over the mesh are multiplied by."""
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear_modulus
-        eps, in plane."""
+        """Return (lambda_eff, shear_modulus) [Pa] of the stress in the plane.
+
+        It is sigma = lambda_eff tr(eps) I + 2 shear_modulus eps.
+        """
 
 
 @dataclass(frozen=True)
 class PlaneStress:
-    """Cut a panel of this thickness [m], free of stress across it: lambda_eff = 2 lambda mu /
-    (lambda + 2 mu)."""
+    """Cut a panel of this thickness [m], free of stress across it.
+
+    lambda_eff = 2 lambda mu / (lambda + 2 mu).
+    """
 
     thickness: float = 1.0
 
@@ -139,16 +157,20 @@ class PlaneStress:
         number("PlaneStress", "the thickness [m]", self.thickness, positive=True)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (lambda_eff, shear_modulus) [Pa]; equal to (E nu / (1 - nu²), E / (2 (1 +
-        nu)))."""
+        """Return (lambda_eff, shear_modulus) [Pa].
+
+        They equal (E nu / (1 - nu²), E / (2 (1 + nu))).
+        """
         lame, shear = material.lame_lambda, material.shear_modulus
         return 2.0 * lame * shear / (lame + 2.0 * shear), shear
 
 
 @dataclass(frozen=True)
 class PlaneStrain:
-    """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis:
-    lambda_eff = lambda."""
+    """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis.
+
+    lambda_eff = lambda.
+    """
 
     thickness: float = 1.0
 
@@ -175,8 +197,10 @@ class Damping(Protocol):
     """Build viscous damping from the mass and stiffness of one material: C = alpha M + beta K."""
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (alpha [1/s], beta [s]) of C = alpha M + beta K on the part of the body made of
-        `material`."""
+        """Return (alpha [1/s], beta [s]) of C = alpha M + beta K.
+
+        They are those on the part of the body made of `material`.
+        """
 
 
 @dataclass(frozen=True)
@@ -190,8 +214,10 @@ class NoDamping:
 
 @dataclass(frozen=True)
 class MassProportional:
-    """Damp by a force c u' per unit volume, rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >=
-    0."""
+    """Damp by a force c u' per unit volume.
+
+    rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >= 0.
+    """
 
     c: float
 
@@ -201,18 +227,22 @@ class MassProportional:
         )
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (c / rho, 0): integrating c against the shape functions is c / rho times the
-        consistent mass."""
+        """Return (c / rho, 0).
+
+        Integrating c against the shape functions is c / rho times the consistent mass.
+        """
         return self.c / material.rho, 0.0
 
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """Damp by C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any
-    contact term.
+    """Damp by C = alpha M + beta K, with alpha [1/s] >= 0 and beta [s] >= 0.
+
+    K is the stiffness without any contact term.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with
-    uplift prefer alpha = 0. Raises InputError for a negative or non-finite coefficient."""
+    uplift prefer alpha = 0. Raises InputError for a negative or non-finite coefficient.
+    """
 
     alpha: float
     beta: float
@@ -223,13 +253,15 @@ class Rayleigh:
 
     @classmethod
     def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> "Rayleigh":
-        """Make the damping of ratio xi1 at f1, xi2 at f2 [Hz]: alpha / (2 w_i) + beta w_i / 2 =
-        xi_i, w_i = 2 pi f_i.
+        """Make the damping of ratio xi1 at f1, xi2 at f2 [Hz].
+
+        alpha / (2 w_i) + beta w_i / 2 = xi_i, w_i = 2 pi f_i.
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²);
         for equal ratios xi alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and
         10 Hz: 0.5712 1/s and 1.4469e-3 s. Raises InputError when f1 = f2 or when the solution needs
-        a negative coefficient."""
+        a negative coefficient.
+        """
         for name, f in (("f1", f1), ("f2", f2)):
             number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
         for name, xi in (("xi1", xi1), ("xi2", xi2)):
@@ -256,10 +288,12 @@ class Rayleigh:
         return self.alpha, self.beta
 
     def ratio(self, f: float) -> float:
-        """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi
-        [Hz] > 0.
+        """Return the damping ratio of a mode of frequency f = w / 2 pi [Hz] > 0.
 
-        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta)."""
+        It is alpha / (2 w) + beta w / 2.
+
+        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
+        """
         number("Rayleigh.ratio", "the frequency f [Hz]", f, positive=True)
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)
@@ -273,11 +307,13 @@ class DampingRatio:
     cell. ``assemble`` refuses the law where no material has one, and a ratio of a material without
     this law.
 
-        C = alpha M + beta K,    alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2),    w = 2 pi f
+        C = alpha M + beta K,    w = 2 pi f
+        alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2)
 
     ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies
     the ratio is less than xi between them and more outside, and alpha M also resists rigid rocking
-    (see ``Rayleigh``)."""
+    (see ``Rayleigh``).
+    """
 
     frequency: float
     second: float = 0.0
@@ -295,8 +331,9 @@ class DampingRatio:
 
 @dataclass(frozen=True)
 class KelvinVoigt:
-    """Damp by sigma_v = bulk tr(eps') I + 2 shear dev(eps'), with the viscosities shear, bulk [Pa
-    s] >= 0.
+    """Damp by sigma_v = bulk tr(eps') I + 2 shear dev(eps').
+
+    The viscosities are shear, bulk [Pa s] >= 0.
 
         C = ∫ sigma_v(v):eps(w) = ∫ (bulk - 2/3 shear) tr(eps(v)) tr(eps(w)) + 2 shear eps(v):eps(w)
 
@@ -306,7 +343,8 @@ class KelvinVoigt:
     strain across the panel would have a motion of its own (``assemble`` refuses it). With
     viscosities beta times the shear and bulk moduli, mu and lambda + 2/3 mu, it is Rayleigh(0,
     beta), the solid of one retardation time, which goes with PlaneStress too. Raises InputError for
-    a viscosity that is negative or not finite."""
+    a viscosity that is negative or not finite.
+    """
 
     shear: float
     bulk: float = 0.0

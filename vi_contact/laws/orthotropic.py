@@ -1,5 +1,7 @@
-"""Describe orthotropic elasticity: nine engineering constants along three material axes at right
-angles."""
+"""Describe orthotropic elasticity along three material axes at right angles.
+
+It has nine engineering constants.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,13 +25,15 @@ VOIGT = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2)
 class Orthotropic:
     """Describe orthotropic elasticity along material axes 1, 2, 3 at right angles.
 
-        eps_ii = sigma_ii / E_i - sum_j (nu_ij / E_i) sigma_jj,   nu_ji / E_j = nu_ij / E_i,   sigma_ij = 2 G_ij eps_ij
+        eps_ii = sigma_ii / E_i - sum_j (nu_ij / E_i) sigma_jj
+        nu_ji / E_j = nu_ij / E_i,   sigma_ij = 2 G_ij eps_ij
 
     with i != j: nu_ij is the contraction along j under a stress along i alone.
 
     Args:
-        E1, E2, E3: Young's moduli [Pa] > 0; G12, G13, G23: shear moduli [Pa] > 0; rho: mass density
-            [kg/m³] > 0.
+        E1, E2, E3: Young's moduli [Pa] > 0.
+        G12, G13, G23: shear moduli [Pa] > 0.
+        rho: mass density [kg/m³] > 0.
         nu12, nu13, nu23: Poisson's ratios.
         axes: the angle [rad] from x to axis 1, anticlockwise about z, which is axis 3; or a
             rotation matrix (3, 3) whose columns are the axes 1, 2, 3. A body in the plane needs z
@@ -107,11 +111,13 @@ class Orthotropic:
         return np.einsum("ip,jq,kr,ls,pqrs->ijkl", Q, Q, Q, Q, C, optimize=True)
 
     def matrix(self, section: Section, dimension: int) -> Array:
-        """Return the stresses (rows in the order of ``VOIGT``, in the plane then sigma_zz) of unit
-        strains [Pa].
+        """Return the stresses of unit strains [Pa].
+
+        The rows are in the order of ``VOIGT``, in the plane then sigma_zz.
 
         (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and
-        on a line."""
+        on a line.
+        """
         if dimension not in VOIGT:
             raise InputError(
                 "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"

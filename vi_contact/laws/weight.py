@@ -32,7 +32,8 @@ def with_weight(
     material. InputError for a direction of another length, and a system without ``base_inertia``:
     it lost the mass at held nodes; for weight that no unknown feels; and for weight that the system
     has already, as a constant load of nearly its size: of ``BodyForce``, or of this function.
-    Collective."""
+    Collective.
+    """
     instance(
         "with_weight",
         "system",
@@ -66,8 +67,10 @@ def with_weight(
 
 
 def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
-    """Raise InputError, on all ranks, for weight that nothing feels, or that the constant loads
-    hold already."""
+    """Raise InputError, on all ranks, for weight that is given in vain.
+
+    Nothing feels it, or the constant loads hold it already.
+    """
     comm = system.algebra.comm
     size = largest(comm, max_abs(weight))
     if not size:

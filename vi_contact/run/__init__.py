@@ -2,7 +2,8 @@
 
 Begin with ``simulate``, as README.md does. ``march`` is the bare loop below it,
 ``static_equilibrium`` the start under weight, ``read_run`` the way back from a folder:
-docs/reference/files.md."""
+docs/reference/files.md.
+"""
 
 from ..core.lazy import lazy
 

@@ -1,7 +1,8 @@
 """Compare independent routes to the same step, step by step from the same state.
 
 Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state
-must not."""
+must not.
+"""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -22,8 +23,11 @@ from .time_steps import TimeSteps
 
 @dataclass
 class Disagreement:
-    """Hold how far the answers of a solver are off those of the primary one so far: of u, r_n and,
-    in steps with friction, r_t the largest difference ``off`` and the largest value ``size``."""
+    """Hold how far the answers of a solver are off those of the primary one so far.
+
+    This is, of u, r_n and, in steps with friction, r_t, the largest difference ``off`` and the
+    largest value ``size``.
+    """
 
     method: str = ""
     off: dict[str, float] = field(default_factory=lambda: {"u": 0.0, "r_n": 0.0})
@@ -33,8 +37,10 @@ class Disagreement:
 
     @property
     def relative(self) -> dict[str, float]:
-        """Return max |x - x'| / max |x| over all components and steps, by name; max |x - x'| where
-        x is zero."""
+        """Return max |x - x'| / max |x| over all components and steps, by name.
+
+        It is max |x - x'| where x is zero.
+        """
         return {name: off / (self.size[name] or 1.0) for name, off in self.off.items()}
 
     @property
@@ -45,10 +51,12 @@ class Disagreement:
 
 @dataclass
 class CrossChecked:
-    """Solve by one solver, whose answer counts, ask others at every step too, and remember how far
-    they are off.
+    """Solve by one solver, whose answer counts, and ask others at every step too.
 
-    ``found``: without attempts that ``HalvedAtImpact`` threw away."""
+    How far they are off is remembered.
+
+    ``found``: without attempts that ``HalvedAtImpact`` threw away.
+    """
 
     primary: Solver
     others: Sequence[Solver]
@@ -68,8 +76,10 @@ class CrossChecked:
         self._earlier, self._last = self.found, (-1, 0.0)
 
     def begin(self, step: StepProblem) -> None:
-        """Forget the attempt before when this one is of the same step but shorter: that was thrown
-        away."""
+        """Forget the attempt before when this one is of the same step but shorter.
+
+        The longer one was thrown away.
+        """
         k, t = self._last
         if step.k == k and step.t < t:
             self.found = self._earlier
@@ -88,8 +98,11 @@ class CrossChecked:
         return PreparedCrossCheck(self, solvers, surface)
 
     def report(self) -> Mapping[str, Mapping[str, float]]:
-        """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per
-        step: what summary.json shows. A name that comes again gets a number."""
+        """Return, by method, relative differences and iterations per step.
+
+        The differences are in u, r_n and, with friction, r_t. This is what summary.json shows. A
+        name that comes again gets a number.
+        """
         names = [one.method for one in self.found]
         return {
             name if names.count(name) == 1 else f"{name} #{rank}": one.relative
@@ -112,6 +125,7 @@ class PreparedCrossCheck:
     surface: ContactSurface
 
     def solve(self, step: StepProblem) -> StepResult:
+        """Return the answer of the first solver; compare those of the others with it."""
         result = self.solvers[0].solve(step)
         self.settings.begin(step)
         for solver, found in zip(self.solvers[1:], self.settings.found, strict=True):
@@ -147,11 +161,13 @@ def cross_check(
     steps: int,
     state: State | None = None,
 ) -> CrossChecked:
-    """March with the first solver and compare the others with it at every step. ``report()`` of the
-    result tells.
+    """March with the first solver and compare the others with it at every step.
+
+    ``report()`` of the result tells.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted
-    ones."""
+    ones.
+    """
     given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
     if len(given) < 2:
         raise InputError(f"cross_check: {len(given)} solvers are given; give two or more")

@@ -1,5 +1,6 @@
-"""Name bodies that nothing holds and that no contact condition touches, before a run computes a
-step.
+"""Name bodies that nothing holds and that no contact condition touches.
+
+They are named before a run computes a step.
 
 They are seldom meant. Where nodes of such a body lie at the places of another body's nodes, the
 meshes of the two have not been merged: they look like one body in a picture, and fly apart without
@@ -26,8 +27,10 @@ SAME = 1e-9  # of the size of the bodies: nodes that are nearer lie at one place
 
 @dataclass(frozen=True)
 class LooseBody:
-    """Hold the middle [m] of a loose body, its number of nodes, and how many of them lie at nodes
-    of other bodies."""
+    """Hold the middle [m] of a loose body and its number of nodes.
+
+    How many of them lie at nodes of other bodies is held too.
+    """
 
     middle: Array
     nodes: int
@@ -36,7 +39,9 @@ class LooseBody:
 
 def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     """Return the bodies with a rigid motion that neither a stiffness nor a contact condition meets.
-    Collective."""
+
+    Collective.
+    """
     # Nearly every body is touched: the rest, which gathers nodes, is for those that are not.
     system = problem.system
     rows = rows_of_bodies(system)
@@ -69,8 +74,10 @@ def _distinct(parts: list[Array]) -> Array:
 
 
 def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
-    """Return for every body whether its translation alone moves some contact condition, as side 1
-    or 2. Collective."""
+    """Return for every body whether its translation alone moves some condition. Collective.
+
+    The body is side 1 or 2 of this contact condition.
+    """
     surface = problem.surface
     moved = np.zeros(len(bodies))
     for number, rows in enumerate(bodies):
@@ -88,8 +95,10 @@ def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
 
 
 def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
-    """Yield a sentence on every loose body, and whether it is refused: where its nodes lie at
-    another's. Collective."""
+    """Yield a sentence on every loose body, and whether it is refused. Collective.
+
+    It is refused where its nodes lie at another's.
+    """
     for body in find_loose_bodies(problem):
         what = (
             f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no "
@@ -108,8 +117,10 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
 
 
 def refuse_loose_bodies(problem: ContactProblem) -> None:
-    """Raise InputError for a loose body whose nodes lie at another body's; warn, on rank 0, of
-    others. Collective."""
+    """Raise InputError for a loose body whose nodes lie at another body's. Collective.
+
+    Warn, on rank 0, of other loose bodies.
+    """
     for sentence, refused in judge_loose_bodies(problem):
         if refused:
             raise InputError(sentence)

@@ -39,7 +39,8 @@ def march(
     are one of the ``steps``. A step whose certificate exceeds ``tolerance`` goes to the solvers of
     ``escalation`` in turn. If all of them fail, StepFailure is raised with step, time, residuals
     and advice. ``state`` is that of a static stage or a checkpoint. InputError is raised at the
-    call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
+    call: arguments of the wrong kind, a state of another problem or inside the obstacle.
+    """
     method = checked_method(
         "march",
         problem,
@@ -57,12 +58,14 @@ def march(
 
 
 class March:
-    """Step along a plan, and keep the books of it. ``prepared``: matrices and solvers by the length
-    of their steps.
+    """Step along a plan, and keep the books of it.
+
+    ``prepared``: matrices and solvers by the length of their steps.
 
     Attributes, at the time a step is handed out:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
-        dt: the length of this step [s]. halved: attempts that were thrown away."""
+        dt: the length of this step [s]. halved: attempts that were thrown away.
+    """
 
     def __init__(
         self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0
@@ -95,7 +98,7 @@ class March:
                 yield report.new, report
 
     def _restarted(self, dt: float) -> State:
-        """The state, with a past for this dt."""
+        """Return the state, with a past for this dt."""
         if dt == self.dt:
             return self.state
         method = self.method
@@ -103,10 +106,13 @@ class March:
             return method.scheme.start(method.problem, self.state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
-        """A step of dt; None when it closes a point and is to be halved: nothing has happened then.
+        """Return a step of dt; None when it closes a point and is to be halved.
+
+        Nothing has happened then.
 
         Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked
-        once, at its end."""
+        once, at its end.
+        """
         with together(self.method.problem.surface.comm):
             return self._attempted(dt, final=final)
 
@@ -139,8 +145,10 @@ class March:
 def after_impact(
     problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float
 ) -> State:
-    """Return the state with the impact law applied; points on massless supports (springs) do not
-    collide."""
+    """Return the state with the impact law applied.
+
+    Points on massless supports (springs) do not collide.
+    """
     law, surface = problem.impact, problem.surface
     if law is None:
         return new

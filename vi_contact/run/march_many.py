@@ -1,5 +1,7 @@
-"""March many: several runs of one body at once, which differ in what shakes it, how it rubs and
-where it starts."""
+"""March several runs of one body at once.
+
+They differ in what shakes it, how it rubs and where it starts.
+"""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -80,7 +82,7 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
 
 
 def _in_turn(runs: Sequence[Together]) -> Iterator[tuple[int, Report | ViContactError]]:
-    """A step of every run in turn, until all have ended."""
+    """Yield a step of every run in turn, until all have ended."""
     going = {number: run.reports() for number, run in enumerate(runs)}
     while going:
         for number, loop in list(going.items()):

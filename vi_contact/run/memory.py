@@ -1,5 +1,7 @@
-"""Say what a run takes of the memory: the peak of every rank, and the bytes of matrices, factor and
-mesh."""
+"""Say what a run takes of the memory.
+
+This is the peak of every rank, and the bytes of matrices, factor and mesh.
+"""
 
 from collections.abc import Mapping
 from resource import RUSAGE_SELF, getrusage
@@ -10,9 +12,11 @@ from ..core.problem import ContactProblem
 
 
 def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
-    """Return peak_bytes, the largest resident memory of every rank so far, and the bytes, of all
-    ranks together, of what tells them: the matrices of all bases, A, its factor, the mesh.
-    Collective."""
+    """Return peak_bytes and the bytes of what tells them. Collective.
+
+    Here peak_bytes is the largest resident memory of every rank so far. The bytes are, of all ranks
+    together, those of what tells them: the matrices of all bases, A, its factor, the mesh.
+    """
     comm, systems = problem.system.algebra.comm, (problem.system, problem.turned, problem.equations)
     owners: dict[str, list[Any]] = {
         name: [getattr(one, name) for one in systems] for name in ("K", "M", "C")

@@ -1,5 +1,7 @@
-"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, the state it
-starts from."""
+"""Choose and check how a problem is marched.
+
+This is scheme, solvers, tolerance, time steps, and the state it starts from.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,8 +29,10 @@ SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state 
 
 @dataclass(frozen=True)
 class Method:
-    """Hold how a problem is marched: scheme, solver and its escalation, time steps [s] as asked
-    for, tolerance."""
+    """Hold how a problem is marched.
+
+    This is scheme, solver and its escalation, time steps [s] as asked for, and tolerance.
+    """
 
     problem: ContactProblem
     scheme: Scheme
@@ -37,8 +41,10 @@ class Method:
     tolerance: float
 
     def bind(self) -> None:
-        """Hand scheme and time steps to the motions that are marched beside the run, unless they
-        have them."""
+        """Hand scheme and time steps to the motions that are marched beside the run.
+
+        Those that have them already are left out.
+        """
         for companion in (*self.problem.system.companions, *self.problem.surface.companions):
             companion.bind(self.scheme, self.dt)
 
@@ -55,11 +61,13 @@ def checked_method(
     state: State | None,
     tolerance: float,
 ) -> Method:
-    """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and
-    the escalation.
+    """Return the method with its defaults.
+
+    ``solvers``: the first one, None for Automatic(), and the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the
-    obstacle. Collective."""
+    obstacle. Collective.
+    """
     check_problem_given(owner, problem)
     comm = problem.surface.comm
     agree(
@@ -104,7 +112,8 @@ def with_defaults(
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass
     at the contact nodes asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains
-    energy. Without a mass: the scheme's. ``others``: the first that has its matrices lends them."""
+    energy. Without a mass: the scheme's. ``others``: the first that has its matrices lends them.
+    """
     check_problem_given("march", problem)
     for one in several("march", "others", others, "give a list of problems, or leave it out"):
         check_problem_given("march", one)
@@ -134,8 +143,10 @@ def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
 
 
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
-    """Raise InputError unless these are a solver or None, a list of solvers, and a tolerance
-    between 0 and 1."""
+    """Raise InputError unless these are solvers and a tolerance.
+
+    They are a solver or None, a list of solvers, and a tolerance between 0 and 1.
+    """
     if solver is not None:
         check_solver(owner, solver)
     for one in several(owner, "escalation", escalation, "give a list of solvers"):
@@ -150,8 +161,9 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
 def check_state(
     owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a state of another problem, or one that penetrates the
-    obstacle. Collective.
+    """Raise InputError, on all ranks, for a state of another problem. Collective.
+
+    So it does for one that penetrates the obstacle.
 
     A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its
     own runs (k > 0).

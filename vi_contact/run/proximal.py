@@ -1,5 +1,6 @@
-"""Solve the static stage of a body that contact alone holds (floating: a block standing on the
-ground): K is singular.
+"""Solve the static stage of a body that contact alone holds.
+
+It is floating, as a block standing on the ground is, and K is singular.
 
 Its equilibrium is the limit of the proximal-point iteration (Martinet 1970; Rockafellar, SIAM J.
 Control Optim. 14, 1976, thm 1), solved for the increment d = u_{k+1} - u_k and with the reactions
@@ -15,7 +16,8 @@ recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
 
 Rigid motions that no load drives stay where they start: along them P-weighted means of u are those
 of u0 (the centre of mass of a block free to slide on level ground does not move). On a conservative
-problem all else is unique."""
+problem all else is unique.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -69,8 +71,11 @@ class _Progress:
         return self.least <= self.tolerance
 
     def take(self, result: StepResult, worst: float, pace: float) -> None:
-        """An answer is better with a smaller residual or, near round-off, with the smallest step:
-        the residual of a stiff body is there long before soft motions are."""
+        """Take an answer that is better than the best so far.
+
+        It is better with a smaller residual or, near round-off, with the smallest step: the
+        residual of a stiff body is there long before soft motions are.
+        """
         better = worst < self.least or (worst <= NEAR * self.tolerance and pace < self.slowest)
         self.vain, self.best = (0, result) if better else (self.vain + 1, self.best)
         self.least, self.slowest = min(worst, self.least), min(pace, self.slowest)
@@ -106,15 +111,19 @@ class Proximal:
         self._prepared = self._solver.prepare(self._A, self._surface, 1.0)
 
     def certificate(self, result: StepResult) -> Certificate:
-        """Return the certificate of the stage itself, with the equilibrium of every body as a rigid
-        one."""
+        """Return the certificate of the stage itself.
+
+        It has the equilibrium of every body as a rigid one.
+        """
         reaction = self.step.surface.reaction_load(result.r_n, len(result.x), result.r_t)
         resultant = self._bodies.imbalance(self.step.b, reaction)
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Iterate until two answers running are no better; once, if the solver fails, with stronger
-        springs instead."""
+        """Iterate until two answers running are no better.
+
+        If the solver fails, this is done once with stronger springs instead.
+        """
         self.step = step
         progress = _Progress(self._tolerance)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
@@ -172,8 +181,10 @@ class Proximal:
             centre = answer.x
 
     def _missing(self, inner: StepProblem, found: StepResult) -> Array:
-        """What a solver left of a step's resultants: the next carries it, or bodies would drift
-        along what P holds."""
+        """Return what a solver left of a step's resultants.
+
+        The next step carries it, or bodies would drift along what P holds.
+        """
         if found.aim == 0.0:
             return np.zeros_like(found.x)
         reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
@@ -182,8 +193,10 @@ class Proximal:
     def _left_over(
         self, answer: StepResult, share: float, centre: Array, carried: Array
     ) -> StepProblem:
-        """The next step, b with the forces' own resultants: K u has none, and its round-off would
-        move the body."""
+        """Return the next step, b with the forces' own resultants.
+
+        K u has none, and its round-off would move the body.
+        """
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
@@ -235,10 +248,13 @@ class Proximal:
         return f"carry it off along ({way})"
 
     def _ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
-        """How many times d to go further at once: the sum of the steps to come when each is
-        ‖d_new‖/‖d_old‖ of the one before (Aitken), or only to the next contact. 0 unless d_new and
-        d_old are parallel, to the accuracy which that distance needs. Any start of the next step
-        will do, so nothing but the speed depends on it."""
+        """Return how many times d to go further at once.
+
+        It is the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the one before (Aitken),
+        or only as far as the next contact. It is 0 unless d_new and d_old are parallel, to the
+        accuracy which that distance needs. Any start of the next step will do, so nothing but the
+        speed depends on it.
+        """
         if 0.0 in (old.pace, new.pace) or self.step.surface.some(old.active != new.active):
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace

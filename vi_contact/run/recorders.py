@@ -2,7 +2,8 @@
 
 Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or arrays (HDF5 only),
 those of rank 0. Displacements and velocities are those of the equations: relative to the ground
-when an excitation shakes the body."""
+when an excitation shakes the body.
+"""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -35,8 +36,10 @@ def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
 
 
 def refuse_overflow(row: Row) -> None:
-    """Raise StepFailure for a number beyond those of the machine: infinite, or NaN in the energy
-    ledger."""
+    """Raise StepFailure for a number beyond those of the machine.
+
+    It is infinite, or NaN in the energy ledger.
+    """
     for name, value in row.items():
         if not isinstance(value, float) or isfinite(value):
             continue
@@ -48,13 +51,15 @@ def refuse_overflow(row: Row) -> None:
 
 
 class Steps:
-    """Record the columns of every run: time, step, iterations, certificate, escalation and ground
-    acceleration."""
+    """Record the columns of every run.
+
+    They are time, step, iterations, certificate, escalation and ground acceleration.
+    """
 
     _axes = AXES  # those of the problem, once it is started
 
     def columns(self) -> Columns:
-        """Name t, k, iterations, certificate, escalated, a_g_x, …"""
+        """Name t, k, iterations, certificate, escalated, a_g_x, and so on."""
         return _named(_COLUMNS["steps"], self._axes)
 
     def _row(
@@ -73,6 +78,7 @@ class Steps:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._row(
             report.new, report.result.iterations, report.certificate.worst, report.escalated
         )
@@ -90,7 +96,8 @@ class Energy:
     themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is
     the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the summed work
     of the residual of the equation of motion; ``summary.json`` has its size over the largest energy
-    or work. Each step costs three products, and damping and impacts cost one more each."""
+    or work. Each step costs three products, and damping and impacts cost one more each.
+    """
 
     _COLUMNS: ClassVar[Columns] = {
         name: ("J", meaning) for name, meaning in WORDS["columns"].items()
@@ -104,8 +111,10 @@ class Energy:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the initial energies; works and losses are zero, or those of the run that is
-        continued."""
+        """Return the initial energies.
+
+        Works and losses are zero, or those of the run that is continued.
+        """
         self._problem = problem
         self._now, self._stored = (
             energies(problem.equations, state.u, state.v),
@@ -122,7 +131,7 @@ class Energy:
         }
 
     def _of_strains(self, state: State) -> float:
-        """What initial strains add to ½ uᵀKu [J]."""
+        """Return what initial strains add to ½ uᵀKu [J]."""
         initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
         return (
             0.0
@@ -131,6 +140,7 @@ class Energy:
         )
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         system, new = self._problem.equations, report.new
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
@@ -164,10 +174,12 @@ class Energy:
 
 
 def told_pressures(surface: ContactSurface) -> Mask | None:
-    """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all
-    of them.
+    """Return the conditions (m,) of this rank whose pressure counts among the largest.
 
-    Where all on all ranks are ``uncovered`` all count. Collective."""
+    It is None for all of them.
+
+    Where all on all ranks are ``uncovered`` all count. Collective.
+    """
     uncovered = (
         np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
     )
@@ -177,8 +189,9 @@ def told_pressures(surface: ContactSurface) -> Mask | None:
 
 @dataclass
 class Contact:
-    """Record gaps, pressures, forces and slip of the contact. Reactions are mean or end values, as
-    the scheme says.
+    """Record gaps, pressures, forces and slip of the contact.
+
+    Reactions are mean or end values, as the scheme says.
 
     gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight; the
     largest is that of points that are covered (``ContactSurface.uncovered``). The force on the body
@@ -203,8 +216,10 @@ class Contact:
         attributes(self, flags=("arrays",))
 
     def columns(self) -> Columns:
-        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call
-        ``start`` first."""
+        """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active.
+
+        Call ``start`` first.
+        """
         every = _named(
             _COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes
         )
@@ -224,6 +239,7 @@ class Contact:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
@@ -264,7 +280,7 @@ class Contact:
         return row
 
     def _whole(self, *each: Any) -> Sequence[Any]:
-        """The arrays of all conditions on rank 0, by one message of each rank."""
+        """Return the arrays of all conditions on rank 0, by one message of each rank."""
         if self._problem.surface.comm.size == 1:
             return each
         found = self._problem.surface.on_first(np.column_stack(each))
@@ -272,7 +288,7 @@ class Contact:
         return [part.copy() for part in (found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing)]
 
     def _largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
-        """The largest depth, pressure and slip of all conditions; nan without any."""
+        """Return the largest depth, pressure and slip of all conditions; nan without any."""
         if not self._problem.surface.total:
             return [np.nan] * (2 + len(slip))
         some = len(gap) > 0
@@ -314,7 +330,8 @@ class Probe:
     ground when an excitation shakes the body.
 
     InputError if a label has other characters than letters, digits and underscores, or a point is
-    outside the body."""
+    outside the body.
+    """
 
     points: Mapping[Any, Sequence[float]]
     velocity: bool = False
@@ -337,7 +354,7 @@ class Probe:
             )
 
     def columns(self) -> Columns:
-        """Name u_x_<label>, …"""
+        """Name u_x_<label> and the like."""
         quantities = {"u": ("m", "displacement")}
         if self.velocity:
             quantities["v"] = ("m/s", "velocity after the impact law")
@@ -367,6 +384,7 @@ class Probe:
         return problem.system.space.find_nodes(points)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         old, new, ground = report.old.t, report.new.t, self._problem.ground_acceleration
         return self._row(
             report.new,

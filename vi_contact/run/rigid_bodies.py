@@ -1,9 +1,11 @@
-"""Treat the bodies of a system as rigid: what of their motion contact alone holds, and whether
-forces balance it.
+"""Treat the bodies of a system as rigid.
+
+This tells what of their motion contact alone holds, and whether forces balance it.
 
 Every body is asked by itself, in its own unknowns (``problem.turned``): with w a rigid motion of it
 and K w = 0, a static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and
-moments. No stiffness enters it."""
+moments. No stiffness enters it.
+"""
 
 import numpy as np
 
@@ -22,9 +24,12 @@ class RigidBodies:
         self._free = list(free_motions(problem.turned))
 
     def imbalance(self, load: Array, reaction: Array) -> float:
-        """Return the largest |w·(load - reaction)| over max |w| times the sum of |load| and
-        |reaction| on the body, forces [N] on the unknowns of ``problem.static_load``. 0 when
-        prescribed displacements hold every body."""
+        """Return how far the forces on a body are from balance.
+
+        It is the largest |w·(load - reaction)| over max |w| times the sum of |load| and |reaction|
+        on the body, forces [N] on the unknowns of ``problem.static_load``. It is 0 when prescribed
+        displacements hold every body.
+        """
         f, r = self._own(load), self._own(reaction)
         worst = 0.0
         for body in self._free:
@@ -35,29 +40,34 @@ class RigidBodies:
         return worst
 
     def resultants(self, force: Array) -> Array:
-        """Return m w (w·force), m = diag M: the part of a force on ``static_load``'s unknowns with
-        its resultants."""
+        """Return m w (w·force), m = diag M.
+
+        It is the part of a force on ``static_load``'s unknowns with its resultants.
+        """
         own, part = self._own(force), np.zeros_like(force)
         for body in self._free:
             part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])
         return part if self._coupling is None else self._coupling.transpose_apply(part)
 
     def _own(self, force: Array) -> Array:
-        """Forces on the bodies themselves: û = R ǔ, R⁻¹ = 2 - R."""
+        """Return forces on the bodies themselves: û = R ǔ, R⁻¹ = 2 - R."""
         return (
             force if self._coupling is None else 2.0 * force - self._coupling.transpose_apply(force)
         )
 
 
 def body_springs(problem: ContactProblem) -> Matrix:
-    """Return P: the mass matrix of every body, times a number [1/s²] that makes the sum of its
-    entries along a direction STRONG of the stiffness of what is softest here, a body or the springs
-    it stands on, and at least WEAK of the body's own largest K_ii if it has a stiffness; in the
-    unknowns of ``problem.static_load``. Collective.
+    """Return P, the springs of bodies. Collective.
+
+    P is the mass matrix of every body, times a number [1/s²] that makes the sum of its entries
+    along a direction STRONG of the stiffness of what is softest here, a body or the springs it
+    stands on, and at least WEAK of the body's own largest K_ii if it has a stiffness; in the
+    unknowns of ``problem.static_load``.
 
     It does not grow as meshes are refined, as it would with the largest K_ii / M_ii. Weaker springs
     take fewer steps to push a stiff body into a soft one, and cost digits: round-off of the first
-    step is 1e-16 / WEAK² at worst."""
+    step is 1e-16 / WEAK² at worst.
+    """
     system, surface = problem.turned, problem.surface
     algebra, numbers = system.algebra, np.asarray(system.space.bodies)
     count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]

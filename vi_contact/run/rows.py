@@ -1,9 +1,11 @@
-"""Hold what several runs have in one step as rows, and make that of one run when somebody asks for
-it.
+"""Hold what several runs have in one step as rows.
+
+That of one run is made when somebody asks for it.
 
 A step of a small system costs as much as the objects that tell of it: those that nobody reads are
 not made. What was made stays as it is, whatever the runs do later: every step has arrays of its
-own, and nobody writes to them."""
+own, and nobody writes to them.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -44,8 +46,10 @@ class RowReport(Report):
 
 
 def joined(states: Sequence[State]) -> State:
-    """Return the state of all runs, read-only; of a memory's arrays only the vectors differ from
-    run to run."""
+    """Return the state of all runs, read-only.
+
+    Of a memory's arrays only the vectors differ from run to run.
+    """
     first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
     u, v, r_n, active = (
         np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active")
@@ -64,8 +68,10 @@ def joined(states: Sequence[State]) -> State:
 
 
 def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
-    """Return the states of runs whose rows are those of ``problem``, and let theirs know the
-    products of the rows."""
+    """Return the states of runs whose rows are those of ``problem``.
+
+    Their problems get to know the products of the rows.
+    """
     viscous = () if problem.equations.C is None else ("C",)
 
     def made(row: int) -> State:
@@ -106,12 +112,15 @@ class Loads(Load):
     rows: Any = None
 
     def __call__(self, t: float) -> Array:
+        """Return the loads of all runs at time t, as rows [N]."""
         return np.asarray(self.rows(t))
 
 
 def loads_of(problems: Sequence[ContactProblem]) -> Loads:
-    """Return the loads of problems on one system: they differ in what shakes them, by few vectors
-    times histories."""
+    """Return the loads of problems on one system.
+
+    They differ in what shakes them, by few vectors times histories.
+    """
     body = problems[0].unshaken.load
     shaken = [
         (run, *pair)

@@ -1,10 +1,12 @@
-"""Say when time steps are too long for what acts: a motion or a load that changes between the steps
-is not seen.
+"""Say when time steps are too long for what acts.
+
+A motion or a load that changes between the steps is not seen.
 
 A sine of frequency f is zero at every step if dt is a multiple of half its period 1/(2 f), whatever
 its amplitude; with fewer than ``FEWEST`` steps in a period the steps miss its peaks. The same holds
 for pulses, by the sine that they are cut from, and for records and tables, by the distance of their
-samples."""
+samples.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -35,16 +37,20 @@ DEEP = 5  # how far a motion is looked for in what holds it
 
 
 def sampling_warning(problem: ContactProblem, dt: float) -> str | None:
-    """Return a sentence when the time step [s] is too long for an excitation, a load or a motion of
-    the problem whose frequency, period or samples are known; None when it is not, or nothing is
-    known."""
+    """Return a sentence when the time step [s] is too long for what acts.
+
+    This is an excitation, a load or a motion of the problem whose frequency, period or samples are
+    known. It is None when it is not, or nothing is known.
+    """
     said = (one for source in _sources(problem) for one in _said(source, dt))
     return next(said, None)
 
 
 def _sources(problem: ContactProblem) -> Iterator[Any]:
-    """Everything that acts as a function of the time: first excitations, then loads, prescribed and
-    moving parts."""
+    """Return everything that acts as a function of the time.
+
+    First come excitations, then loads, prescribed and moving parts.
+    """
     yield from problem.excitations
     system, surface = problem.system, problem.surface
     for _, history in system.load.separable:
@@ -57,7 +63,7 @@ def _sources(problem: ContactProblem) -> Iterator[Any]:
 
 
 def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
-    """The sentences about a source, or about the motions that it holds."""
+    """Return the sentences about a source, or about the motions that it holds."""
     if source is None or depth == 0:
         return
     name = type(source).__name__
@@ -84,15 +90,17 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
 
 
 def _frequency(source: Any) -> float | None:
-    """The frequency [Hz] that a motion, of the user's too, says that it has."""
+    """Return the frequency [Hz] that a motion, of the user's too, says that it has."""
     value: Any = getattr(source, "frequency", None)
     known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     return float(value) if known and 0.0 < float(value) < np.inf else None
 
 
 def _held(source: Any) -> Iterator[Any]:
-    """What a function or an object may have its motion from: its owner, a part of it, or what it
-    closes over."""
+    """Return what a function or an object may have its motion from.
+
+    It is its owner, a part of it, or what it closes over.
+    """
     for name in PARTS:
         found = getattr(source, name, None)
         yield from found if isinstance(found, list | tuple) else (found,)
@@ -109,7 +117,7 @@ def _held(source: Any) -> Iterator[Any]:
 
 
 def _of_samples(spacing: float, dt: float) -> Iterator[str]:
-    """A record with longer steps than its own."""
+    """Tell of a record with longer steps than its own."""
     if dt > spacing * (1.0 + ROUNDED):
         yield (
             f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose "
@@ -121,7 +129,7 @@ def _of_samples(spacing: float, dt: float) -> Iterator[str]:
 
 
 def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
-    """A sine, or a part of one, with too few steps in its period."""
+    """Tell of a sine, or a part of one, with too few steps in its period."""
     if dt <= period / FEWEST * (1.0 + ROUNDED):
         return
     halves = 2.0 * dt / period
@@ -133,4 +141,7 @@ def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
         if blind
         else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}"
     )
-    yield f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, a twentieth of the period"
+    yield (
+        f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, "
+        "a twentieth of the period"
+    )

@@ -1,5 +1,7 @@
-"""Run the loop over certified steps, with everything that has to happen when it ends, well or
-badly."""
+"""Run the loop over certified steps.
+
+Everything that has to happen when it ends, well or badly, is done here.
+"""
 
 import logging
 import time
@@ -49,21 +51,25 @@ LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compa
 class Comparison(Protocol):
     """Report about a cross-check of routes that accompanies the run (cross_check.CrossChecked)."""
 
-    def report(self) -> Mapping[str, Mapping[str, float]]: ...
+    def report(self) -> Mapping[str, Mapping[str, float]]:
+        """Return, by method, how far its answers were off."""
 
 
 @dataclass
 class Session:
-    """Hold a run under way: what of the arguments of ``simulate`` holds for all of it, and where it
-    is.
+    """Hold a run under way.
+
+    This is what of the arguments of ``simulate`` holds for all of it, and where it is.
 
     Attributes:
-        recorders: the user's, after those of every run. wall_time: when the process has to have
-            ended.
-        table: the rows so far. step_plan: the base steps. place: the end of the last base step.
-        loop: its steps, where others have them too. resumed_from: the step of the checkpoint that
-            it continues, None for a new run. stopped: in words, when the callback has asked for the
-            end.
+        recorders: the user's, after those of every run.
+        wall_time: when the process has to have ended.
+        table: the rows so far.
+        step_plan: the base steps.
+        place: the end of the last base step.
+        loop: its steps, where others have them too.
+        resumed_from: the step of the checkpoint that it continues, None for a new run.
+        stopped: in words, when the callback has asked for the end.
     """
 
     method: Method
@@ -202,8 +208,10 @@ class Session:
                 begin = time.perf_counter()
 
     def _stop_if_asked(self, writer: Writer, signals: StopSignals) -> None:
-        """Interrupted on all ranks, with a checkpoint, by a signal to one, or by the end of the
-        time. Collective."""
+        """Raise Interrupted on all ranks, with a checkpoint, when asked to stop. Collective.
+
+        A signal to one rank asks for it, or the end of the time.
+        """
         number, late = signals.asked(self._comm, self.wall_time.over())
         if not (number or late):
             return
@@ -221,7 +229,9 @@ class Session:
         self, callback: Callable[[State, Report], Any], report: Report, writer: Writer
     ) -> None:
         """Show a step to the callback, which may ask for the end of the run or raise, on one rank.
-        Collective."""
+
+        Collective.
+        """
         state = report.new
         for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
             if array is not None:
@@ -287,8 +297,11 @@ class Session:
     def _rescue(
         self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool
     ) -> None:
-        """Save what there is. A checkpoint of the last base step only on one rank, or where
-        ``all_ranks`` raise the same error: others might not come."""
+        """Save what there is.
+
+        A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the same
+        error: others might not come.
+        """
         # Of any kind: the error that ended the run is the one to tell, and it may keep each of
         # these from working.
         with suppress(Exception):
@@ -322,7 +335,7 @@ class Session:
             )
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
-        """The content of summary.json."""
+        """Return the content of summary.json."""
         return {
             "status": status,
             "reason": reason,
@@ -342,8 +355,10 @@ class Session:
         }
 
     def _seconds_per_linear_step(self) -> float:
-        """Median time of right-hand side, one back-substitution and update with the same A, from
-        the last state [s]."""
+        """Return the median time [s] of a linear step from the last state.
+
+        It takes a right-hand side, one back-substitution and an update with the same A.
+        """
         if (
             self.last is None or not self.last.step.A.factorised
         ):  # none is made for this: it may not fit
@@ -368,8 +383,10 @@ class Session:
 
 
 def _locked(value: T) -> T:
-    """The value with read-only views of its arrays: some of them, such as the gap at rest, belong
-    to the problem."""
+    """Return the value with read-only views of its arrays.
+
+    Some of them, such as the gap at rest, belong to the problem.
+    """
     own: Any = value
     views = {
         one.name: array.view()

@@ -1,5 +1,7 @@
-"""Simulate: march, listen with recorders, and keep everything in a folder that a crash cannot
-spoil."""
+"""Simulate: march, listen with recorders, and keep everything in a folder.
+
+A crash cannot spoil the folder.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -55,16 +57,21 @@ def simulate(
     wall_time: str | None = None,
     callback: Callable[[State, Report], Any] | None = None,
 ) -> Solution:
-    """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank
-    gets the solution.
+    """Compute steps in time until t_end, or so many steps, and record them.
+
+    Collective; every rank gets the solution. After an error all that was computed is in the folder,
+    and summary.json says why the run ended.
 
     Args:
+        problem: what is marched.
         scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
             Zienkiewicz-Wood-Taylor step. A problem that names no mass matrix gets the one of the
             scheme (``run.method.with_defaults``).
         solver: None means Automatic().
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and
             checkpoint_every count base steps.
+        t_end: the time [s] until which is marched; give it or ``steps``.
+        steps: the number of base steps.
         record: recorders; None means (Energy(), Contact()). Time, iterations and certificate are
             always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log,
@@ -72,7 +79,8 @@ def simulate(
             the folder is replaced, unless ``restart``.
         state: the initial state, from a gravity stage for example; None means u0 and v0 of the
             system.
-        escalation, tolerance: see ``march``.
+        escalation: see ``march``.
+        tolerance: see ``march``.
         checkpoint_every: number of base steps between checkpoints.
         restart: True continues the run in ``out`` from its checkpoint; a path continues the run in
             that folder. ``steps`` and ``t_end`` are those of the whole run. The result is that of
@@ -80,8 +88,8 @@ def simulate(
             if problem, dt or scheme differ from the checkpoint.
         changed: True continues even if they differ; after a change of dt, ``steps`` count from the
             checkpoint.
-        progress: show a progress line on a terminal. fields: fem.XDMF(every=10) writes frames for
-            ParaView.
+        progress: show a progress line on a terminal.
+        fields: fem.XDMF(every=10) writes frames for ParaView.
         cross_check: a solver whose report() goes into the summary.
         wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends
             before it is over.
@@ -97,9 +105,8 @@ def simulate(
         Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with
             a checkpoint.
         OutOfTime: before the wall time is over, with a checkpoint.
-        StepFailure: no solver could certify a step. ViContactError: the disk refused to read or
-            write. All that was computed is then in the folder, and summary.json says why the run
-            ended.
+        StepFailure: no solver could certify a step.
+        ViContactError: the disk refused to read or write.
     """
     with opened(**locals()) as (session, writer):
         return session.go(writer)
@@ -129,9 +136,11 @@ def opened(
     others: Sequence[ContactProblem] = (),
     runs: int = 1,
 ) -> Iterator[tuple[Session, Writer]]:
-    """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``:
-    problems that lend their matrices and factors to it, if they are its own. ``runs``: how many
-    take turns. Collective."""
+    """Check the arguments of ``simulate`` and set a run up, in its locked folder.
+
+    ``others``: problems that lend their matrices and factors to it, if they are its own. ``runs``:
+    how many take turns. Collective.
+    """
     check_problem_given("simulate", problem)
     comm = problem.system.algebra.comm
     agree(
@@ -235,8 +244,10 @@ def _check_outputs(
     fields: Any,
     cross_check: Any,
 ) -> None:
-    """InputError for what is no recorder, folder, number of steps, writer of fields or
-    cross-check."""
+    """Raise InputError for outputs that are none.
+
+    This is what is no recorder, folder, number of steps, writer of fields or cross-check.
+    """
     owner = "simulate"
     for one in (
         ()
@@ -270,7 +281,7 @@ def _check_outputs(
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
-    """The folder of the run to continue."""
+    """Return the folder of the run to continue."""
     if isinstance(restart, bool):
         if restart and folder is None:
             raise InputError("restart=True needs the folder of the run: give out")
@@ -285,8 +296,10 @@ def _started(
     state: State,
     resumed: Mapping[str, Any] | None = None,
 ) -> tuple[Columns, Row]:
-    """Start the recorders: their columns, and the row of the state. InputError when two record the
-    same column."""
+    """Start the recorders: their columns, and the row of the state.
+
+    InputError when two record the same column.
+    """
     row: dict[str, Any] = {}
     nothing: Row = {}
     columns: dict[str, tuple[str, str]] = {}
@@ -309,8 +322,11 @@ def _started(
 
 
 def _kinds(record: Any) -> Any:
-    """What is compared over ranks of recorders: kinds, and settings of those of the package, as
-    each rank may hold its part of what is recorded."""
+    """Return what is compared over ranks of recorders.
+
+    This is kinds, and settings of those of the package, as each rank may hold its part of what is
+    recorded.
+    """
     if not isinstance(record, list | tuple):
         return record
     return [
@@ -321,7 +337,9 @@ def _kinds(record: Any) -> Any:
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
     """Put the rows of an earlier run into the table, arrays on rank 0 only; the last of them.
-    Collective."""
+
+    Collective.
+    """
     blocks = stored.blocks()
     last: Row = {}
     while True:

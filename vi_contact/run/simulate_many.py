@@ -1,5 +1,7 @@
-"""Simulate many: several runs of one body at once, each recorded in its own folder as ``simulate``
-does."""
+"""Simulate several runs of one body at once.
+
+Each is recorded in its own folder as ``simulate`` does.
+"""
 
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -24,8 +26,9 @@ Ended = tuple[int, Solution | ViContactError]
 def simulate_many(
     runs: Sequence[Mapping[str, Any]], *, tell: Callable[[float], None] = lambda share: None
 ) -> Iterator[Ended]:
-    """Yield (number of the run, its solution) as the runs end; each is given by the arguments of
-    ``simulate``.
+    """Yield (number of the run, its solution) as the runs end.
+
+    Each is given by the arguments of ``simulate``.
 
     A run that fails yields its error instead, and the others go on; what cannot begin is told
     before the first step. Runs of one body step together, which costs less than one after the
@@ -36,7 +39,8 @@ def simulate_many(
 
     Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as
     ``simulate`` does, when all runs that have begun have written their checkpoints:
-    ``restart=True`` continues them."""
+    ``restart=True`` continues them.
+    """
     every = [
         _arguments(run)
         for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")
@@ -98,7 +102,7 @@ class _Turn:
 
 
 def _in_turn(runs: Sequence[Mapping[str, Any]], tell: Callable[[float], None]) -> Iterator[Ended]:
-    """A base step of every run in turn, until all have ended."""
+    """Make a base step of every run in turn, until all have ended."""
     going: list[_Turn] = []
     stopped: Interrupted | None = None
     with StopSignals(lasting=True) as signals, ExitStack() as stack:

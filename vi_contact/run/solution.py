@@ -36,8 +36,8 @@ class Solution:
             back).
         facts: the contents of summary.json; the times of a step are medians in seconds, nan without
             steps.
-        problem: the solved problem, with the mass matrix that the scheme chose. folder: the run
-            folder, or None.
+        problem: the solved problem, with the mass matrix that the scheme chose.
+        folder: the run folder, or None.
     """
 
     history: Mapping[str, Array]
@@ -55,11 +55,13 @@ class Solution:
         frame: int | None = None,
         continuous: bool = False,
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function,
-        ``fem.as_function`` of the end state.
+        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function.
+
+        It is ``fem.as_function`` of the end state.
 
         With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``.
-        Collective. InputError for a system without a mesh, and without such a frame."""
+        Collective. InputError for a system without a mesh, and without such a frame.
+        """
         if not hasattr(self.problem.system.space, "V"):
             raise InputError(
                 "function: the system has no mesh and so no Functions; use history and state"
@@ -88,8 +90,10 @@ class Solution:
     __repr__ = summary
 
     def plot(self) -> Any:
-        """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger,
-        certificates."""
+        """Return a matplotlib Figure of what was recorded.
+
+        It shows probes, contact force, energy ledger and certificates.
+        """
         return import_module("vi_contact.plots").plot_overview(
             self
         )  # by name: on a floor above, and no run needs it
@@ -112,8 +116,10 @@ class Solution:
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
-    """Return a sentence when the run had more energy than was put in, by more than CREATED of the
-    largest energy."""
+    """Return a sentence when the run had more energy than was put in.
+
+    It is so when the excess is more than CREATED of the largest energy.
+    """
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
     return (

@@ -1,5 +1,6 @@
-"""Find equilibria with contact: the static (gravity) stage where a run starts, and load histories
-without inertia.
+"""Find equilibria with contact.
+
+These are the static (gravity) stage where a run starts, and load histories without inertia.
 
 In a history one stage follows another, as friction makes the equilibrium depend on the way to it.
 Each stage solves the static problem with slips counted from the stage before (slip rate times time
@@ -10,7 +11,8 @@ step, implicit Euler):
 so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed``
 displacements, and obstacles that move. Without friction every stage is the equilibrium of its own
 loads. Slip between stages has no rate, so a law that asks for one is refused: its value at rest
-would be wrong for points in motion wherever it jumps there."""
+would be wrong for points in motion wherever it jumps there.
+"""
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
@@ -45,8 +47,9 @@ def static_equilibrium(
     t: float = 0.0,
     tolerance: float = TOLERANCE,
 ) -> State:
-    """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without
-    excitation.
+    """Return the gravity stage, without excitation.
+
+    It is K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active.
 
     The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic
     stage starts. A body that no prescribed displacement holds is brought to rest on its contacts.
@@ -72,10 +75,12 @@ def static_equilibrium(
 
 
 def _warn_if_open(problem: ContactProblem, state: State) -> None:
-    """Warn, on rank 0, where much of a contact that touches at the start, and is pressed, is open
-    at rest. Collective.
+    """Warn, on rank 0, where much of a contact is open at rest. Collective.
 
-    The place is that of the open point with the lowest number."""
+    It is a contact that touches at the start, and is pressed.
+
+    The place is that of the open point with the lowest number.
+    """
     surface = problem.surface
     touching = surface.gap0 <= TOUCHING * largest(surface.comm, max_abs(surface.points))
     opened = touching & ~state.active
@@ -121,8 +126,10 @@ class Equilibria:
             self._solve = lambda step: certified.solve(step)[0]
 
     def after(self, old: State, t: float) -> State:
-        """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was;
-        its number too."""
+        """Return the equilibrium at time t of a body that rubs and slides, and its number.
+
+        It slides from where ``old`` was.
+        """
         problem = self._problem
         with together(
             problem.surface.comm
@@ -156,8 +163,9 @@ def quasi_static(
     state: State | None = None,
     tolerance: float = TOLERANCE,
 ) -> Iterator[State]:
-    """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k
-    counts stages.
+    """Yield the equilibrium at each of the times, from where the one before left the body.
+
+    v = 0; k counts stages.
 
     A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at
     least a step for every turn, and more where zones of slip grow (small steps follow the path, the
@@ -165,11 +173,13 @@ def quasi_static(
     velocity and acceleration: their C U' + M U'' are loads.
 
     Args:
+        problem: what stands in equilibrium; its loads are taken at the times.
         solver: Automatic() when None.
         times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
         state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t
             = 0 without reactions when None. A body pressed without friction first: the state of
             that problem.
+        tolerance: of the certificate of every answer.
 
     Raises:
         InputError: times that do not increase; friction that depends on the slip rate; loads that
@@ -205,7 +215,7 @@ def quasi_static(
 
 
 def _checked(times: Iterable[float], start: float) -> list[float]:
-    """The times as a list."""
+    """Return the times as a list."""
     if not isinstance(times, Iterable) or isinstance(times, str | bytes):
         raise InputError(f"load steps at {shown(times)}: give times in seconds")
     order = [real(t) for t in times]

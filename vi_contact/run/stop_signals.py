@@ -1,9 +1,11 @@
-"""Note signals that ask a run to end when they come; act on them between two steps, on all ranks
-together.
+"""Note signals that ask a run to end when they come.
+
+They are acted on between two steps, on all ranks together.
 
 Ctrl-C (SIGINT), a scheduler's or container's end of time (SIGTERM), a closed terminal (SIGHUP).
 PETSc has handlers of its own for some of them, which print pages and stop; those of the run come
-after them and win."""
+after them and win.
+"""
 
 import os
 import signal
@@ -24,7 +26,8 @@ class StopSignals:
     A signal that was ignored stays so (nohup, jobs in the background), and so do handlers that the
     caller wrote. A second Ctrl-C ends the process at once. What nobody has acted on in the end is
     sent again, to the old handlers. ``lasting``: for several runs, all of which are told once one
-    has been."""
+    has been.
+    """
 
     def __init__(self, *, lasting: bool = False) -> None:
         self._found, self._lasting, self._late = 0, lasting, False
@@ -47,8 +50,10 @@ class StopSignals:
             signal.signal(number, signal.SIG_DFL)
 
     def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
-        """Return the number of a signal that a rank has got, or 0, and whether time is over for
-        one. Collective."""
+        """Return the number of a signal that a rank has got, or 0. Collective.
+
+        Whether time is over for a rank is returned too.
+        """
         over = over or self._late
         number, late = (
             (self._found, over)

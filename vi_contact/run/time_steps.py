@@ -1,9 +1,11 @@
-"""Plan how long the steps of a run are: a constant dt [s], a ``Schedule``, or steps halved where
-contact closes.
+"""Plan how long the steps of a run are.
+
+This is a constant dt [s], a ``Schedule``, or steps halved where contact closes.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it
 from them (``start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*:
-of the plan, halved or not."""
+of the plan, halved or not.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,12 +27,14 @@ LONGEST = (
 
 @dataclass(frozen=True)
 class Schedule:
-    """Plan pieces (dt [s], until [s]) with steps of dt until that time; the last piece is usually
-    (dt, math.inf).
+    """Plan pieces (dt [s], until [s]) with steps of dt until that time.
+
+    The last piece is usually (dt, math.inf).
 
     A piece ends with the first step that reaches its time, even if the piece is not a whole number
     of steps long. InputError if there are no pieces, if a dt is not positive, or if the times do
-    not increase."""
+    not increase.
+    """
 
     pieces: tuple[tuple[float, float], ...]
 
@@ -57,13 +61,15 @@ class Schedule:
 
 @dataclass(frozen=True)
 class HalvedAtImpact:
-    """Plan steps of ``dt`` [s], or of a Schedule; a step that closes an open contact point is
-    computed again in halves.
+    """Plan steps of ``dt`` [s], or of a Schedule, halved at impacts.
+
+    A step that closes an open contact point is computed again in halves.
 
     The halves may be halved again, down to dt/2**halvings, which resolves the time of an impact.
     Every accepted part is a certified step like any other. At most one matrix is factorised for
     each of the halvings + 1 lengths of a piece. InputError if dt is not positive, or if halvings is
-    not a whole number from 0 to 20."""
+    not a whole number from 0 to 20.
+    """
 
     dt: float | Schedule
     halvings: int = 3
@@ -87,16 +93,21 @@ def described(plan: TimeSteps) -> float | str:
 
 
 def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
-    """Return the pieces (dt, until) of a plan, endless for a constant dt [s]; InputError for no
-    dt."""
+    """Return the pieces (dt, until) of a plan, endless for a constant dt [s].
+
+    Raises:
+        InputError: there is no dt.
+    """
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
     return dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
 
 
 @dataclass(frozen=True)
 class StepPlan:
-    """Hold the base steps of one run: parts (dt, number of steps), and how often each may be
-    halved."""
+    """Hold the base steps of one run.
+
+    These are parts (dt, number of steps), and how often each may be halved.
+    """
 
     parts: tuple[tuple[float, int], ...]
     halvings: int = 0
@@ -121,13 +132,15 @@ class StepPlan:
 
 
 def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> StepPlan:
-    """Return the base steps from t0 to t_end, or so many; InputError when plan, steps or t_end make
-    no sense.
+    """Return the base steps from t0 to t_end, or so many.
+
+    There is an InputError when plan, steps or t_end make no sense.
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a
     restart, which builds it from the same t0, has the same steps. A step shorter than a millionth
     of dt would be round-off of these times, at the end of a piece and of the run alike, and is not
-    made. InputError for more than 1e9 steps."""
+    made. InputError for more than 1e9 steps.
+    """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
     pieces = pieces_of(plan)
     left = _wanted(steps, t_end, t0)
@@ -200,7 +213,11 @@ def _positive(dt: Any) -> float:
 
 
 def _read(check: Callable[..., Any], value: Any, remedy: str, **limits: Any) -> Any:
-    """What the check makes of the value; InputError of this sentence when it refuses."""
+    """Return what the check makes of the value.
+
+    Raises:
+        InputError: says this sentence when the check refuses.
+    """
     try:
         return check("", "", value, **limits)
     except InputError:

@@ -1,10 +1,12 @@
-"""Step several runs with one effective matrix together: vectors are rows (k, n), and matrices are
-read once for all.
+"""Step several runs with one effective matrix together.
+
+Vectors are rows (k, n), and matrices are read once for all.
 
 The scheme steps the rows as it steps one state, and the solver answers them together
 (``solve_many``); certificates, impacts and reports are a run's own. A step that is not answered at
 once with a certificate far below the tolerance is solved alone; who then has to escalate, or fails,
-goes on alone."""
+goes on alone.
+"""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -148,8 +150,10 @@ class Group:
             self.without(leaving)
 
     def _step(self, dt: float) -> list[Together]:
-        """Make a step and hand out its reports; the runs that cannot make it, and then none is
-        made."""
+        """Make a step and hand out its reports, or the runs that cannot make it.
+
+        Where there are such runs none is made.
+        """
         runs, scheme, problem = self._runs, self._scheme, self._problem
         if dt != self._dt:
             states = [
@@ -192,8 +196,10 @@ class Group:
     def _judged(
         self, many: StepProblem, rows: StepResult, parts: dict[str, Any]
     ) -> tuple[StepResult, list[int]]:
-        """The answers as rows, those not good at once found alone; the rows of runs that have to
-        escalate, or fail."""
+        """Return the answers as rows, and the rows of runs that have to escalate, or fail.
+
+        Answers that are not good at once are found alone.
+        """
         steps, results, leaving = parts["step"], parts["result"], []
         certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [
@@ -242,8 +248,10 @@ class Group:
             run.waiting.append((dt, RowReport(parts=parts, row=row)))
 
     def _struck(self, rows: State, free: Each) -> tuple[State, Each]:
-        """The states after the impact law, as rows and one by one: as they are where nothing was
-        struck."""
+        """Return the states after the impact law, as rows and one by one.
+
+        They are as they were where nothing was struck.
+        """
         problem, scheme, old, dt = self._problem, self._scheme, self._states, self._dt
         closed = rows.active & problem.surface.rigid
         if problem.impact is None or not closed.any():

@@ -1,5 +1,7 @@
-"""End a run before its time is over: read a wall time as Slurm does, and say when what is left of
-it gets short."""
+"""End a run before its time is over.
+
+A wall time is read as Slurm does, and it is said when what is left of it gets short.
+"""
 
 import math
 import os
@@ -41,8 +43,10 @@ def seconds_of(wall_time: object) -> float:
 
 
 def age() -> float:
-    """Return the seconds since this process began; where the system does not tell, since this
-    module was imported."""
+    """Return the seconds since this process began.
+
+    Where the system does not tell, it is since this module was imported.
+    """
     return time.monotonic() - _born()
 
 
@@ -57,8 +61,10 @@ def _born() -> float:
 
 
 class WallTime:
-    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time; None:
-    there is no end."""
+    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time.
+
+    None: there is no end.
+    """
 
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
         self.text, self._runs = wall_time, runs

@@ -1,5 +1,7 @@
-"""Hold what schemes share: two families of them, the step in displacements, and what does not suit
-their contact."""
+"""Hold what schemes share.
+
+There are two families of them, the step in displacements, and what does not suit their contact.
+"""
 
 import logging
 
@@ -14,18 +16,24 @@ log = logging.getLogger(__name__)
 
 
 class SingleStep:
-    """Share what one-step schemes have in common: they start by themselves, and velocity jumps do
-    not disturb them."""
+    """Share what one-step schemes have in common.
+
+    They start by themselves, and velocity jumps do not disturb them.
+    """
 
     @property
     def mass(self) -> MassLaw:
-        """Return the consistent mass: contact is an impulse within the step, so contact nodes need
-        their mass."""
+        """Return the consistent mass.
+
+        Contact is an impulse within the step, so contact nodes need their mass.
+        """
         return ConsistentMass()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for unknowns without mass, as contact nodes: their forces would swing
-        for ever."""
+        """Raise InputError for unknowns without mass, as contact nodes.
+
+        Their forces would swing for ever.
+        """
         _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
             raise InputError(
@@ -48,13 +56,17 @@ class BalanceStep:
 
     @property
     def mass(self) -> MassLaw:
-        """Return the redistributed mass: with contact in the balance of forces, mass at its nodes
-        creates energy."""
+        """Return the redistributed mass.
+
+        With contact in the balance of forces, mass at its nodes creates energy.
+        """
         return Redistributed()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes; warn when they have
-        mass."""
+        """Raise InputError for an impact law on massless contact nodes.
+
+        Warn when they have mass.
+        """
         check_balance(repr(self), problem)
 
 
@@ -69,8 +81,10 @@ def position_step(
     guess: Array | None = None,
     active: Mask | None = None,
 ) -> StepProblem:
-    """Return the step A x = b - …, x = u1: gap and slip of the end of the step; by default free
-    flight as the guess."""
+    """Return the step A x = b - …, x = u1.
+
+    Gap and slip are those of the end of the step. By default free flight is the guess.
+    """
     end = state.t + dt
     return StepProblem(
         A=A,
@@ -89,8 +103,10 @@ def position_step(
 
 
 def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
-    """Return the state after the step, with the mean reactions r/scale; what another scheme
-    remembered is forgotten."""
+    """Return the state after the step, with the mean reactions r/scale.
+
+    What another scheme remembered is forgotten.
+    """
     r_t = None if result.r_t is None else result.r_t / step.scale
     return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
@@ -98,8 +114,10 @@ def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
 def means(
     problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array
 ) -> Balance:
-    """Return the equation of a step with mean u and f, mean rates of u and v, and the reactions of
-    the new state."""
+    """Return the equation of a step with means of u, f and the rates of u and v.
+
+    The reactions are those of the new state.
+    """
     v, a = problem.equations.rates(old.u, new.u, old.v, new.v, dt)
     return Balance(u=u, v=v, a=a, f=f, r_n=new.r_n, r_t=new.r_t)
 

@@ -1,10 +1,12 @@
-"""Make initial data consistent: the acceleration that fits them, and equilibrium of unknowns
-without inertia.
+"""Make initial data consistent.
+
+This is the acceleration that fits them, and equilibrium of unknowns without inertia.
 
 What schemes with accelerations start from, also after an impact, fits a displacement and a
 velocity:
 
-    M a + C v + K u = f(t) - B_nᵀ r_n - B_tᵀ r_t,    0 <= r_n  ⊥  -a_n >= 0    on resting points (gap and v_n zero)
+    M a + C v + K u = f(t) - B_nᵀ r_n - B_tᵀ r_t
+    0 <= r_n  ⊥  -a_n >= 0    on resting points (gap and v_n zero)
     |r_t| <= limit(r_n),    r_t along the slip rate v_t + dt a_t
 
 Points that are open, or that move towards or off the obstacle, carry no normal reaction: the one a
@@ -18,7 +20,8 @@ Contact unknowns without inertia are in equilibrium with the body at every time:
 
 Initial data rarely know that. Kept as they are, what is missing in this equation would swing on at
 the contact nodes from step to step for ever, so schemes put it right once, at the start; the energy
-this takes is of the order of the mesh size, and the history starts after it."""
+this takes is of the order of the mesh size, and the history starts after it.
+"""
 
 from dataclasses import replace
 
@@ -39,8 +42,10 @@ ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and v
 def consistent_acceleration(
     problem: ContactProblem, state: State, dt: float
 ) -> tuple[Array, Array]:
-    """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v, owned unknowns of the
-    rotated basis."""
+    """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v.
+
+    They are on the owned unknowns of the rotated basis.
+    """
     system = problem.equations
     force = system.load(state.t) - system.K @ state.u
     if system.C is not None:
@@ -114,11 +119,13 @@ def rigid_part(surface: ContactSurface) -> ContactSurface:
 
 
 def equilibrated(problem: ContactProblem, state: State) -> State:
-    """Return the state with its massless unknowns, if any, in equilibrium, and with the reactions
-    that belong to it.
+    """Return the state with its massless unknowns, if any, in equilibrium.
+
+    It has the reactions that belong to it.
 
     Only their own block of K is factorised, however large the body is; not even that when it is
-    large itself."""
+    large itself.
+    """
     system, layer = problem.equations, problem.equations.massless
     if layer is None:
         return state
@@ -158,7 +165,9 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
 
 
 def massless_take(problem: ContactProblem, given: Array | float, x: Array) -> Array:
-    """Return x with these values on massless unknowns: a mean velocity, without momentum to keep;
-    no acceleration."""
+    """Return x with these values on massless unknowns.
+
+    They take a mean velocity, without momentum to keep, and no acceleration.
+    """
     massless = problem.equations.massless
     return x if massless is None else np.where(massless, given, x)

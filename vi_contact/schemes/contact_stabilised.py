@@ -1,13 +1,16 @@
-"""Step by contact-stabilised Newmark: the predictor is made admissible first, so that contact
-forces do not ring.
+"""Step by contact-stabilised Newmark.
+
+The predictor is made admissible first, so that contact forces do not ring.
 
     u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0  (= on bilateral rows)
-    M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t],    gap(u1) >= 0
-    v1 = v0 + 2/dt (u1 - u_p),    0 <= r̄_n  ⊥  gap(u1),    |r̄_t| <= limit(r̄_n) along the slip B_t (u1 - u0)
+    M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t]
+    v1 = v0 + 2/dt (u1 - u_p)
+    gap(u1) >= 0,    0 <= r̄_n  ⊥  gap(u1),    |r̄_t| <= limit(r̄_n) along the slip B_t (u1 - u0)
 
-In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 f,  scale = 2, guess u_p. The impulse
-that projects the predictor moves contact nodes to the obstacle and leaves their velocity alone: r̄ is what the body
-presses with, not what stops the mass of the contact nodes. They keep the velocity of their approach till they open.
+In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 f,  scale = 2,
+guess u_p. The impulse that projects the predictor moves contact nodes to the obstacle and leaves
+their velocity alone: r̄ is what the body presses with, not what stops the mass of the contact nodes.
+They keep the velocity of their approach till they open.
 
 Order 2 without contact (the midpoint rule); unconditionally stable. Energy, q [N s²] the
 projection's multipliers:
@@ -22,7 +25,8 @@ would have no sign.
 and SS22(½, ½).
 
 Sources: Deuflhard, Krause and Ertel, Int. J. Numer. Meth. Engng 73 (2008) 1274-1290; Kane, Repetto,
-Ortiz and Marsden, Comput. Methods Appl. Mech. Engng 180 (1999) 1-26."""
+Ortiz and Marsden, Comput. Methods Appl. Mech. Engng 180 (1999) 1-26.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -42,8 +46,11 @@ from .consistent_data import mass_matrix, rigid_part
 
 @dataclass(frozen=True)
 class ContactStabilisedNewmark(SingleStep):
-    """Step by the module's equations. They need mass at contact nodes. ``projected``: whether the
-    predictor is projected. StepFailure when the projection cannot be certified."""
+    """Step by the module's equations.
+
+    They need mass at contact nodes. ``projected``: whether the predictor is projected. StepFailure
+    when the projection cannot be certified.
+    """
 
     projected: bool = True
 
@@ -100,15 +107,17 @@ class ContactStabilisedNewmark(SingleStep):
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
-    """Return (u_p, the points that stopped it) for a predicted displacement ``u`` of the step of dt
-    after ``state``.
+    """Return (u_p, the points that stopped it) for a predicted displacement ``u``.
+
+    The step is that of dt after ``state``.
 
         M w = -B_nᵀ q,    0 <= q  ⊥  gap0 - B_n u - B_n w >= 0,    u_p = u + w
 
     The same small problem as a step with A = M, solved in the increment w, so that nothing is
     rounded where nothing is in the way. Springs give way: their points are not projected. Normal
     directions only; friction has no part in it. StepFailure when the projection cannot be
-    certified."""
+    certified.
+    """
     surface, system, rigid = problem.surface, problem.equations, problem.surface.rigid
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)

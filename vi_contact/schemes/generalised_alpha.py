@@ -5,8 +5,11 @@
     a_m = (1 - alpha_m) a1 + alpha_m a0,    (u, v, r_n, r_t)_f = (1 - alpha_f) (…)1 + alpha_f (…)0
     0 <= r_n1  ⊥  gap0 - B_n u1 >= 0,    |r_t1| <= limit(r_n1) along B_t (u1 - u0)
 
-Divided by 1 - alpha_f, in x = u1:  A = (1 - alpha_m)/((1 - alpha_f) beta dt²) M + gamma/(beta dt) C + K,  scale = 1,
-r the reaction at the end of the step.
+Divided by 1 - alpha_f, in x = u1:
+
+    A = (1 - alpha_m)/((1 - alpha_f) beta dt²) M + gamma/(beta dt) C + K,  scale = 1
+
+with r the reaction at the end of the step.
 
 Order 2 at gamma = ½ - alpha_m + alpha_f, else 1. Unconditionally stable for alpha_m <= alpha_f <=
 ½, gamma >= ½ - alpha_m + alpha_f and beta >= gamma/2, all that is accepted.
@@ -22,7 +25,8 @@ creates energy when it opens. Unless rho_inf is near 0 the damping does not make
 wave crosses many elements in a step, nor on consistent mass where dt resolves the highest frequency
 of the mesh: docs/guide/schemes.md has numbers. Impulses: sum of dt r_n,f over a contact with free
 flight before and after is the change of momentum; in single steps it is not, unless the member is
-Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375."""
+Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
+"""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -42,24 +46,30 @@ SLACK = 1e-12  # round-off in the conditions of stability
 
 
 class AlphaStep(BalanceStep, ABC):
-    """Step by the module's equations, with the weights of a member. Its memory is "a" (the
-    acceleration), "reaction" (Bᵀr at the same end) and "of" (alpha_m, alpha_f and t they belong
-    to)."""
+    """Step by the module's equations, with the weights of a member.
+
+    Its memory is "a" (the acceleration), "reaction" (Bᵀr at the same end) and "of" (alpha_m,
+    alpha_f and t they belong to).
+    """
 
     by_rows: ClassVar[bool] = True
 
     @property
     @abstractmethod
     def weights(self) -> "GeneralisedAlpha":
-        """Return the member of generalised-alpha that it is, with alpha_m, alpha_f, beta and
-        gamma."""
+        """Return the member of generalised-alpha that it is.
+
+        It tells alpha_m, alpha_f, beta and gamma.
+        """
 
     def _mark(self, t: float) -> Array:
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with massless nodes in equilibrium and its acceleration; not on restarts
-        or a new dt."""
+        """Return the state with massless nodes in equilibrium and its acceleration.
+
+        This is not done on restarts or a new dt.
+        """
         if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
             return state
         return self._restarted(problem, equilibrated(problem, state), dt)
@@ -87,8 +97,10 @@ class AlphaStep(BalanceStep, ABC):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 -
-        alpha_f) at u1 = 0."""
+        """Return the step with b of the equation at u1 = 0.
+
+        b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f).
+        """
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
         mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
@@ -111,8 +123,10 @@ class AlphaStep(BalanceStep, ABC):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with a1 and v1 from u1; massless unknowns get none and the mean velocity
-        of the step."""
+        """Return the state with a1 and v1 from u1.
+
+        Massless unknowns get no acceleration and the mean velocity of the step.
+        """
         w = self.weights
         v, a = self._known(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
@@ -134,8 +148,10 @@ class AlphaStep(BalanceStep, ABC):
 def weighted(
     problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = ""
 ) -> Balance:
-    """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else; ``level``: of
-    names in memory."""
+    """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else.
+
+    ``level`` is that of names in memory.
+    """
     load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
     return Balance(
         u=(1.0 - f) * new.u + f * old.u,
@@ -149,8 +165,10 @@ def weighted(
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(AlphaStep):
-    """Step by the module's equations. Take ``GeneralisedAlpha.spectral_radius(rho_inf)``.
-    InputError unless stable."""
+    """Step by the module's equations.
+
+    Take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable.
+    """
 
     alpha_m: float
     alpha_f: float
@@ -181,8 +199,10 @@ class GeneralisedAlpha(AlphaStep):
 
     @classmethod
     def spectral_radius(cls, rho_inf: float = 0.8) -> "GeneralisedAlpha":
-        """Return the member of order 2 with this amplification at infinite frequency, 0 (all
-        damped) to 1 (none)."""
+        """Return the member of order 2 with this amplification at infinite frequency.
+
+        It goes from 0 (all damped) to 1 (none).
+        """
         remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
         between("rho_inf", rho_inf, 0.0, 1.0, remedy)
         alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)

@@ -1,15 +1,19 @@
-"""Step by the method of Hilber, Hughes and Taylor: Newmark's, with the forces but not the inertia
-before its end.
+"""Step by the method of Hilber, Hughes and Taylor.
 
-    M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f,    (…)_f = (1 + alpha) (…)1 - alpha (…)0
-    beta = ¼ (1 - alpha)²,    gamma = ½ - alpha;    contact and friction conditions at the end of the step
+It is Newmark's, with the forces but not the inertia before its end.
+
+    M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f
+    (…)_f = (1 + alpha) (…)1 - alpha (…)0
+    beta = ¼ (1 - alpha)²,    gamma = ½ - alpha
+    contact and friction conditions at the end of the step
 
 Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy and
 impulses). Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification (1 + alpha)/(1 -
 alpha) at infinite frequency: 1 at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3. On massless
 contact nodes contact creates energy when a wave crosses many elements in a step, and the damping
 does not keep it in bounds; on consistent mass also when dt resolves the mesh: docs/guide/schemes.md
-has numbers. Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292."""
+has numbers. Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,5 +1,6 @@
-"""Step by Houbolt's method: velocity and acceleration at the end from the cubic through four
-displacements.
+"""Step by Houbolt's method.
+
+Velocity and acceleration at the end are those of the cubic through four displacements.
 
     dt v1  = 11/6 u1 - 3 u0 + 3/2 u(-1) - 1/3 u(-2)
     dt² a1 = 2 u1 - 5 u0 + 4 u(-1) - u(-2)
@@ -15,7 +16,8 @@ Energy: the ledger closes with the means of both ends; the damping is its algori
 stands in the balance of forces, but what it creates at high frequencies is damped away at once:
 docs/guide/schemes.md has numbers. Impulses: those over a contact with free flight before and after
 are the change of momentum; in single steps not. Source: Houbolt, J. Aeronaut. Sci. 17 (1950)
-540-550; as a member of eqs. 11a,b: docs/reference/sources.md [1]."""
+540-550; as a member of eqs. 11a,b: docs/reference/sources.md [1].
+"""
 
 from dataclasses import dataclass, field
 

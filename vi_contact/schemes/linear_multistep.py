@@ -1,5 +1,6 @@
-"""Step with the general linear multistep operators of the boundary method, eqs. 11a,b, with Newmark
-as one member.
+"""Step with the general linear multistep operators of the boundary method.
+
+They are eqs. 11a,b, with Newmark as one member.
 
     sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
     sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
@@ -7,7 +8,8 @@ as one member.
 Solved for the newest velocity and acceleration and put into M u'' + C u' + K u = f - B_nᵀ r_n -
 B_tᵀ r_t at t_p:
 
-    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1,   |r_t| <= limit(r_n) along B_t du
+    A = gamma[0]/(mu dt² b[0]) M + a[0]/(dt b[0]) C + K,   x = u(p),   scale = 1
+    |r_t| <= limit(r_n) along B_t du
 
 (The text prints -A u on the right of the semi-discrete equation; with A > 0 the sign is +.) Start,
 and restart after every velocity jump or change of dt: the past is filled in with constant
@@ -18,7 +20,8 @@ off what the impact law has just stopped. A change of dt keeps both. Unknowns wi
 (mass.Redistributed) have no acceleration and the mean velocity of the step. Energy: the ledger
 closes with the means of both ends. Unlike the midpoint form, contact in the acceleration balance at
 t_p can *gain* energy on consistent mass, booked as algorithmic or contact loss of negative sign.
-Impulses: those over a contact with free flight before and after are the change of momentum."""
+Impulses: those over a contact with free flight before and after are the change of momentum.
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -40,11 +43,13 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 @dataclass(frozen=True)
 class LinearMultistep(BalanceStep):
-    """Step with the coefficients of a linear multistep method, newest level first, all of one
-    length q + 1 >= 2.
+    """Step with the coefficients of a linear multistep method.
+
+    The newest level is first; all are of one length q + 1 >= 2.
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u =
-    1, t and t²)."""
+    1, t and t²).
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -94,8 +99,11 @@ class LinearMultistep(BalanceStep):
             )
 
     def spectral_radius(self) -> float:
-        """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over
-        FREQUENCIES w dt and DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
+        """Return the largest |z| of the solutions u(p) = z^p over FREQUENCIES and DAMPING.
+
+        The solutions are those of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and DAMPING xi:
+        roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z).
+        """
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         polynomials = [b] + [
             gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING
@@ -121,8 +129,10 @@ class LinearMultistep(BalanceStep):
         return self.a[0] / (dt * self.b[0]), self.gamma[0] / (self.mu * dt**2 * self.b[0])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with a past, unless it has one for this dt; massless nodes come into
-        equilibrium, once."""
+        """Return the state with a past, unless it has one for this dt.
+
+        Massless nodes come into equilibrium, once.
+        """
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
             return self._restarted(problem, equilibrated(problem, state), dt)
@@ -188,8 +198,10 @@ class LinearMultistep(BalanceStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one
-        down."""
+        """Return the state with velocity and acceleration from eqs. 11c,d.
+
+        The levels move one down.
+        """
         levels = self._levels(state)
         (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
         v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
@@ -206,6 +218,8 @@ class LinearMultistep(BalanceStep):
         )
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the mean of the equations of motion at both ends of the step, the old end after
-        its impact."""
+        """Return the mean of the equations of motion at both ends of the step.
+
+        The old end is that after its impact.
+        """
         return weighted(problem, old, new, 0.5, 0.5, "_0")

@@ -1,13 +1,15 @@
 """Step by Moreau and Jean's method: contact and impact are impulses on velocities.
 
     v_θ = (1 - theta) v0 + theta v1,    u1 = u0 + dt v_θ
-    M (v1 - v0) + dt C v_θ + dt K ((1 - theta) u0 + theta u1) = dt ((1 - theta) f0 + theta f1) - B_nᵀ P_n - B_tᵀ P_t
+    M (v1 - v0) + dt C v_θ + dt K ((1 - theta) u0 + theta u1)
+        = dt ((1 - theta) f0 + theta f1) - B_nᵀ P_n - B_tᵀ P_t
     0 <= P_n  ⊥  -e B_n v0 - B_n v1 >= 0   where gap(u0 + ½ dt v0) <= 0,    P_n = 0 elsewhere
     |P_t| <= limit(P_n) along the tangential velocity B_t v1;    B_n v1 = 0 on bilateral points
 
-In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed points and +inf elsewhere,  r = P [N s],
-scale = dt; the state keeps the mean reactions P/dt, and its active points are those that carry an impulse. Restitution
-is a law for nodes: on a fine mesh it has no macroscopic effect. Order 2 without contact at theta = ½, else 1.
+In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed points and +inf
+elsewhere,  r = P [N s],  scale = dt; the state keeps the mean reactions P/dt, and its active points
+are those that carry an impulse. Restitution is a law for nodes: on a fine mesh it has no
+macroscopic effect. Order 2 without contact at theta = ½, else 1.
 
 Energy:  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)
 
@@ -24,7 +26,8 @@ of approach, and what it has passed by then stays while contact lasts (e = 0): a
 
 Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods
 Appl. Mech. Engng 177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound
-of separating points is ours."""
+of separating points is ours.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -79,8 +82,10 @@ class MoreauJean(SingleStep):
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point
-        with a gap."""
+        """Raise InputError for what does not suit the scheme.
+
+        This is massless contact nodes, springs, an impact law, or a bilateral point with a gap.
+        """
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
@@ -112,8 +117,10 @@ class MoreauJean(SingleStep):
         return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
 
     def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Largest normal velocity after the step of a closed point; all refer to the velocity of
-        the obstacle."""
+        """Return the largest normal velocity after the step of a closed point.
+
+        All refer to the velocity of the obstacle.
+        """
         surface, advance = problem.surface, problem.surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt
         v_n = surface.normal_values(state.v) - obstacle
@@ -125,8 +132,10 @@ class MoreauJean(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta)
-        C v0)."""
+        """Return the step in x = v1.
+
+        b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0).
+        """
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.product("K", state.u)
         force -= self.theta * left * dt * system.product("K", state.v)

@@ -1,5 +1,6 @@
-"""Step by Newmark's method: the equation of motion, with contact in it, holds at the end of the
-step.
+"""Step by Newmark's method.
+
+The equation of motion, with contact in it, holds at the end of the step.
 
     u1 = u0 + dt v0 + dt² ((½ - beta) a0 + beta a1),    v1 = v0 + dt ((1 - gamma) a0 + gamma a1)
     M a1 + C v1 + K u1 = f1 - B_nᵀ r_n1 - B_tᵀ r_t1
@@ -19,7 +20,8 @@ At (¼, ½) without contact E is constant. With rigid contact its work is ½ (r_
 consistent mass a gain whenever a contact opens; on redistributed mass of order dt, and then
 Newmark(¼, ½) is Trapezoidal(). Impulses: dt times the reactions (…)_gamma are the change of
 momentum in every step; the ledger uses these means. Source: Newmark, J. Eng. Mech. Div. ASCE 85
-(1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195 (2006) 6110-6124."""
+(1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195 (2006) 6110-6124.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,6 +47,8 @@ class Newmark(AlphaStep):
         return GeneralisedAlpha(0.0, 0.0, self.beta, self.gamma)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equations of both ends, with the weights that make M a the change of
-        momentum."""
+        """Return the equations of both ends.
+
+        Their weights make M a the change of momentum.
+        """
         return weighted(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)

@@ -1,14 +1,19 @@
-"""Step by SS22, the single-step form of the Zienkiewicz-Wood-Taylor method with two weights theta1,
-theta2.
+"""Step by SS22, a form of the Zienkiewicz-Wood-Taylor method.
 
-    u(tau) = u0 + v0 tau + ½ alpha tau²,  weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
-    (M + theta1 dt C + ½ theta2 dt² K) alpha = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n - B_tᵀ r̄_t
+It is the single-step form with two weights theta1, theta2.
+
+    u(tau) = u0 + v0 tau + ½ alpha tau²
+    weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
+    (M + theta1 dt C + ½ theta2 dt² K) alpha
+        = f(t0 + theta1 dt) - C v0 - K (u0 + theta1 dt v0) - B_nᵀ r̄_n - B_tᵀ r̄_t
     u1 = u0 + dt v0 + ½ dt² alpha,   v1 = v0 + dt alpha,   gap(u1) >= 0
 
 In x = u1:  A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K,  scale = 1/theta2.
-Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for theta2 >= theta1 >= ½,
-order 2 at theta1 = ½. Energy: as the midpoint rule at theta1 = theta2 = ½; dissipates for theta1 > ½.
-Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2]."""
+Same amplification as Newmark(beta = theta2/2, gamma = theta1): unconditionally stable for
+theta2 >= theta1 >= ½, order 2 at theta1 = ½. Energy: as the midpoint rule at theta1 = theta2 = ½;
+dissipates for theta1 > ½.
+Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2].
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -25,8 +30,10 @@ from .base import SingleStep, means, position_step, stepped
 
 @dataclass(frozen=True)
 class SS22(SingleStep):
-    """Step by the module's equations. InputError unless theta2 >= theta1 >= ½ (else only
-    conditionally stable)."""
+    """Step by the module's equations.
+
+    InputError unless theta2 >= theta1 >= ½ (else only conditionally stable).
+    """
 
     by_rows: ClassVar[bool] = True
 

@@ -1,17 +1,20 @@
 """Step by the trapezoidal rule on redistributed mass: the default for dynamic contact.
 
     (u1 - u0)/dt = ½ (v0 + v1)
-    M (v1 - v0)/dt + C (u1 - u0)/dt + ½ K (u0 + u1) = ½ (f0 + f1) - ½ B_nᵀ(r0 + r1) - ½ B_tᵀ(r0 + r1)
+    M (v1 - v0)/dt + C (u1 - u0)/dt + ½ K (u0 + u1)
+        = ½ (f0 + f1) - ½ B_nᵀ(r0 + r1) - ½ B_tᵀ(r0 + r1)
     0 <= r1_n  ⊥  gap0 - B_n u1 >= 0,    |r1_t| <= limit(r1_n) along B_t (u1 - u0)
 
-In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - K u0 + f0 + f1 - Bᵀr0,  scale = 1, r the
-reaction at the end. M has no inertia at contact nodes (mass.Redistributed): they are in equilibrium at both ends.
+In x = u1:  A = 4/dt² M + 2/dt C + K,
+b = 4/dt² M (u0 + dt v0) + 2/dt C u0 - K u0 + f0 + f1 - Bᵀr0,  scale = 1, r the reaction at the end.
+M has no inertia at contact nodes (mass.Redistributed): they are in equilibrium at both ends.
 
 Order 2 while nothing opens or closes; unconditionally stable. Energy: changes by work of loads and
 damping and by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event:
 quasi-conservative, contact forces do not ring. On consistent mass this is Newmark(¼, ½), which
 gains energy in every impact; it runs there with a warning. Source: Khenous, Laborde and Renard,
-Eur. J. Mech. A 27 (2008) 918-932."""
+Eur. J. Mech. A 27 (2008) 918-932.
+"""
 
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -29,8 +32,11 @@ from .consistent_data import equilibrated, massless_take
 
 @dataclass(frozen=True)
 class Trapezoidal:
-    """Step by the module's equations. ``mass``: the mass matrix for problems that do not name
-    one."""
+    """Step by the module's equations.
+
+    ``mass``: the mass matrix for problems that do not name
+    one.
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -41,8 +47,11 @@ class Trapezoidal:
         provides("Trapezoidal", "mass", self.mass, ("apply",), remedy, lacks=("target",))
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes, and a mass of its own
-        beside that of the problem; warn when contact nodes have mass."""
+        """Raise InputError for an impact law on massless contact nodes.
+
+        So it does for a mass of its own beside that of the problem. Warn when contact nodes have
+        mass.
+        """
         if self.mass not in (Redistributed(), problem.mass):
             raise InputError(
                 f"Trapezoidal: mass={self.mass} is not read, as the problem has "
@@ -52,8 +61,10 @@ class Trapezoidal:
         check_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with massless nodes in equilibrium; once, not on restarts and changes of
-        dt."""
+        """Return the state with massless nodes in equilibrium.
+
+        This is done once, not on restarts and changes of dt.
+        """
         if "force" in state.memory:
             return state
         return self._with_force(problem, equilibrated(problem, state))
@@ -94,8 +105,10 @@ class Trapezoidal:
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity
-        of the step."""
+        """Return the state with v1 = 2 (u1 - u0)/dt - v0.
+
+        Massless unknowns get the mean velocity of the step.
+        """
         mean = (result.x - state.u) / dt
         v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)
         return self._with_force(problem, stepped(step, result, result.x, v))

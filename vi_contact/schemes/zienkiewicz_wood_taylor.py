@@ -1,12 +1,15 @@
-"""Step as Zienkiewicz, Wood and Taylor do: displacement and velocity are interpolated
-independently.
+"""Step as Zienkiewicz, Wood and Taylor do.
+
+Displacement and velocity are interpolated independently.
 
 Linear u and v over the step, weighted residual with weight phi (docs/reference/sources.md [2]):
 
     (u1 - u0)/dt = (1 - phi) v0 + phi v1
-    M (v1 - v0)/dt + C (u1 - u0)/dt + K ((1 - phi) u0 + phi u1) = f(t0 + phi dt) - B_nᵀ r̄_n,    gap(u1) >= 0
+    M (v1 - v0)/dt + C (u1 - u0)/dt + K ((1 - phi) u0 + phi u1) = f(t0 + phi dt) - B_nᵀ r̄_n
+    gap(u1) >= 0
 
-In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi, r_n = r̄_n/phi (phi = ½: as the boundary method has it).
+In x = u1:  A = M/(phi dt)² + C/(phi dt) + K,  scale = 1/phi, r_n = r̄_n/phi (phi = ½: as the
+boundary method has it).
 
 Order 2 at phi = ½, else 1; unconditionally stable for phi >= ½. Energy at phi = ½: it changes only
 by work of loads, damping and contact, and contact with gap >= 0 at the end of the step never
@@ -26,8 +29,10 @@ from .base import SingleStep, means, position_step, stepped
 
 @dataclass(frozen=True)
 class ZienkiewiczWoodTaylor(SingleStep):
-    """Step by the module's equations. ``phi`` in [½, 1]: InputError below ½, where the step is
-    unstable."""
+    """Step by the module's equations.
+
+    ``phi`` in [½, 1]: InputError below ½, where the step is unstable.
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -54,8 +59,10 @@ class ZienkiewiczWoodTaylor(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi
-        K u0."""
+        """Return the step in x = u1.
+
+        b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0.
+        """
         system, phi = problem.equations, self.phi
         b = self._load(problem, state, dt) / phi
         b += (system.product("M", state.u) + dt * system.product("M", state.v)) / (phi * dt) ** 2

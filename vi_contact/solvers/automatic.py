@@ -1,10 +1,12 @@
-"""Choose the route by the size of the problem: condensed where it is faster, iterative where it is
-not.
+"""Choose the route by the size of the problem.
+
+It is condensed where that is faster, iterative where it is not.
 
 Condensing costs one factor of A, once per dt, and a step then one forward and one backward
 substitution; the iterative route costs some tens of products with A every step, and next to nothing
 before. In the plane factors stay sparse, in space they do not; with friction the small dense
-problem grows faster still. What the rule was measured on is in docs/guide/solvers.md."""
+problem grows faster still. What the rule was measured on is in docs/guide/solvers.md.
+"""
 
 import logging
 from collections.abc import Callable
@@ -37,14 +39,16 @@ TOLERANCE = (
 
 @dataclass(frozen=True)
 class Automatic:
-    """Solve by ``condensed`` or by ``iterative``: the one that is faster for the size of the
-    problem.
+    """Solve by ``condensed`` or by ``iterative``.
+
+    It is the one that is faster for the size of the problem.
 
     ``iterative`` solves problems in space from 50 000 unknowns on (20 000 on several ranks, or
     without CHOLMOD), and problems with more contact points (with friction: contact unknowns) than
     4000 in space or 5000 in the plane. ``condensed`` solves all others, and all problems without
     finite elements. The log says which one is used. If ``iterative`` is None, it is Iterative(),
-    which needs PETSc."""
+    which needs PETSc.
+    """
 
     condensed: Solver = field(default_factory=Condensed)
     iterative: Solver | None = None
@@ -114,12 +118,14 @@ class Chosen:
 
 
 def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
-    """Return what solves the contact problems that schemes pose beside the steps, at the start or
-    of a predictor.
+    """Return what solves the contact problems that schemes pose beside the steps.
+
+    These are posed at the start or of a predictor.
 
     Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which
     factorise nothing: these matrices, of mass or of a layer of nodes, are well-conditioned.
-    Volume() for systems that are not symmetric. Collective."""
+    Volume() for systems that are not symmetric. Collective.
+    """
     if not A.algebra.symmetric:
         from .volume import Volume
 

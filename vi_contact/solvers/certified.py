@@ -1,9 +1,11 @@
-"""Certify or refuse steps: a solver, the methods to escalate to, and the certificate of every
-answer.
+"""Certify or refuse steps.
+
+There are a solver, the methods to escalate to, and the certificate of every answer.
 
 An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets
 bodies of very unlike stiffness, is corrected by what it leaves over (``correction``) before it is
-judged."""
+judged.
+"""
 
 from collections.abc import Sequence
 
@@ -31,8 +33,10 @@ ADVICE = "try a smaller dt or another solver, or check the data of this time"
 
 
 class CertifiedSolver:
-    """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing
-    uncertified leaves it."""
+    """Try a solver and the methods to escalate to, all bound to one effective matrix.
+
+    Nothing uncertified leaves it.
+    """
 
     def __init__(
         self,
@@ -65,15 +69,18 @@ class CertifiedSolver:
         return self._get(0)
 
     def _get(self, rank: int) -> PreparedSolver:
-        """The solver of that rank of escalation, prepared when first needed."""
+        """Return the solver of that rank of escalation, prepared when first needed."""
         if rank not in self._prepared:
             prepare = stage("preparing")(self._solvers[rank].prepare)
             self._prepared[rank] = prepare(self._A, self._surface, self._scale)
         return self._prepared[rank]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
-        """Return (result, certificate, escalated) of the first method below tolerance; StepFailure
-        if there is none."""
+        """Return (result, certificate, escalated) of the first method below tolerance.
+
+        Raises:
+            StepFailure: there is none.
+        """
         refuse_nan(step, lambda: self._problem.equations)
         tried = []
         for rank in range(len(self._solvers)):
@@ -98,8 +105,11 @@ class CertifiedSolver:
 
 
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
-    """Raise InputError for friction without a tangential direction, or of a wrong number of values,
-    and for matrices that are not symmetric unless the owner solves with them. Collective."""
+    """Raise InputError for laws that do not fit.
+
+    This is for friction without a tangential direction, or of a wrong number of values, and for
+    matrices that are not symmetric unless the owner solves with them. Collective.
+    """
     surface, law = problem.surface, problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(

@@ -1,12 +1,15 @@
-"""Eliminate everything but the contact unknowns: the condensed route (docs/reference/sources.md
-[1], sections 3, 4).
+"""Eliminate everything but the contact unknowns.
+
+This is the condensed route (docs/reference/sources.md [1], sections 3, 4).
 
 With the one factorisation of A and the unit vectors E of the normal unknowns:
 
     x_free = A⁻¹ b                     the unilateral constraints ignored (problem 34)
-    G = EᵀA⁻¹E (+ compliance/scale)    Delassus operator, the flexibility b~ of eq. 39; G⁻¹ is the matrix D~ of eq. 49
+    G = EᵀA⁻¹E (+ compliance/scale)    Delassus operator, the flexibility b~ of eq. 39; G⁻¹ is the
+                                       matrix D~ of eq. 49
     q = bound - Eᵀx_free               gap that is left; z~ = D~ Eᵀx_free in eq. 49
-    0 <= r ⊥ q + G r >= 0              the small problem: eq. 42 in r, eqs. 46, 49 in the displacements
+    0 <= r ⊥ q + G r >= 0              the small problem: eq. 42 in r, eqs. 46, 49 in the
+                                       displacements
     x = A⁻¹ (b - E r)
 
 A step costs one forward and one backward substitution and the small problem, whatever the number of
@@ -43,17 +46,20 @@ class SmallMethod(Protocol):
     """Solve the small problem without friction: ActiveSet, Hildreth or Lemke."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
-        """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral``
-        (m,).
+        """Check G (m, m) and factor or scale it, once for many right-hand sides.
+
+        ``bilateral`` (m,) says which rows are bilateral.
 
         What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and
-        ``guess`` (m,)."""
+        ``guess`` (m,).
+        """
 
 
 @dataclass(frozen=True)
 class Condensed:
-    """Condense each step onto its contact unknowns and solve this smaller problem, on any number of
-    ranks.
+    """Condense each step onto its contact unknowns and solve this smaller problem.
+
+    It does so on any number of ranks.
 
     ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves
     it with friction: FrictionNewton, NSGS, FixedPoint or GivenForces. ``rates`` is the iteration
@@ -79,9 +85,12 @@ class Condensed:
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of
-        values, for more contact unknowns than a dense matrix suits, and matrices that are not
-        symmetric unless the methods take them."""
+        """Raise InputError for what the route cannot treat.
+
+        This is friction without a tangential direction, or of a wrong number of values, more
+        contact unknowns than a dense matrix suits, and matrices that are not symmetric unless the
+        methods take them.
+        """
         surface = problem.surface
         if problem.frictional:
             refuse_dense(
@@ -100,8 +109,10 @@ class Condensed:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedCondensed":
-        """Return what condenses A at its first step, which tells of friction. InputError for too
-        many conditions."""
+        """Return what condenses A at its first step, which tells of friction.
+
+        InputError for too many conditions.
+        """
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 
@@ -129,7 +140,7 @@ class PreparedCondensed:
 
     @stage("condensing")
     def _condensed(self, *, frictional: bool) -> Condensation:
-        """A condensed, with the compliance of the support in its flexibility."""
+        """Return A condensed, with the compliance of the support in its flexibility."""
         made, surface = condense(self._A, self._surface, frictional=frictional), self._surface
         extra = surface.everywhere(surface.compliance) / self._scale
         normal = np.arange(surface.total) * (len(made.there) // max(surface.total, 1))
@@ -169,9 +180,11 @@ class PreparedCondensed:
         )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
-        """Return the answers to the steps that are rows of ``many``; ``own`` makes one. None where
-        this cannot be: on several ranks, without contact unknowns last in the factor, and with
-        other methods than ActiveSet."""
+        """Return the answers to the steps that are rows of ``many``; ``own`` makes one.
+
+        None where this cannot be: on several ranks, without contact unknowns last in the factor,
+        and with other methods than ActiveSet.
+        """
         surface, rubs = self._surface, many.slip0 is not None and self._surface.total > 0
         condensed, small = (self.friction.condensed, None) if rubs else self._normal
         if surface.comm.size > 1 or not isinstance(condensed, Last):

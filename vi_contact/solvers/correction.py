@@ -1,17 +1,21 @@
-"""Correct residuals: what an answer leaves over is a step of its own, small, and solved by the same
-solver.
+"""Correct residuals.
+
+What an answer leaves over is a step of its own, small, and solved by the same solver.
 
 The answer (x0, r0) stays, but for a share s of its reactions. The contract of ``step.py`` for d = x
 - x0 and q = r - (1 - s) r0 is the contract again, because reactions that obey the laws form a cone
 at every point:
 
-    A d = (b - A x0 - (1 - s) Bᵀr0) - Bᵀq,    |q_t| <= s cohesion + slope q_n, along the slip B_t d - (slip0 - B_t x0)
-    0 <= q_n  ⊥  (bound - B_n x0 + (1 - s) compliance r0_n / scale) - B_n d + compliance q_n / scale >= 0
+    A d = (b - A x0 - (1 - s) Bᵀr0) - Bᵀq
+    |q_t| <= s cohesion + slope q_n, along the slip B_t d - (slip0 - B_t x0)
+    0 <= q_n  ⊥  (bound - B_n x0 + (1 - s) compliance r0_n / scale)
+                 - B_n d + compliance q_n / scale >= 0
 
 Its solution is that of the step, exactly, whatever s is, as long as no reaction falls by more than
 its share: q_n >= 0 leaves r_n >= (1 - s) r0_n. But a solver passes through numbers as large as
 A⁻¹Bᵀq, and their round-off is now s times what it was. Where a stiff body rests on a soft one, or
-on nothing but contact, A⁻¹Bᵀr is millions of times x."""
+on nothing but contact, A⁻¹Bᵀr is millions of times x.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -56,8 +60,10 @@ class Share:
 
 
 def share_of(residual: float) -> float:
-    """Return the share of reactions that an answer with this residual gives back, a power of two:
-    it loses no digit."""
+    """Return the share of reactions that an answer with this residual gives back.
+
+    It is a power of two, so that no digit is lost.
+    """
     return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
 
 
@@ -93,8 +99,11 @@ def added(step: StepProblem, answer: StepResult, found: StepResult, share: float
 
 
 def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
-    """Return 1 - s times the reactions, those outside the cone, or no farther than s from its edge,
-    on its edge: whether they stick or slip, what is missing then lies in the cone of q."""
+    """Return 1 - s times the reactions, which corrections keep.
+
+    Those outside the cone, or no farther than s from its edge, are put on its edge: whether they
+    stick or slip, what is missing then lies in the cone of q.
+    """
     surface = step.surface
     r_n = np.where(surface.bilateral, answer.r_n, np.maximum(answer.r_n, 0.0))
     if answer.r_t is None or step.slip0 is None:
@@ -115,8 +124,10 @@ def corrected(
     solve: Callable[[StepProblem], StepResult],
     goal: float,
 ) -> tuple[StepResult, Certificate]:
-    """Return the result after corrections that brought its certificate to the goal, or as near to
-    it as they got."""
+    """Return the result after corrections that brought its certificate to the goal.
+
+    Or they brought it as near to it as they got.
+    """
     for _ in range(ROUNDS):
         share = share_of(certificate.worst)
         try:

@@ -1,8 +1,10 @@
-"""Refuse numbers that are none at the door of a step, before any solver works on them: NaN spreads
-without a word.
+"""Refuse numbers that are none at the door of a step, before any solver works on them.
+
+NaN spreads without a word.
 
 What is asked of every step is three inner products; what is wrong, and where, is looked for only
-when something is."""
+when something is.
+"""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -25,9 +27,11 @@ Source = Callable[[], SemiDiscreteSystem]
 
 
 def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
-    """Raise StepFailure for NaN or infinite loads, NaN in gaps, guesses or slips, with time and
-    place; asked of all ranks, so that all stop. ``source``: makes the system whose histories may be
-    named. Collective."""
+    """Raise StepFailure for NaN or infinite loads, and NaN in gaps, guesses or slips.
+
+    It tells time and place. It is asked of all ranks, so that all stop. ``source``: makes the
+    system whose histories may be named. Collective.
+    """
     bound, slip0 = step.bound, step.slip0
     fine = isfinite(
         step.b.dot(step.guess)
@@ -40,7 +44,9 @@ def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
 
 def _refuse(step: StepProblem, source: Source | None) -> None:
     """Raise StepFailure of the first array that has such numbers; large ones alone are none.
-    Collective."""
+
+    Collective.
+    """
     comm, space = step.surface.comm, step.A.space
     there = None if space is None else space.coordinates
     when = f"of step {step.k} at t = {step.t:.6g} s"
@@ -68,7 +74,9 @@ def _refuse(step: StepProblem, source: Source | None) -> None:
 
 def _place(comm: Any, wrong: Mask, points: Array | None) -> str:
     """Where the first wrong row of all ranks is, if places are known and not all rows are wrong.
-    Collective."""
+
+    Collective.
+    """
     found = np.flatnonzero(wrong)
     said = at(points[found[0]]) if len(found) and points is not None else ""
     told = comm.bcast(comm.gather((said, bool(wrong.all()))))
@@ -78,8 +86,10 @@ def _place(comm: Any, wrong: Mask, points: Array | None) -> str:
 
 
 def _histories(step: StepProblem, system: SemiDiscreteSystem) -> Iterator[str]:
-    """Name the first history of a load or excitation that is no number, and the time it was asked
-    for. Collective."""
+    """Name the first history of a load or excitation that is no number.
+
+    The time it was asked for is named too. Collective.
+    """
     for t in dict.fromkeys([*system.times, step.t]):
         for _, history in system.load.separable:
             value = on_all(step.surface.comm, "the history of a load", partial(_number, history, t))
@@ -96,8 +106,10 @@ def _number(history: Callable[[float], float], t: float) -> float:
 
 
 def refuse_matrix(problem: ContactProblem, A: EffectiveMatrix) -> None:
-    """Raise InputError for a matrix of the steps with entries that are no finite numbers. Once for
-    every dt; a product with it. Collective."""
+    """Raise InputError for a matrix of the steps with entries that are no finite numbers.
+
+    Once for every dt; a product with it. Collective.
+    """
     ones = np.ones(A.matrix.rows)
     rows, comm = A.matrix @ ones, A.algebra.comm
     if not largest(comm, not isfinite(rows.sum())):

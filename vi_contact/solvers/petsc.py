@@ -1,5 +1,7 @@
-"""Import PETSc for the solvers, after MPI: the PETSc of PyPI finds the MPI library that mpi4py has
-loaded before."""
+"""Import PETSc for the solvers, after MPI.
+
+The PETSc of PyPI finds the MPI library that mpi4py has loaded before.
+"""
 
 from contextlib import suppress
 

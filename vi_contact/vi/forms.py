@@ -1,5 +1,7 @@
-"""Read a user's forms, conditions and bounds; evaluate F and its Jacobian on the unknowns that
-nothing clamps."""
+"""Read a user's forms, conditions and bounds; evaluate F and its Jacobian.
+
+They are evaluated on the unknowns that nothing clamps.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -49,8 +51,11 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
 
 
 def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
-    """Return (F, J), the first and second derivative of a functional of u; InputError for
-    others."""
+    """Return (F, J), the first and second derivative of a functional of u.
+
+    Raises:
+        InputError: what is no functional of u.
+    """
     if not isinstance(energy, ufl.Form) or energy.arguments():
         what = (
             f"a form of rank {len(energy.arguments())}"
@@ -134,13 +139,17 @@ class Problem:
 
     @property
     def change(self) -> Array:
-        """Return the prescribed values less those of the first guess, 0 at free unknowns; ghosts
-        too."""
+        """Return the prescribed values less those of the first guess.
+
+        It is 0 at free unknowns; ghosts are there too.
+        """
         return np.where(self._held, self._values - self.given, 0.0)
 
     def put(self, x: Array, left: float = 0.0) -> None:
-        """Write the free unknowns into u, and the held ones but for the share ``left`` of their
-        change. Collective."""
+        """Write the free unknowns into u, and the held ones.
+
+        The held ones lack the share ``left`` of their change. Collective.
+        """
         values = self.u.x.array
         values[self._held] = self._values[self._held]
         if left:
@@ -161,8 +170,11 @@ class Problem:
         return not largest(self.comm, not here)
 
     def places(self) -> Array:
-        """Return (n, 4) where the free unknowns are: coordinates as shares of the body's box, and
-        the component as a share of their number. Collective."""
+        """Return (n, 4) where the free unknowns are.
+
+        These are coordinates as shares of the body's box, and the component as a share of their
+        number. Collective.
+        """
         space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
         x = space.tabulate_dof_coordinates()[: self.owned // width]
         low = -self.comm.max(-np.min(x, axis=0, initial=np.inf))
@@ -172,14 +184,19 @@ class Problem:
         return np.column_stack([shares, component])[self.free]
 
     def put_back(self) -> None:
-        """Write the first guess into u, with the held values that it had, as if nothing had been
-        done."""
+        """Write the first guess into u, as if nothing had been done.
+
+        The held values are those that it had.
+        """
         self.u.x.array[:] = self.given = self._first
         self._values = self._prescribed
 
     def aim(self, share: float) -> None:
-        """Take the present u for the first guess, and as prescribed values those that are so far on
-        the way from the values of the very first guess."""
+        """Take the present u for the first guess.
+
+        Prescribed values are then those that are so far on the way from the values of the very
+        first guess.
+        """
         self.given = np.array(self.u.x.array)
         way = self._prescribed - self._first
         self._values = self._prescribed if share == 1.0 else self._first + share * way
@@ -201,9 +218,11 @@ class Problem:
         return self.linearised(0.0)[0]
 
     def linearised(self, left: float) -> tuple[PetscMatrix, Array]:
-        """Return (J at u on the free unknowns, what F of these will gain, to first order, by the
-        share ``left`` of the change of the held ones); the J that it returned before is freed.
-        Collective."""
+        """Return (J at u on the free unknowns, what F of these will gain).
+
+        F gains it, to first order, by the share ``left`` of the change of the held ones. The J that
+        it returned before is freed. Collective.
+        """
         gain = np.zeros(np.count_nonzero(self.free))
         if self._jacobian is None or left or not self.constant:
             self.close()
@@ -230,12 +249,14 @@ class Problem:
         self._jacobian = None
 
     def bounds(self, lower: Any, upper: Any) -> tuple[Array, Array]:
-        """Return (lower, upper) of the free unknowns; InputError, on all ranks, for what
-        contradicts.
+        """Return (lower, upper) of the free unknowns.
+
+        What contradicts raises InputError on all ranks.
 
         What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is
         beyond a bound stays as it is, and where lower is above upper the unknown is held at
-        lower."""
+        lower.
+        """
         low, high = self._bound("lower", lower, -np.inf), self._bound("upper", upper, np.inf)
         u, space = (
             np.where(self._held, self._values, self.given)[: self.owned],
@@ -272,14 +293,16 @@ class Problem:
         return low[self.free], np.maximum(low, high)[self.free]
 
     def moves(self, low: Array, high: Array) -> bool:
-        """Say whether conditions or bounds change the first guess by more than rounding; after
-        ``bounds``. Collective."""
+        """Say whether conditions or bounds change the first guess by more than rounding.
+
+        It is asked after ``bounds``. Collective.
+        """
         x = self.given[: self.owned][self.free]
         most = max(max_abs(self.change), max_abs(x - np.clip(x, low, high)))
         return largest(self.comm, most) > OFF * self.size
 
     def _bound(self, name: str, given: Any, none: float) -> Array:
-        """A bound at the owned unknowns."""
+        """Return a bound at the owned unknowns."""
         space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
         if isinstance(given, compat.fem.Function) and given.function_space == space:
             return np.array(given.x.array[: self.owned])
@@ -298,6 +321,8 @@ class Problem:
 
 
 def given_alike(bound: Any) -> Any:
-    """Return what of a bound all ranks give alike: numbers and the value of a Constant; of a
-    Function the kind."""
+    """Return what of a bound all ranks give alike.
+
+    These are numbers and the value of a Constant; of a Function it is the kind.
+    """
     return bound.value if isinstance(bound, compat.fem.Constant) else bound

@@ -1,9 +1,11 @@
-"""Find u between bounds: F(u; v - u) >= 0 for all v with lower <= v <= upper, at the points of a
-Function's space.
+"""Find u between bounds with F(u; v - u) >= 0 for all v with lower <= v <= upper.
+
+The bounds hold at the points of a Function's space.
 
 Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F
 (``solve_linear``) and goes towards the answer as far as makes the natural residual u - mid(lower, u
-- F/J_ii, upper) smaller by a part of what the slope promises. A linear problem takes one step."""
+- F/J_ii, upper) smaller by a part of what the slope promises. A linear problem takes one step.
+"""
 
 import logging
 import time
@@ -86,8 +88,9 @@ def solve(
     tolerance: float = 1e-9,
     iterations: int | None = None,
 ) -> Result:
-    """Solve F(u; v - u) >= 0 for all v between the bounds, or find a local minimum of an energy
-    between them; u holds the first guess, and the answer.
+    """Solve F(u; v - u) >= 0 for all v between bounds, or minimise an energy between them.
+
+    The minimum is a local one. u holds the first guess, and the answer.
 
     ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v).
     ``energy``: in its place a functional Pi(u), whose derivative is F; F need not be monotone then.
@@ -103,7 +106,8 @@ def solve(
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which
     for degrees above one is not everywhere. InputError for forms, bounds and bcs that do not fit;
     StepFailure when the certificate stays above ``tolerance`` after ``iterations`` steps (None: 50,
-    and 500 of an energy), with the best u so far kept. Collective."""
+    and 500 of an energy), with the best u so far kept. Collective.
+    """
     start = time.process_time()
     most = NEWTON_STEPS if energy is None else DESCENT_STEPS
     limit = whole("vi.solve", "iterations", most if iterations is None else iterations, least=1)
@@ -178,8 +182,10 @@ def solve(
 
 
 def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
-    """Raise InputError unless there is a form or an energy, and not both, nor what an energy has no
-    use for."""
+    """Raise InputError unless there is a form or an energy, and not both.
+
+    What an energy has no use for is refused too.
+    """
     if form is None and energy is None:
         raise refused(
             "there is nothing to solve: give the form F(u; v), or energy=, a functional of u"
@@ -205,7 +211,9 @@ def preconditioner(ranks: int) -> Mapping[str, object | None]:
 
 def curves_down(found: Found, layers: OptionLayers) -> bool:
     """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u.
-    Collective."""
+
+    Collective.
+    """
     best = found.best
     problem = best.problem
     if best.broken or problem.constant:
@@ -223,8 +231,10 @@ def curves_down(found: Found, layers: OptionLayers) -> bool:
 
 
 def failed(problem: Problem, found: Found, sentence: str) -> StepFailure:
-    """Write the best values into u, or the first guess where conditions were never met, and return
-    the error. Collective."""
+    """Write the best values into u and return the error. Collective.
+
+    It is the first guess where conditions were never met.
+    """
     if found.best.left:
         problem.put_back()
         return StepFailure(f"{sentence} (u holds the first guess)")

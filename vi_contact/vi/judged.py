@@ -1,5 +1,7 @@
-"""Judge a u: linearise F about it, compute its certificate, and measure by one number how far it is
-from the answer."""
+"""Judge a u by its certificate, and measure how far it is from the answer.
+
+F is linearised about u; the measure is one number.
+"""
 
 import numpy as np
 
@@ -69,18 +71,22 @@ class Judged:
         self.certificate = Certificate(*(worst.tolist() if known else [np.inf] * len(worst)))
 
     def natural(self, x: Array, F: Array) -> float:
-        """Return sum J_ii r², r = x - mid(lower, x - F / J_ii, upper) the natural residual, J_ii
-        those of this u.
+        """Return the size sum J_ii r² of the natural residual r.
 
-        It is zero at the answer only. Infinite where F is not a number. Collective."""
+        r = x - mid(lower, x - F / J_ii, upper); J_ii are those of this u.
+
+        It is zero at the answer only. Infinite where F is not a number. Collective.
+        """
         with np.errstate(over="ignore", invalid="ignore"):
             r = x - np.clip(x - F / self.diagonal, self.lower, self.upper)
             found = total(self.problem.comm, self.diagonal @ r**2)
         return found if np.isfinite(found) else np.inf
 
     def put(self, x: Array, left: float) -> Array:
-        """Write another x into u, and the held unknowns but for ``left``; return the F there, with
-        what it will gain by the rest of their change. Collective."""
+        """Write another x into u, and the held unknowns but for ``left``; return the F there.
+
+        F comes with what it will gain by the rest of their change. Collective.
+        """
         self.problem.put(x, left)
         F = self.problem.residual()
         return F + (left / self.left) * self.gain if left else F

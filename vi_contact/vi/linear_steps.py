@@ -1,5 +1,7 @@
-"""Solve a linear problem between bounds, lower <= x <= upper with A x - b, by the methods of the
-volume route."""
+"""Solve a linear problem A x - b between bounds, lower <= x <= upper.
+
+The methods are those of the volume route.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,7 +30,8 @@ class LinearSteps:
     """Solve the linear problems of one call of ``vi.solve`` one after another.
 
     ``given``: the methods to try; those that suit A if there are none. A method that failed is
-    tried last from then on: the tangents of one problem are alike."""
+    tried last from then on: the tangents of one problem are alike.
+    """
 
     def __init__(self, settings: Volume, given: Sequence[Method], comm: MpiComm) -> None:
         self.settings, self.given, self.comm = settings, given, comm
@@ -51,8 +54,13 @@ class LinearSteps:
     def solve(
         self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array
     ) -> tuple[Array, int, str]:
-        """Return (x, iterations, name of the method) of the first method that finds x; StepFailure
-        with what all said. Every unknown is the one of a contact condition. Collective."""
+        """Return (x, iterations, name of the method) of the first method that finds x.
+
+        Every unknown is the one of a contact condition. Collective.
+
+        Raises:
+            StepFailure: no method finds x; it tells what all said.
+        """
         numbers, comm = np.arange(A.rows), self.comm
         symmetric = is_symmetric(A, comm)
         methods = self.methods(symmetric)
@@ -90,16 +98,18 @@ class LinearSteps:
 
 
 def reduced_step(point: Judged) -> Array:
-    """Return where one step of Newton's method for the natural residual leads. Where a bound holds
-    an unknown in that residual, lower + F/J_ii >= x or x >= upper + F/J_ii, the step goes to the
-    bound; the others are free:
+    """Return where one step of Newton's method for the natural residual leads.
+
+    Where a bound holds an unknown in that residual, lower + F/J_ii >= x or x >= upper + F/J_ii, the
+    step goes to the bound; the others are free:
 
         A_ff d_f = -F_f - A_fh d_h,    d_h = bound - x_h
 
     The residual falls along this direction, whatever the signs of the eigenvalues of A are. The
     target may lie beyond bounds. By LU; StepFailure where A_ff is singular. Reference: the active
     set step of M. Hintermüller, K. Ito and K. Kunisch, 2003, The primal-dual active set strategy as
-    a semismooth Newton method. Collective."""
+    a semismooth Newton method. Collective.
+    """
     x, F, comm = point.x, point.F, point.problem.comm
     aim = x - F / point.diagonal
     held = (aim <= point.lower) | (aim >= point.upper)

@@ -5,7 +5,8 @@ bounds and |s| not above a radius, in the norm |s|² = sum J_ii s_i². The radiu
 energy falls as the model says and shrinks where it does not, also where the energy at x + s is no
 number. J need not be positive definite: along a direction of negative curvature the step goes to
 the edge of the region. Reference: C.-J. Lin and J. J. Moré, 1999, Newton's method for large
-bound-constrained optimization problems (TRON)."""
+bound-constrained optimization problems (TRON).
+"""
 
 import numpy as np
 
@@ -34,9 +35,11 @@ NO_DESCENT = (
 def minimise(
     problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
 ) -> Found:
-    """Return where the descent ends: at a point whose certificate is below the tolerance and where
-    no direction of negative curvature is found, or with a failure. ``layers``: options of the
-    preconditioner. Collective."""
+    """Return where the descent ends: at a point that is found, or with a failure.
+
+    Such a point has a certificate below the tolerance, and no direction of negative curvature is
+    found there. ``layers``: options of the preconditioner. Collective.
+    """
     found = Found(begin(problem, lower, upper), method="trust region")
     while found.best.left and not found.failure:
         carry_conditions(found, layers)
@@ -46,8 +49,10 @@ def minimise(
 
 
 def carry_conditions(found: Found, layers: OptionLayers) -> None:
-    """Take one step that carries Dirichlet conditions and bounds into the body, as far as the
-    energy is a number."""
+    """Take one step that carries Dirichlet conditions and bounds into the body.
+
+    It goes as far as the energy is a number.
+    """
     point = found.best
     problem = point.problem
     model = Model(point, layers)
@@ -79,11 +84,19 @@ def carry_conditions(found: Found, layers: OptionLayers) -> None:
 def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) -> None:
     """Go down from the best point until it is a local minimum. Collective."""
     point = found.best
-    problem = point.problem
-    energy = problem.energy()
+    energy = point.problem.energy()
     if point.broken or not np.isfinite(energy):
         found.failure = NOT_A_NUMBER
-        return
+    else:
+        _follow(found, energy, tolerance, limit, layers)
+
+
+def _follow(
+    found: Found, energy: float, tolerance: float, limit: int, layers: OptionLayers
+) -> None:
+    """Take steps with a trust region from the best point, whose energy is given. Collective."""
+    point = found.best
+    problem = point.problem
     model = Model(point, layers)
     radius = first = FIRST_RADIUS * model.jacobi_step()
     # the length of a step along negative curvature, as a share of the first one that is tried
@@ -104,18 +117,9 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
         if found.steps >= limit or radius > UNBOUNDED * first:
             found.failure = TOO_FEW if found.steps >= limit else NO_DESCENT
             break
-        promised, length = -model.value(step), model.length(step)
-
-        problem.put(np.clip(point.x + step, point.lower, point.upper))
-        trial = problem.energy()
-        gained = energy - trial
-        if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
-            gained = -0.5 * problem.dot(point.F + problem.residual(), step)
-        ratio = gained / promised if promised > 0.0 else -np.inf
-        if ratio < POOR:
-            radius = 0.25 * length
-        elif ratio > GOOD and length > 0.9 * radius:
-            radius *= 4.0
+        length = model.length(step)
+        trial, ratio = _try_step(model, point, step, energy)
+        radius = _trust(radius, length, ratio)
 
         if ratio > ACCEPTED:
             next_point = Judged(problem, point.lower, point.upper)
@@ -139,3 +143,26 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
             found.failure = NO_DESCENT
             break
     model.close()
+
+
+def _try_step(model: Model, point: Judged, step: Array, energy: float) -> tuple[float, float]:
+    """Write the point after a step into u.
+
+    Returns:
+        The energy there, and what was gained over what the model promises; -inf where it promises
+        nothing.
+    """
+    problem, promised = point.problem, -model.value(step)
+    problem.put(np.clip(point.x + step, point.lower, point.upper))
+    trial = problem.energy()
+    gained = energy - trial
+    if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
+        gained = -0.5 * problem.dot(point.F + problem.residual(), step)
+    return trial, gained / promised if promised > 0.0 else -np.inf
+
+
+def _trust(radius: float, length: float, ratio: float) -> float:
+    """Return the next radius: smaller after a poor step, larger after a good one at the edge."""
+    if ratio < POOR:
+        return 0.25 * length
+    return 4.0 * radius if ratio > GOOD and length > 0.9 * radius else radius

@@ -4,7 +4,8 @@
 
 First comes the Cauchy step, along the projected direction of steepest descent in the norm above.
 From there conjugate gradients run on the unknowns that are off their bounds, some rounds, as each
-round may bring others onto them."""
+round may bring others onto them.
+"""
 
 from typing import Any
 
@@ -55,12 +56,16 @@ class Model:
 
     def jacobi_step(self) -> float:
         """Return |s| of one step of Jacobi's method between the bounds: a first measure of lengths.
-        Collective."""
+
+        Collective.
+        """
         return self.length(self._projected(-self.F / self.diagonal))
 
     def minimise(self, radius: float) -> tuple[Array, int]:
-        """Return (s, iterations of conjugate gradients): q(s) well below that of the Cauchy step.
-        Collective."""
+        """Return (s, iterations of conjugate gradients).
+
+        q(s) is well below that of the Cauchy step. Collective.
+        """
         s = self._cauchy(radius)
         residual = self.F + self.J @ s
         first = self._free_size(residual, self._off_bounds(self._projected(0.0 * s)))
@@ -88,10 +93,13 @@ class Model:
         return s, count
 
     def downward(self, share: float) -> tuple[Array | None, int]:
-        """Return (s, iterations): a step along a direction of negative curvature on the unknowns
-        that no bound holds, on the side where the energy is lower; None where conjugate gradients
-        find no such direction. Its length is this share of one that, by the curvature, changes the
-        energy by a part of its size. Collective."""
+        """Return (s, iterations), a step along a direction of negative curvature.
+
+        The direction is on the unknowns that no bound holds, and the step on the side where the
+        energy is lower. s is None where conjugate gradients find no such direction. Its length is
+        this share of one that, by the curvature, changes the energy by a part of its size.
+        Collective.
+        """
         direction, its = self._negative()
         if direction is None:
             return None, its
@@ -114,12 +122,14 @@ class Model:
         return sides[1] if second else sides[0], its
 
     def curves_down(self) -> bool:
-        """Say whether a direction of negative curvature is found on the unknowns that no bound
-        holds. Collective."""
+        """Say whether a direction of negative curvature is found. Collective.
+
+        It is sought on the unknowns that no bound holds.
+        """
         return self._negative()[0] is not None
 
     def _projected(self, s: Array) -> Array:
-        """The nearest step that ends between the bounds."""
+        """Return the nearest step that ends between the bounds."""
         return np.clip(s, self.low, self.high)
 
     def _off_bounds(self, s: Array) -> Mask:
@@ -127,13 +137,15 @@ class Model:
         return np.asarray((s > self.low) & (s < self.high))
 
     def _free_size(self, residual: Array, free: Mask) -> float:
-        """The size of the residual at free unknowns, in the norm dual to |s|."""
+        """Return the size of the residual at free unknowns, in the norm dual to |s|."""
         r = residual[free]
         return float(np.sqrt(self.problem.dot(r, r / self.diagonal[free])))
 
     def _cauchy(self, radius: float) -> Array:
-        """A step along the projected direction of steepest descent that brings a part of what the
-        slope promises."""
+        """Return a step along the projected direction of steepest descent.
+
+        It brings a part of what the slope promises.
+        """
         start = self._projected(np.zeros_like(self.x))  # zero, unless x lies outside the bounds
         direction = -(self.F + self.J @ start) / self.diagonal
         base = self.value(start)
@@ -150,8 +162,10 @@ class Model:
         return start
 
     def _search(self, s: Array, w: Array, residual: Array) -> Array | None:
-        """The longest step s + beta w, brought between the bounds, that makes q smaller; None where
-        none does."""
+        """Return the longest step s + beta w, brought between the bounds, that makes q smaller.
+
+        It is None where none does.
+        """
         base, beta = self.value(s), 1.0
         for _ in range(30):
             trial = self._projected(s + beta * w)
@@ -172,9 +186,11 @@ class Model:
     def _conjugate_gradients(
         self, free: Mask, s: Array, residual: Array, radius: float, aim: float
     ) -> tuple[Array, int, bool]:
-        """(w, iterations, whether it ended early): w on the free unknowns, J w = -residual or as
-        far towards it as the radius allows, counted from x. Directions of negative curvature are
-        followed to the edge (T. Steihaug, 1983)."""
+        """Return (w, iterations, whether it ended early), w on the free unknowns.
+
+        J w = -residual or as far towards it as the radius allows, counted from x. Directions of
+        negative curvature are followed to the edge (T. Steihaug, 1983).
+        """
         block, precondition = self._block(free)
         dot, D, s0 = self.problem.dot, self.diagonal[free], s[free]
         outside = self.problem.dot(s[~free], self.diagonal[~free] * s[~free])
@@ -210,8 +226,11 @@ class Model:
         return full, count, early
 
     def _negative(self) -> tuple[Array | None, int]:
-        """(A direction of negative curvature of J on the unknowns that no bound holds or None,
-        iterations of conjugate gradients)."""
+        """Return (a direction of negative curvature of J or None, iterations).
+
+        The direction is on the unknowns that no bound holds; the iterations are those of conjugate
+        gradients.
+        """
         free = (
             self._off_bounds(np.zeros_like(self.x))
             & (self.point.push[0] == 0.0)
@@ -242,8 +261,11 @@ class Model:
 
 
 class Preconditioner:
-    """Apply an approximate inverse of a symmetric matrix, positive definite also where the matrix
-    is not: PETSc's incomplete Cholesky factor, which shifts what would not be."""
+    """Apply an approximate inverse of a symmetric matrix.
+
+    It is positive definite also where the matrix is not: PETSc's incomplete Cholesky factor, which
+    shifts what would not be.
+    """
 
     def __init__(self, block: PetscMatrix, layers: OptionLayers) -> None:
         self._x, self._y = block.mat.createVecs()
@@ -254,6 +276,7 @@ class Preconditioner:
         layers.apply(self._pc, _set_up)
 
     def __call__(self, r: Array) -> Array:
+        """Return the preconditioned r."""
         self._x.array[:] = r
         self._pc.apply(self._x, self._y)
         return np.array(self._y.array_r)
@@ -270,6 +293,8 @@ def _set_up(pc: Any, _layers: OptionLayers) -> None:
 
 
 def _uneven(places: Array) -> Array:
-    """Values between 1/2 and 3/2 at points (n, 4) of the unit box, the last coordinate that of the
-    component: smooth, and of no symmetry."""
+    """Return values between 1/2 and 3/2 at points (n, 4) of the unit box.
+
+    The last coordinate is that of the component. The values are smooth, and of no symmetry.
+    """
     return np.asarray(1.0 + 0.5 * np.sin(1.0 + places @ (GOLDEN * np.array([4.0, 3.0, 2.0, 1.0]))))

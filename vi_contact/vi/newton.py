@@ -7,7 +7,8 @@ natural residual smaller.
 The first step begins at the u that was given, *before* Dirichlet conditions and bounds have changed
 it, and carries their change through the body with the linear step. Written into u by themselves
 they would turn the cells beside a clamped side inside out as soon as the change is larger than a
-cell."""
+cell.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -45,9 +46,11 @@ UNHELD = (
 
 @dataclass
 class Found:
-    """Hold where a method stopped: the best u, whether all conditions were met from the start, how
-    many steps it took, with which inner method, what failed, and whether a method for
-    positive Jacobians did."""
+    """Hold where a method stopped.
+
+    This is the best u, whether all conditions were met from the start, how many steps it took, with
+    which inner method, what failed, and whether a method for positive Jacobians did.
+    """
 
     best: Judged
     at_once: bool = False
@@ -64,7 +67,8 @@ def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -
     Where conditions and bounds change a problem that is not linear, this is u as it was given; a
     small change, which leaves forces hardly larger than the linear step that carries it would, is
     written into u at once unless told to ``carry`` it. Else, and where F is not a number at this u,
-    it is u with the conditions and between the bounds."""
+    it is u with the conditions and between the bounds.
+    """
     given = problem.x
     if not problem.constant and problem.moves(lower, upper):
         problem.put(given, 1.0)
@@ -89,9 +93,11 @@ def solve_in_parts(
     *,
     carry: bool = True,
 ) -> Found:
-    """Return where Newton's method ends. Where it fails as Dirichlet conditions change the first
-    guess too much at once, they change it in parts, each from the answer of the part before.
-    Collective."""
+    """Return where Newton's method ends.
+
+    Where it fails as Dirichlet conditions change the first guess too much at once, they change it
+    in parts, each from the answer of the part before. Collective.
+    """
     moves = not problem.constant and problem.moves(lower, upper)
     whole = newton(problem, lower, upper, settings, methods, limit, carry=False)
     if not whole.failure or not moves:
@@ -127,7 +133,9 @@ def newton(
     carry: bool = True,
 ) -> Found:
     """Return where Newton's method ends: below the tolerance of the settings, or with a failure.
-    Collective."""
+
+    Collective.
+    """
     point = begin(problem, lower, upper, carry=carry)
     found = Found(point, at_once=point.left == 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
@@ -151,10 +159,12 @@ def newton(
 
 
 def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
-    """Take one step from a point, in u: towards the answer of the linear problem between the bounds
-    or, where this one is not found or leads nowhere, a reduced step. Return the share of the change
-    of held unknowns that is then left; None, and the reason in ``found``, where neither helps.
-    Collective."""
+    """Take one step from a point, in u, and return what is then left.
+
+    It goes towards the answer of the linear problem between the bounds or, where this one is not
+    found or leads nowhere, is a reduced step. Returned is the share of the change of held unknowns
+    that is then left; it is None, and the reason in ``found``, where neither helps. Collective.
+    """
     # Where all methods have failed before, the tangents are not positive: a reduced step costs one
     # factor.
     ways = [linear_step, reduced] if steps.helps else [reduced, linear_step]
@@ -170,7 +180,9 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
 
 def linear_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
     """Go towards the answer of the linear problem between the bounds; None if that fails.
-    Collective."""
+
+    Collective.
+    """
     start = np.clip(point.x, point.lower, point.upper)
     try:
         x, its, found.method = steps.solve(point.A, point.b, point.lower, point.upper, start)
@@ -197,8 +209,11 @@ def reduced(found: Found, point: Judged, steps: LinearSteps) -> float | None:
 
 
 def advance(point: Judged, target: Array) -> float | None:
-    """Go from a point towards the target as far as is an improvement, in u; return the share of the
-    change of held unknowns that is then left, None where no length helps. Collective."""
+    """Go from a point towards the target as far as is an improvement, in u.
+
+    Returned is the share of the change of held unknowns that is then left, None where no length
+    helps. Collective.
+    """
     problem = point.problem
     if problem.constant:
         problem.put(target)

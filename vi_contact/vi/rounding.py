@@ -2,7 +2,8 @@
 
 A value of a field is often computed from larger ones: sin(pi x) is 1.2e-16 at x = 1, where 0 is
 meant. What rounding leaves at a node is relative to the size of the whole field and not to the
-value at that node."""
+value at that node.
+"""
 
 import numpy as np
 
@@ -15,13 +16,15 @@ FAR = 1e4
 
 
 def size_of_field(values: Array, lower: Array, upper: Array, comm: Comm) -> float:
-    """Return the largest finite number among the values of a field and its bounds, the same on all
-    ranks.
+    """Return the largest finite number among the values of a field and its bounds.
+
+    It is the same on all ranks.
 
     Users write 1e7 or 1e20 where there is no bound. Such walls say nothing of the size of the
     field: the largest numbers are left out for as long as they lie on the far side of zero (lower <
     0 or upper > 0) and are more than ``FAR`` times as large as the next smaller number. ``values``,
-    ``lower``, ``upper``: (n,) owned. Collective."""
+    ``lower``, ``upper``: (n,) owned. Collective.
+    """
     # Numbers that the field certainly reaches: its own values, and bounds that keep it away from
     # zero.
     reached = largest(

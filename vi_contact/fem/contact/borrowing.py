@@ -1,9 +1,11 @@
-"""Say from which neighbours a node of a contact boundary without a condition takes its pressure in
-pictures and fields.
+"""Say from which neighbours a node of a contact boundary takes its pressure.
+
+This is a node without a condition, and its pressure in pictures and fields.
 
 Such a node is held, shared by both sides, or hardly covered: no reaction of its own tells the
 pressure there. The mean of its neighbours on the facets around it is right up to the size of a
-facet, where zero is wrong by all of it."""
+facet, where zero is wrong by all of it.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +18,11 @@ from ...core.algebra import Array, Indices, from_each, largest
 
 @dataclass(frozen=True, eq=False)
 class Borrowed:
-    """Hold nodes of this rank that take the values of others: their numbers (t,), the numbers (q,)
-    of the lenders, of all ranks, and shares (t, q) with rows that sum to one."""
+    """Hold nodes of this rank that take the values of others.
+
+    These are their numbers (t,), the numbers (q,) of the lenders, of all ranks, and shares (t, q)
+    with rows that sum to one.
+    """
 
     numbers: Indices
     lenders: Indices
@@ -29,9 +34,11 @@ class Borrowed:
 
 
 def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
-    """Return what nodes ``without`` a pressure of their own borrow of those ``having`` one; None
-    where there are none of either. Both are numbers of nodes of any rank, as this rank knows them.
-    Collective."""
+    """Return what nodes ``without`` pressure borrow of those ``having`` one. Collective.
+
+    A pressure here is one of their own. It is None where there are none of either. Both are numbers
+    of nodes of any rank, as this rank knows them.
+    """
     # A node has its condition on the rank that owns it: most boundaries end here, and nothing is
     # gathered.
     if not largest(space.comm, len(np.setdiff1d(without, having))):

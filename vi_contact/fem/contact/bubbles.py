@@ -1,11 +1,13 @@
-"""Average bubbles of edges to contact conditions at vertices: dual conditions of tetrahedra of
-second order.
+"""Average bubbles of edges to contact conditions at vertices.
+
+These are dual conditions of tetrahedra of second order.
 
 With the hats phi_i of vertices and the bubbles b_k = 4 phi_a phi_b of the edges of contact facets,
 displacements are sum phi_i v_i + sum b_k e_k (``fem.hierarchical``). The gap of a condition is the
 mean of the gap with the weight psi_i,
 
-    gap_i = gap0_i - n·(v_i + sum_k c_ik e_k),   c_ik = ∫ psi_i b_k / ∫ psi_i,   ∫ psi_i phi_j = delta_ij ∫ phi_i
+    gap_i = gap0_i - n·(v_i + sum_k c_ik e_k)
+    c_ik = ∫ psi_i b_k / ∫ psi_i,   ∫ psi_i phi_j = delta_ij ∫ phi_i
 
 on every facet, so that psi_i is a combination of its three hats and no gap asks for the v of
 another vertex (dual Lagrange multipliers: Wohlmuth, SIAM J. Numer. Anal. 38 (2000), 989-1012; of
@@ -13,7 +15,8 @@ first order on facets of second: Puso, Laursen and Solberg, Comput. Methods Appl
 (2008), 555-566). The weights ∫ psi_i = ∫ phi_i are positive, those of first order; a uniform
 pressure p gives r_i = p ∫ phi_i. On a flat facet of area A the integral of psi_i b_k is A / 5 for
 its edges at vertex i and -A / 15 for the other one; on curved ones it is a quadrature on the
-facet."""
+facet.
+"""
 
 from dataclasses import dataclass
 
@@ -39,9 +42,11 @@ OTHERS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Bubbles(Rows):
-    """Hold facets: numbers (k, 3) of their vertices and of the mid-points opposite, and of these
-    the unknowns (k, 3, d) of all ranks; outward normals (k, d), ∫ phi_i (k, 3), ∫ psi_i b_k (k, 3,
-    3)."""
+    """Hold facets of second order, and their bubbles.
+
+    These are numbers (k, 3) of their vertices and of the mid-points opposite, and of these the
+    unknowns (k, 3, d) of all ranks; outward normals (k, d), ∫ phi_i (k, 3), ∫ psi_i b_k (k, 3, 3).
+    """
 
     vertices: Indices
     middles: Indices
@@ -52,7 +57,7 @@ class Bubbles(Rows):
 
 
 def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: bool) -> Bubbles:
-    """The facets of a group that have a vertex of this rank, or all of them."""
+    """Return the facets of a group that have a vertex of this rank, or all of them."""
     mesh, local = space.mesh, np.asarray(facets.indices)
     rows = facet_rows(space.V, local)
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
@@ -93,8 +98,10 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
 
 
 def _integrals(x: Array) -> tuple[Array, Array]:
-    """(∫ phi_i (k, 3), ∫ psi_i b_k (k, 3, 3)) of facets with these points of vertices and
-    mid-points (k, 6, 3)."""
+    """Return (∫ phi_i (k, 3), ∫ psi_i b_k (k, 3, 3)) of facets with these points.
+
+    These are the points of vertices and mid-points (k, 6, 3).
+    """
     place, weight = np.polynomial.legendre.leggauss(POINTS)
     s, t = (one.ravel() for one in np.meshgrid(0.5 + 0.5 * place, 0.5 + 0.5 * place, indexing="ij"))
     weights = (
@@ -120,12 +127,14 @@ def _integrals(x: Array) -> tuple[Array, Array]:
 def averaged(
     space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None
 ) -> tuple[Facing, ...]:
-    """Return the bubbles that displacements of conditions contain, none but in a hierarchy: -c_ik
-    of this rank's nodes with conditions or, where these face ``nodes``, the same on every rank,
-    with ``share``, share times c_ik.
+    """Return the bubbles that displacements of conditions contain, none but in a hierarchy.
+
+    They are -c_ik of this rank's nodes with conditions or, where these face ``nodes``, the same on
+    every rank, with ``share``, share times c_ik.
 
     Where a node has several conditions each facet belongs to the one with the normal nearest to its
-    own. Collective. InputError for a mid-point that is held while an end of its edge is free."""
+    own. Collective. InputError for a mid-point that is held while an end of its edge is free.
+    """
     if space.hierarchy is None:
         return ()
     found = _bubbles(space, space.hierarchy, facets, share is not None)

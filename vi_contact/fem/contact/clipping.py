@@ -1,8 +1,10 @@
-"""Cut convex polygons of a plane against one another, many at once, and integrate over what is
-left.
+"""Cut convex polygons of a plane against one another, many at once.
+
+It is integrated over what is left.
 
 Polygons are (k, m, 2), corners anticlockwise; one with fewer corners repeats some, one that is cut
-away has no area."""
+away has no area.
+"""
 
 import numpy as np
 
@@ -12,8 +14,10 @@ SHORT = 1e-9  # of the longest side of a polygon: round-off of what was cut
 
 
 def cut(polygons: Array, start: Array, along: Array) -> Array:
-    """Return what of each polygon is on the left of its line, through ``start`` (k, 2) along
-    ``along`` (k, 2)."""
+    """Return what of each polygon is on the left of its line.
+
+    The line goes through ``start`` (k, 2) along ``along`` (k, 2).
+    """
     offset = polygons - start[:, None, :]
     left = along[:, None, 0] * offset[:, :, 1] - along[:, None, 1] * offset[:, :, 0]
     after, ahead = np.roll(polygons, -1, axis=1), np.roll(left, -1, axis=1)
@@ -30,8 +34,10 @@ def cut(polygons: Array, start: Array, along: Array) -> Array:
 
 
 def sides(polygons: Array) -> Array:
-    """Return the vectors (k, m, 2) from each corner to the next; zero for round-off, which has no
-    direction."""
+    """Return the vectors (k, m, 2) from each corner to the next.
+
+    They are zero for round-off, which has no direction.
+    """
     edges = np.roll(polygons, -1, axis=1) - polygons
     length = np.linalg.norm(edges, axis=2, keepdims=True)
     return np.where(length > SHORT * length.max(axis=1, keepdims=True), edges, 0.0)
@@ -46,8 +52,10 @@ def overlaps(polygons: Array, others: Array) -> Array:
 
 
 def without(polygons: Array, others: Array, least: Array) -> tuple[Indices, Array]:
-    """Return (number of its polygon, polygons) of the convex parts of each polygon outside of
-    another one, if their areas are above ``least`` (k,)."""
+    """Return (number of its polygon, polygons) of the parts of each polygon outside of another.
+
+    The parts are convex, and their areas above ``least`` (k,).
+    """
     owner, inside, parts = np.arange(len(polygons)), polygons, []
     for start, along in zip(others.swapaxes(0, 1), sides(others).swapaxes(0, 1), strict=True):
         outside = cut(inside, start + along, -along)
@@ -77,8 +85,10 @@ def cross(one: Array, two: Array) -> Array:
 
 
 def turns(polygons: Array) -> Array:
-    """Return twice the area (k, m) of the triangle at each corner: of one sign on convex
-    polygons."""
+    """Return twice the area (k, m) of the triangle at each corner.
+
+    It is of one sign on convex polygons.
+    """
     edges = np.roll(polygons, -1, axis=1) - polygons
     return cross(np.roll(edges, 1, axis=1), edges)
 
@@ -96,8 +106,11 @@ def triangles(polygons: Array) -> tuple[Indices, Array]:
 
 
 def rule(n: int) -> tuple[Array, Array]:
-    """Return (barycentric coordinates (n², 3), weights (n²)) that integrate degree 2n - 2 exactly
-    over a triangle of area 1: Gauss points of a square of which one side is drawn together."""
+    """Return (barycentric coordinates (n², 3), weights (n²)) of a rule on a triangle.
+
+    They integrate degree 2n - 2 exactly over a triangle of area 1: Gauss points of a square of
+    which one side is drawn together.
+    """
     x, w = np.polynomial.legendre.leggauss(n)
     x, w = 0.5 + 0.5 * x, 0.5 * w
     u, v = (one.ravel() for one in np.meshgrid(x, x, indexing="ij"))
@@ -106,12 +119,15 @@ def rule(n: int) -> tuple[Array, Array]:
 
 
 def hats(corners: Array, points: Array) -> Array:
-    """Return the shape functions (k, p, v), linear on a triangle and bilinear on a quadrilateral,
-    of each facet with these corners (k, v, 2) at points (k, p, 2) in it.
+    """Return the shape functions (k, p, v) of each facet at points (k, p, 2) in it.
+
+    They are linear on a triangle and bilinear on a quadrilateral; the facets have these corners (k,
+    v, 2).
 
     Coordinates (x, y) of a point r = x b + y c + x y d from the first corner are roots of quadratic
     equations; neither denominator vanishes in a convex facet, where the determinant of the map is
-    positive at all corners."""
+    positive at all corners.
+    """
     origin = corners[:, :1]
     r, b, c = points - origin, corners[:, 1:2] - origin, corners[:, -1:] - origin
     quadrilateral = corners.shape[1] == 4

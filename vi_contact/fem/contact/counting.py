@@ -1,5 +1,7 @@
-"""Count the nodes of a contact boundary by what became of them: the `Census` of a contact
-surface."""
+"""Count the nodes of a contact boundary by what became of them.
+
+This is the `Census` of a contact surface.
+"""
 
 import logging
 from collections.abc import Mapping
@@ -20,6 +22,9 @@ def census_on_ranks(
     """Return the census of a boundary whose ``nodes`` are those of this rank only. Collective.
 
     Args:
+        comm: the ranks that share the boundary.
+        name: of the boundary.
+        nodes: those of this rank.
         kinds: kind -> mask (k,) of the nodes of this rank that are of this kind.
         points: number of contact conditions on this rank.
     """
@@ -35,6 +40,8 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
     """Return the census of a boundary whose ``nodes``, ordered by number, every rank has.
 
     Args:
+        name: of the boundary.
+        nodes: those of all ranks, ordered by number.
         kinds: kind -> mask (k,) of the nodes that are of this kind.
         points: number of contact conditions on all ranks.
     """
@@ -43,8 +50,10 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
 
 
 def tell(comm: Comm, census: Census) -> None:
-    """Log, on rank 0, what became of the nodes of a boundary, where not all are plain contact
-    points."""
+    """Log, on rank 0, what became of the nodes of a boundary.
+
+    It is told where not all are plain contact points.
+    """
     if census.places and comm.rank == 0:
         log.info("contact on '%s': %s", census.name, census.in_words())
 
@@ -57,5 +66,5 @@ def _gathered(comm: Comm, nodes: Nodes) -> Array:
 
 
 def _filled(places: Mapping[str, Array]) -> dict[str, Array]:
-    """The kinds of which there are nodes."""
+    """Return the kinds of which there are nodes."""
     return {kind: points for kind, points in places.items() if len(points)}

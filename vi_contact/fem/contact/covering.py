@@ -1,5 +1,6 @@
-"""Let whole facets carry what is covered of a facet beside them, at the edge of what side 1 has in
-front of it.
+"""Let whole facets carry what is covered of a facet beside them.
+
+This is at the edge of what side 1 has in front of it.
 
 A node t of side 1 beyond that edge has but a share of its facets in front of side 2. A multiplier
 of its own would be that of a sliver: its reaction over its weight is no pressure of the interface,
@@ -11,12 +12,14 @@ on linearly to t instead:
 
 and on the partly covered facet these nodes get D_k = sum_t E_tk D_t and the functions
 
-    psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k),   b = (1, x) or (1, x, y),   ∫ over its part in front of side 2
+    psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k),   b = (1, x) or (1, x, y)
+    (∫ over its part in front of side 2)
 
 so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a uniform pressure passes
 through exactly, forces and moments of both sides are in balance, and every pressure is one over a
 patch that is covered. Badia, Verdugo and Martín, Comput. Methods Appl. Mech. Engrg. 336 (2018),
-533-553 carry displacements on in the same way."""
+533-553 carry displacements on in the same way.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,11 +40,12 @@ class Covered:
     """Hold what is covered of the k facets of side 1 in front of which something lies.
 
     Attributes:
-        facets: (k, v) their nodes; middles: (k, d) middles of their covered parts.
+        facets: (k, v) their nodes.
+        middles: (k, d) middles of their covered parts.
         weights, full: (k, v) integrals of the functions of their nodes, over the covered part and
             over all of it.
-        inside: (k, v) nodes that are in front of side 2 themselves; parts: (k,) covered shares of
-            the facets.
+        inside: (k, v) nodes that are in front of side 2 themselves.
+        parts: (k,) covered shares of the facets.
         common: (m,) nodes of side 1 that are nodes of side 2 too.
     """
 
@@ -61,8 +65,10 @@ class Covered:
 
     @property
     def share(self) -> Array:
-        """Return the covered share (m,) of the facets of each node beyond the edge, 1 for all other
-        nodes."""
+        """Return the covered share (m,) of the facets of each node beyond the edge.
+
+        It is 1 for all other nodes.
+        """
         full = self.sums(self.full)
         share = self.sums(self.weights) / np.where(full > 0.0, full, 1.0)
         beyond = (full > 0.0) & (self.sums(self.inside.astype(float)) == 0.0)
@@ -71,8 +77,11 @@ class Covered:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Say which nodes (m,) of side 1 are carried, by the nodes (k, v) of which facet on each
-    covered facet, and which facets (k,) are used at all."""
+    """Say which nodes (m,) of side 1 are carried, and by which facets.
+
+    They are carried by the nodes (k, v) of a facet on each covered facet. It is told which facets
+    (k,) are used at all.
+    """
 
     nodes: Mask
     by: Indices
@@ -80,10 +89,12 @@ class Carried:
 
 
 def carried_by(covered: Covered, asked: Mask) -> Carried:
-    """Return the nodes that are carried of those ``asked`` for (m,), by the facets whose middle is
-    the nearest.
+    """Return the nodes that are carried of those ``asked`` for (m,).
 
-    None is where there is no whole facet to carry them, and none of a facet at a weld."""
+    They are carried by the facets whose middle is the nearest.
+
+    None is where there is no whole facet to carry them, and none of a facet at a weld.
+    """
     facets, common = covered.facets, covered.common
     nodes = asked.copy()
     nodes[facets[common[facets].any(axis=1)]] = False
@@ -106,8 +117,10 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
 
 
 def extrapolation(corners: Array, points: Array) -> Array:
-    """Return E (k, p, v): what each of the corners (k, v, c) of facets counts at points (k, p, c),
-    linearly."""
+    """Return E (k, p, v), what each of the corners of facets counts at points.
+
+    The corners are (k, v, c), the points (k, p, c); it counts linearly.
+    """
     middle = corners.mean(axis=1, keepdims=True)
     size = np.abs(corners - middle).max(axis=(1, 2))[:, None, None]
     known, wanted = (
@@ -118,12 +131,14 @@ def extrapolation(corners: Array, points: Array) -> Array:
 
 
 def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
-    """Return the carried nodes (m,) that leave too little of its own weight to a node which carries
-    them: the one with the largest weight for each of these. ``weights``: (m,) with what is carried
-    [m], [m²].
+    """Return the carried nodes (m,) that leave too little weight to a node which carries them.
+
+    It is too little of its own weight, and of these nodes the one with the largest weight for each.
+    ``weights``: (m,) with what is carried [m], [m²].
 
     A linear function that is positive at one node of a facet and beyond is negative at the other:
-    where much is carried far this one would be pulled."""
+    where much is carried far this one would be pulled.
+    """
     own = covered.sums(covered.weights)
     light = ~(carried.nodes | covered.common) & (own > 0.0) & (weights < LEAST_WEIGHT * own)
     found = np.zeros(len(own), dtype=bool)
@@ -137,9 +152,12 @@ def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Coupled:
-    """Hold D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node,
+    """Hold the coupling of two sides.
+
+    This is D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node,
     the carried nodes (m,), which have no row in either, and the covered share (m,) of the facets of
-    each node."""
+    each node.
+    """
 
     D: Array
     M: sp.csr_matrix
@@ -151,8 +169,10 @@ class Coupled:
 def coupled(
     covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
 ) -> Coupled:
-    """Return the coupling in which whole facets carry the nodes that have little covered, as far as
-    they can."""
+    """Return the coupling in which whole facets carry the nodes that have little covered.
+
+    They do so as far as they can.
+    """
     share = covered.share
     asked = share < LEAST_SHARE
     while True:

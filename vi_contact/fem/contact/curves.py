@@ -1,5 +1,6 @@
-"""Say by how much two polygons, or polyhedra, of one curved face may overlap although the face does
-not.
+"""Say by how much polygons, or polyhedra, of one curved face may overlap.
+
+Two of them may although the face does not.
 
 Facets leave a curve of radius R by up to h²/(8R). Nodes of side 1 lie on the curve, and so do those
 of side 2; what a mean gap may lack is how far the facets of side 2 are from the function that is
@@ -10,7 +11,8 @@ side 2, estimated from how its facets turn, that is
     q(w, X) = sum_i w_i x_i·H x_i - x·H x,   x = sum_i w_i x_i
 
 with the shape functions lambda and mu at a point. Plane sides have H = 0 and sides with the same
-facets delta = 0: they may overlap by round-off only."""
+facets delta = 0: they may overlap by round-off only.
+"""
 
 import numpy as np
 
@@ -27,16 +29,18 @@ FLAT = (
 
 
 def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
-    """Return the curvature H (k, d, d) [1/m] of a side at each of its facets, positive where it
-    bulges outwards.
+    """Return the curvature H (k, d, d) [1/m] of a side at each of its facets.
+
+    It is positive where the side bulges outwards.
 
     The normal of a face at a node is the mean of those of the facets that turn by less than the
     feature angle; H is the fit of normals to nodes. Facets at the rim of a face see half of the
     turning only, so that theirs is doubled.
 
     Args:
-        corners: (k, v, d) of the facets; facets: (k, v) their nodes; normals: (k, d) outward unit
-            normals.
+        corners: (k, v, d) of the facets.
+        facets: (k, v) their nodes.
+        normals: (k, d) outward unit normals.
     """
     nodal, rim = _nodal_normals(facets, normals)
     x = corners - corners.mean(axis=1, keepdims=True)
@@ -50,8 +54,9 @@ def left_out(H: Array, weights: Array, corners: Array) -> Array:
     """Return q (k, p): twice the distance of a curved face from a facet, at points.
 
     Args:
-        H: (k, d, d); weights: (k, p, v) shape functions at the points; corners: (k, v, d) of the
-            facet.
+        H: (k, d, d).
+        weights: (k, p, v) shape functions at the points.
+        corners: (k, v, d) of the facet.
     """
     x = corners - corners.mean(axis=1, keepdims=True)
     nodal = np.einsum("kvi,kij,kvj->kv", x, H, x)
@@ -62,20 +67,24 @@ def left_out(H: Array, weights: Array, corners: Array) -> Array:
 
 
 def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:
-    """Return by how much (k,) [m] pieces of facets may overlap, at most at their points, with the
-    margin.
+    """Return by how much (k,) [m] pieces of facets may overlap.
+
+    This is the most at their points, with the margin.
 
     Args:
-        H: (k, d, d) of side 2 at each piece; one, two: shape functions (k, p, v) at the points and
-            corners (k, v, d) of the facets of side 1 and side 2.
+        H: (k, d, d) of side 2 at each piece.
+        one: shape functions (k, p, v) at the points and corners (k, v, d) of the facets of side 1.
+        two: the same of the facets of side 2.
     """
     delta = 0.5 * (left_out(H, *two) - left_out(H, *one))
     return np.asarray(MARGIN * np.abs(delta).max(axis=1, initial=0.0))
 
 
 def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
-    """Normals (k, v, d) of smooth faces at the nodes of their facets, and which facets (k,) are at
-    a rim of a face."""
+    """Return normals (k, v, d) of smooth faces at the nodes of their facets.
+
+    Which facets (k,) are at a rim of a face is returned too.
+    """
     k, v = facets.shape
     node, facet = facets.ravel(), np.repeat(np.arange(k), v)
     sums, alone = normals[facet].copy(), np.ones(k * v, dtype=bool)
@@ -97,8 +106,10 @@ def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
 
 
 def _at_border(facets: Indices) -> Mask:
-    """Return which facets have a node on the outline of their side: in space, an edge of one facet
-    only."""
+    """Return which facets have a node on the outline of their side.
+
+    In space this is an edge of one facet only.
+    """
     if facets.shape[1] == 2:
         return np.zeros(len(facets), dtype=bool)  # there a node of one facet only, which is alone
     edges = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)

@@ -1,10 +1,12 @@
-"""Split a contact boundary into faces: where it turns by more than a feature angle, nodes have one
-normal a face.
+"""Split a contact boundary into faces.
+
+Where it turns by more than a feature angle, nodes have one normal a face.
 
 Facets round a node are one face there as long as each turns by no more than the angle from another
 one of them. A smooth node has one face, a node at an edge two, at a corner in space three. Normal
 and weight of a face at a node are those of the facets of this face. Facets are gathered on every
-rank only round nodes where they may turn so far."""
+rank only round nodes where they may turn so far.
+"""
 
 import logging
 from dataclasses import dataclass, replace
@@ -38,9 +40,10 @@ class Boundary:
     """Hold facets of a group, the same on every rank in the order of the numbers of their nodes.
 
     Attributes:
-        vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, v, d)
-            outward there, unit ones.
-        local: this rank's facets of the group; place: their numbers among the k.
+        vertices: (k, v) numbers of their nodes, mid-points too, ascending.
+        normals: (k, v, d) outward there, unit ones.
+        local: this rank's facets of the group.
+        place: their numbers among the k.
     """
 
     vertices: Indices
@@ -49,8 +52,10 @@ class Boundary:
     place: Indices
 
     def corner_faces(self, angle: float) -> Indices:
-        """Number the faces (k, v) that each facet belongs to round each of its nodes, all nodes
-        apart."""
+        """Return the numbers (k, v) of the faces of each facet round each of its nodes.
+
+        All nodes are taken apart.
+        """
         node = self.vertices.ravel()
         normals = self.normals.reshape(-1, self.normals.shape[2])
         order = np.argsort(node, kind="stable")
@@ -66,7 +71,7 @@ class Boundary:
         return connected(len(node), *pairs).reshape(self.vertices.shape)
 
     def faces(self, angle: float) -> Indices:
-        """Number the face (k,) of each facet over the whole boundary."""
+        """Return the number (k,) of the face of each facet over the whole boundary."""
         k, v = self.vertices.shape
         of_facet = np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()
         return np.unique(connected(k + k * v, *of_facet)[:k], return_inverse=True)[1].ravel()
@@ -83,8 +88,11 @@ def checked_angle(owner: str, value: Any) -> float:
 
 
 def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) -> Boundary:
-    """Gather the facets of a group; with the angle ``beyond`` only those round nodes where some may
-    turn by more than it from others: of a smooth boundary none. Collective."""
+    """Gather the facets of a group. Collective.
+
+    With the angle ``beyond`` these are only those round nodes where some may turn by more than it
+    from others: of a smooth boundary none.
+    """
     mesh, local = space.mesh, np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
     vertices, plane = space.corners_of_facets(local), outward(mesh, local, geometry)
@@ -107,9 +115,11 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
 
 
 def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -> Indices:
-    """Numbers of the nodes, the same on every rank, whose facets have normals in too large a box
-    for all to be within the angle of one another. Of nodes that other ranks own every rank tells
-    the box of those facets that it holds."""
+    """Return the numbers of the nodes, the same on every rank, at which facets may turn.
+
+    Their facets have normals in too large a box for all to be within the angle of one another. Of
+    nodes that other ranks own every rank tells the box of those facets that it holds.
+    """
     every = normals.reshape(-1, normals.shape[2])
     numbers, low, high = _boxes(vertices.ravel(), every, every)
     away = ~np.isin(numbers, space.nodes)
@@ -147,11 +157,13 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
 
 
 def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
-    """Outward unit normals (k, n, d) at the nodes of curved facets; ``plane``: those of the planes
-    of their vertices.
+    """Return outward unit normals (k, n, d) at the nodes of curved facets.
+
+    ``plane``: the normals of the planes of their vertices.
 
     At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices
-    around."""
+    around.
+    """
     x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][
         :, :, : space.dimension
     ]
@@ -182,8 +194,10 @@ def _turn(one: Array, other: Array) -> Array:
 
 
 def integrals(space: FemSpace, indices: Any) -> Array:
-    """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets; in a hierarchy those of
-    the vertices, which are of first order. Collective."""
+    """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets. Collective.
+
+    In a hierarchy they are those of the vertices, which are of first order.
+    """
     mesh, d = space.mesh, space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
     V, blocks = (space.V, slice(None)) if space.hierarchy is None else space.hierarchy.vertices
@@ -200,10 +214,12 @@ def integrals(space: FemSpace, indices: Any) -> Array:
 
 
 def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
-    """Return (nodes, at corners one for each face with its normal and weight; a facet of the face,
-    -1 elsewhere).
+    """Return (nodes, a facet of the face of each, -1 elsewhere).
 
-    ``nodes``: of this rank or of all, the order is kept. Collective."""
+    At corners there is one node for each face with its normal and weight.
+
+    ``nodes``: of this rank or of all, the order is kept. Collective.
+    """
     if not len(around.vertices):
         return nodes, np.full(len(nodes.numbers), -1)
     corners, labels = (
@@ -234,11 +250,13 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
 
 
 def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices) -> Array:
-    """``integrals`` (pairs, 1 + d) at corner nodes over one of their faces, for pairs of node and
-    face.
+    """Return ``integrals`` (pairs, 1 + d) at corner nodes over one of their faces.
+
+    They are those for pairs of node and face.
 
     Facets are sorted into classes, in which those at one node are all of one face, and each class
-    is integrated."""
+    is integrated.
+    """
     corners = np.unique(pairs[:, 0])
     classes, row_of = _classes(around.vertices, labels, corners), np.full(int(labels.max()) + 1, -1)
     row_of[pairs[:, 1]] = np.arange(len(pairs))
@@ -254,8 +272,10 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
 
 
 def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
-    """Class (k,) of every facet at a corner, -1 for others; facets of different faces at a node
-    differ in class."""
+    """Return the class (k,) of every facet at a corner, -1 for others.
+
+    Facets of different faces at a node differ in class.
+    """
     classes = np.full(len(vertices), -1, dtype=np.int64)
     at_corner = np.isin(vertices, corners)
     around: dict[int, list[tuple[int, int]]] = {int(node): [] for node in corners}
@@ -277,11 +297,13 @@ def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
 
 
 def in_symmetry_planes(normals: Array, held: Mask) -> Array:
-    """Return normals (k, d) without the prescribed components of their nodes, where that turns them
-    by little.
+    """Return normals (k, d) without the prescribed components of their nodes.
+
+    This is done where it turns them by little.
 
     On a symmetry plane the true normal lies in the plane; that of the facets on one side of it
-    leans to that side."""
+    leans to that side.
+    """
     inside = np.where(held, 0.0, normals)
     length = np.linalg.norm(inside, axis=1)[:, None]
     return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))

@@ -1,11 +1,13 @@
-"""Turn contact nodes to their frames, and conditions with them: the bases T and R of a
-`ContactSurface`.
+"""Turn contact nodes to their frames, and conditions with them.
+
+These are the bases T and R of a `ContactSurface`.
 
 A condition is a node, a contact direction and, between two bodies, what the node faces. Each node
 has one frame Q, with the directions of all its conditions among its vectors, and its unknowns are û
 = Qᵀu: every u·n is one of them. Forces are Q f̂ then, and u = T û with T = Q⁻ᵀ: Q itself, unless
 directions of the node are oblique. In space a node with two directions has the unit vector along
-its edge as the third. A rank holds the conditions of its own nodes."""
+its edge as the third. A rank holds the conditions of its own nodes.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -35,8 +37,10 @@ INDEPENDENT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """Hold what contact nodes face: opposite node s the other body moves by sum_j P_sj u_j, nodes
-    of all ranks."""
+    """Hold what contact nodes face.
+
+    Opposite node s the other body moves by sum_j P_sj u_j, nodes of all ranks.
+    """
 
     nodes: Nodes
     P: sp.csr_matrix
@@ -44,10 +48,12 @@ class Facing:
 
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
-    """Hold this rank's conditions u·direction <= gap at nodes, u being relative to what they are
-    ``facing`` if that deforms too, and less what the ``bubbles`` of edges add where displacements
-    have them (``.bubbles``); ``slots``: their numbers among those of all ranks, ascending.
-    ``borrowed``: pressures of nodes without one."""
+    """Hold this rank's conditions u·direction <= gap at nodes.
+
+    u is relative to what they are ``facing`` if that deforms too, and less what the ``bubbles`` of
+    edges add where displacements have them (``.bubbles``); ``slots``: their numbers among those of
+    all ranks, ascending. ``borrowed``: pressures of nodes without one.
+    """
 
     nodes: Nodes
     directions: Array
@@ -59,21 +65,26 @@ class NodalConditions:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class FemSurface(ContactSurface):
-    """Hold a contact surface that remembers what it was made of, so that it can be joined with
-    others."""
+    """Hold a contact surface that remembers what it was made of.
+
+    So it can be joined with others.
+    """
 
     space: NodalSpace = field(repr=False)
     parts: tuple[NodalConditions, ...] = field(repr=False)
 
 
 class NodalFrames:
-    """Make one frame of unit vectors per node of conditions, orthonormal unless the node has
-    oblique directions.
+    """Make one frame of unit vectors per node of conditions.
+
+    It is orthonormal unless the node has oblique directions.
 
     Attributes:
-        numbers: (k,) nodes; blocks: (k, d, d) frames Q, vectors as columns; turns: (k, d, d) Q⁻ᵀ.
-        place, column: (m,) node and column of each condition; double: (k,) nodes with several
-            conditions.
+        numbers: (k,) nodes.
+        blocks: (k, d, d) frames Q, vectors as columns.
+        turns: (k, d, d) Q⁻ᵀ.
+        place, column: (m,) node and column of each condition.
+        double: (k,) nodes with several conditions.
         oblique: whether some node has directions that are not at right angles.
         rubs: (m, d-1) tangential vectors that belong to each condition; what a node with several of
             them has left, the direction of the edge in space, belongs to the first.
@@ -110,8 +121,10 @@ class NodalFrames:
         self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
 
     def own_vectors(self) -> Mask:
-        """Return which vectors (m, d) of its node belong to each condition: its direction, and
-        those that rub."""
+        """Return which vectors (m, d) of its node belong to each condition.
+
+        They are its direction, and those that rub.
+        """
         m, d = self.place.size, self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
         np.put_along_axis(own, tangential_columns(self.column, d), self.rubs, axis=1)
@@ -148,15 +161,19 @@ class NodalFrames:
 
 
 def snapped(directions: Array) -> Array:
-    """Turn directions to an axis where they are along it to round-off: axis-aligned walls stay
-    unrotated."""
+    """Turn directions to an axis where they are along it to round-off.
+
+    Axis-aligned walls stay unrotated.
+    """
     snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
 
 
 def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
-    """Return what makes the frames of conditions: numbers and points of their nodes, directions,
-    held components."""
+    """Return what makes the frames of conditions.
+
+    This is numbers and points of their nodes, directions, held components.
+    """
     nodes = joined_nodes([part.nodes for part in parts])
     return (
         nodes.numbers,
@@ -167,8 +184,10 @@ def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask
 
 
 def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
-    """Make the surface of these conditions, one part after the other. ``data``: gap0, weights and
-    whatever else it holds of each condition of this rank. Collective."""
+    """Make the surface of these conditions, one part after the other.
+
+    ``data``: gap0, weights and whatever else it holds of each condition of this rank. Collective.
+    """
     comm, d = space.comm, space.dimension
     starts = np.cumsum([0, *comm.sum(np.array([float(len(part.slots)) for part in parts]))]).astype(
         np.int64
@@ -204,8 +223,10 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
 
 
 def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
-    """The identity but for the blocks of contact nodes (T, or T⁻ᵀ); None when all are the identity
-    too. Collective."""
+    """Return the identity but for the blocks of contact nodes (T, or T⁻ᵀ). Collective.
+
+    It is None when all blocks are the identity too.
+    """
     n = len(space.ids)
     if not largest(space.comm, np.any(blocks != np.eye(space.dimension))):
         return None
@@ -223,10 +244,13 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
 def _coupling(
     space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
 ) -> Matrix | None:
-    """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj
-    u_j + sum_k P_sk e_k).
+    """Return R with û = R ǔ.
 
-    At nodes with several conditions each one's own vectors only are relative to what it faces."""
+    To the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk
+    e_k).
+
+    At nodes with several conditions each one's own vectors only are relative to what it faces.
+    """
     if all(part.facing is None and not part.bubbles for part in parts):
         return None
     _refuse_chains(space, parts)
@@ -264,7 +288,9 @@ def _coupling(
 
 def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
     """T (k, d, d) of nodes that are faced, of all ranks; the axes where nothing else touches them.
-    Collective."""
+
+    Collective.
+    """
     d = space.dimension
     known = np.zeros((len(space.nodes), 1 + d * d))
     own = space.blocks_of(frames.numbers)
@@ -287,8 +313,11 @@ def _faced(
 
 
 def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
-    """InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another: R⁻¹ = 2
-    - R needs them apart. Collective."""
+    """Raise InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another.
+
+    R⁻¹ = 2
+    - R needs them apart. Collective.
+    """
     coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles]
     first = np.zeros((len(space.nodes), 1))
     first[space.blocks_of(np.concatenate(coupled))] = 1.0

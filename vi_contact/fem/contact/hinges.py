@@ -1,10 +1,12 @@
-"""Find nodes at which two bodies hang together by a point, or by a line in space: a contact is
-glued there.
+"""Find nodes at which two bodies hang together by a point, or by a line in space.
+
+A contact is glued there.
 
 Bodies that are drawn between the same corner points share these nodes, although each has sides of
 its own. The tip of a crack is a shared node too, but there the material goes on: its cells hang
 together through their facets, round the tip. So a node is a hinge if its cells do not hang together
-through facets at the node."""
+through facets at the node.
+"""
 
 from collections.abc import Sequence
 
@@ -27,7 +29,8 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
 
     Things that are connected are pairs of a node and a facet at it: all those of one cell, and so,
     as a facet is of two cells and may be of two ranks, all those round the node. Mid-points of
-    edges and sides are no hinges."""
+    edges and sides are no hinges.
+    """
     mesh, d = space.mesh, space.mesh.topology.dim
     names, vertices = node_numbers(mesh), len(compat.sub_entities(mesh, 0))
     corners = names[compat.geometry_dofmap(mesh)[:, :vertices]]
@@ -79,8 +82,10 @@ def hinges_of(space: FemSpace, nodes: Nodes) -> Mask:
 
 
 def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
-    """Raise InputError for hinges at these points (k, d), ordered, if there are any; ``names``: of
-    the boundaries."""
+    """Raise InputError for hinges at these points (k, d), if there are any.
+
+    The points are ordered; ``names`` are those of the boundaries.
+    """
     if not len(points):
         return
     places = " and ".join(at(point) for point in points[:NAMED])

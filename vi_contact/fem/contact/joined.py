@@ -1,5 +1,7 @@
-"""Join several contact surfaces of one system: more than one pair of bodies, pairs and obstacles,
-corners."""
+"""Join several contact surfaces of one system.
+
+So there can be more than one pair of bodies, pairs and obstacles, corners.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -71,7 +73,7 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
 
 
 def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
-    """The motions of all conditions from those of the surfaces."""
+    """Return the motions of all conditions from those of the surfaces."""
     if all(motion is None for motion, _ in motions):
         return None
     return lambda t: np.concatenate(
@@ -80,8 +82,10 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
 
 
 def _slide(made: Sequence[FemSurface]) -> Motion | None:
-    """The slides of all conditions, those of nodes with several along the vectors that are left to
-    them."""
+    """Return the slides of all conditions.
+
+    Those of nodes with several are along the vectors that are left to them.
+    """
     joined = _joined(
         [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made]
     )

@@ -1,7 +1,9 @@
-"""Find the nodes of side 2 that a contact node of side 1 faces: u_2 at the point opposite node s is
-sum_j P_sj u_j.
+"""Find the nodes of side 2 that a contact node of side 1 faces.
 
-The rows of P sum to one, so that a common translation of both bodies opens and closes nothing."""
+The displacement u_2 at the point opposite node s is sum_j P_sj u_j.
+
+The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -27,11 +29,13 @@ DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows
-    of their places.
+    """Hold a boundary that may touch another, the same on every rank.
+
+    This is its name, nodes, and facets as rows of their places.
 
     ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all
-    components, -1 for others. None: there are no such nodes."""
+    components, -1 for others. None: there are no such nodes.
+    """
 
     name: str
     nodes: Nodes
@@ -40,8 +44,11 @@ class Side:
 
 
 def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a
-    weld, or tied to one of side 2, which is the same; -1 for others."""
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both.
+
+    They are so at a tip or a weld, or tied to one of side 2, which is the same; -1 stands for
+    others.
+    """
     places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
     places[own] = others
@@ -53,7 +60,8 @@ class Matched:
     """Hold the m nodes of side 1 that face side 2.
 
     Attributes:
-        rows: their rows among those of side 1; P: (m, nodes of side 2).
+        rows: their rows among those of side 1.
+        P: (m, nodes of side 2).
         weights: (m,) of their shares of the interface [m] or [m²].
         overlap: (m,) by how much the sides may overlap there [m] and count as touching.
         covered: (m,) share of the facets around a node that is in front of side 2, where the node
@@ -95,14 +103,16 @@ class Matching(Protocol):
 
 @dataclass(frozen=True)
 class NodeToNode:
-    """Match conforming sides: every node of side 1 has one node of side 2 at its place, or opposite
-    along its normal.
+    """Match conforming sides.
+
+    Every node of side 1 has one node of side 2 at its place, or opposite along its normal.
 
     ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the
     next node of side 1. Of several nodes at one place, of bodies that meet there, the partner is
     the one whose facets lie in front of all facets of the node. InputError where there is none, as
     for a stone on two stones, for nodes without a partner, two nodes with the same one, and sides
-    that do not face each other."""
+    that do not face each other.
+    """
 
     tolerance: float = BESIDE
 
@@ -110,6 +120,7 @@ class NodeToNode:
         attributes(self, positive=("tolerance",))
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
+        """Return what every node of side 1 faces; InputError where a node has no partner."""
         partner = self._partners(one, two, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
@@ -192,7 +203,8 @@ def _opposite(
 
     Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the
     normal, infinite for none; whether all that are there face away; where several are about as
-    near)."""
+    near).
+    """
     offset = two.points[places] - one.points[:, None, :]
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
@@ -216,8 +228,10 @@ def _opposite(
 
 
 def _refuse_several(one: Side, two: Side, row: int) -> None:
-    """Raise InputError for a node of side 1 that faces several nodes of side 2, each with a part of
-    what it faces."""
+    """Raise InputError for a node of side 1 that faces several nodes of side 2.
+
+    Each of them has a part of what it faces.
+    """
     where = (
         f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of "
         f"'{two.name}' at one place"
@@ -243,8 +257,10 @@ def refuse_same_way(one: str, two: str, point: Array) -> None:
 
 
 def _spacing(points: Array, size: float) -> Array:
-    """Distance of each node to the next one of the same side that is not at its place [m]; the size
-    of the mesh for a single node."""
+    """Return the distance [m] of each node to the next one of the same side.
+
+    That one is not at its place; for a single node it is the size of the mesh.
+    """
     if len(points) == 1:
         return np.array([size])
     from scipy.spatial import cKDTree

@@ -20,7 +20,8 @@ psi_t to u_t: pressure is uniform up to the weld, which carries what a multiplie
 
 Literature: Wohlmuth, SIAM J. Numer. Anal. 38 (2000); Hüeber and Wohlmuth, Comput. Methods Appl.
 Mech. Engrg. 194 (2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200
-(2011)."""
+(2011).
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -42,8 +43,9 @@ AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Match sides of plane and solid bodies with any meshes by the mortar method with dual Lagrange
-    multipliers.
+    """Match sides of plane and solid bodies with any meshes by the dual mortar method.
+
+    It has dual Lagrange multipliers.
 
     A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is
     covered, where that is at least half of its share of the facets around it; else the nodes inside
@@ -51,11 +53,13 @@ class DualMortar:
     curved face overlap by no more than their distance from it, some h²/(8R) on a curve of radius R,
     the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only. InputError
     for bars, for sides that do not face each other, in space for facets that are slivers or not
-    convex."""
+    convex.
+    """
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
+        """Return what the nodes of side 1 face by the dual mortar coupling."""
         d = one.nodes.points.shape[1]
         if d == 1:
             raise InputError(
@@ -94,9 +98,11 @@ def _refuse(one: Side, two: Side) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Segment:
-    """Hold a segment of side 1 in front of side 2: nodes, ends, pieces, ∫ phi phiᵀ (2, 2), by
-    segment of side 2 ∫ phi_i phi_j (2, 2), and by how much polygons of one curve may overlap on it
-    [m]."""
+    """Hold a segment of side 1 in front of side 2.
+
+    This is its nodes, ends, pieces, ∫ phi phiᵀ (2, 2), by segment of side 2 ∫ phi_i phi_j (2, 2),
+    and by how much polygons of one curve may overlap on it [m].
+    """
 
     nodes: Array
     ends: Array
@@ -133,8 +139,10 @@ def _in_plane(one: Side, two: Side) -> Coupled:
 def _overlap(
     pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array
 ) -> float:
-    """By how much the polygon of side 2, of curvature H at its segments, may overlap a segment of
-    side 1 [m]."""
+    """Return by how much the polygon of side 2 may overlap a segment of side 1 [m].
+
+    Side 2 is of curvature H at its segments.
+    """
     segment = [piece[2] for piece in pieces]
     share = np.array([0.0, 0.5, 1.0])
     own = np.array([low + share * (high - low) for low, high, *_ in pieces])
@@ -145,7 +153,7 @@ def _overlap(
 
 
 def _covered(segments: list[_Segment], common: Mask) -> Covered:
-    """What is covered of these segments; ``common``: nodes (m,) of both sides."""
+    """Return what is covered of these segments; ``common``: nodes (m,) of both sides."""
     ends = np.array(
         [
             [min(piece[0] for piece in one.pieces), max(piece[1] for piece in one.pieces)]
@@ -169,8 +177,10 @@ def _covered(segments: list[_Segment], common: Mask) -> Covered:
 def _assembled(
     one: Side, two: Side, segments: list[_Segment], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
-    """D (m,), M (m, n) and by how much polygons of one curve may overlap at each node of side 1
-    (m,) [m]."""
+    """Return D (m,), M (m, n) and by how much polygons of one curve may overlap.
+
+    They may overlap so at each node of side 1 (m,) [m].
+    """
     m, n = len(one.nodes.points), len(two.nodes.points)
     D, M, overlap, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
     for part, by, used in zip(segments, carried.by, carried.used, strict=True):
@@ -206,8 +216,10 @@ def _carry(
     by: Indices,
     carried: Mask,
 ) -> None:
-    """Add to D and M what a segment adds of which some node is carried by the nodes of another
-    (``covering``)."""
+    """Add to D and M what a segment adds with nodes that are carried.
+
+    Some node of it is carried by the nodes of another (``covering``).
+    """
     weights, inverse = part.own.sum(axis=1), np.linalg.inv(part.own)
     there = part.places(points[by])[None, :, None]
     shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
@@ -233,8 +245,11 @@ def _normals(side: Side, ends: Array) -> Array:
 def _pieces(
     ends: Array, normal: Array, ends2: Array, normals2: Array
 ) -> Iterator[tuple[float, float, int, Array]]:
-    """(low, high, segment of side 2, its coordinates at low and high) of each piece of a segment of
-    side 1, in its coordinate from 0 to 1: where several segments lie opposite, the nearest."""
+    """Return the pieces of a segment of side 1, in its coordinate from 0 to 1.
+
+    Each is (low, high, segment of side 2, its coordinates at low and high): where several segments
+    lie opposite, the nearest.
+    """
     along = ends[1] - ends[0]
     place = (ends2 - ends[0]) @ along / (along @ along)  # (k, 2): projections of the ends of side 2
     height = (ends2 - ends[0]) @ normal

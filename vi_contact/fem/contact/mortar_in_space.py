@@ -1,5 +1,6 @@
-"""Integrate the dual mortar coupling of sides in space, of triangles or quadrilaterals, in any
-mixture of both sides.
+"""Integrate the dual mortar coupling of sides in space.
+
+They are of triangles or quadrilaterals, in any mixture of both sides.
 
 A node of side 1 looks along its own normal, so that what it faces lies on that normal and normal
 forces have no moment. Along it, its facets and those of side 2 are seen as polygons of a plane
@@ -10,7 +11,8 @@ forces have no moment. Along it, its facets and those of side 2 are seen as poly
 with b = phi if that is all of it (biorthogonal functions, of distorted quadrilaterals too) and b =
 (1, x, y) if it is a part: bilinear functions, carried on from a strip of a facet to its far nodes,
 grow without bound as the strip thins. Both keep sum_s psi_s = 1, ∫ psi_s = D_s > 0 and ∫ psi_s x =
-D_s x_s, and are the same on triangles."""
+D_s x_s, and are the same on triangles.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,8 +35,10 @@ POINTS = 2**18  # at which functions are held at once, a few for each triangle o
 
 
 def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
-    """Return ∫ phi phiᵀ (looks, v, v) over the pieces of looks, and by piece ∫ phi_i phi_j (pieces,
-    v, w) with the functions of side 2."""
+    """Return ∫ phi phiᵀ (looks, v, v) over the pieces of looks, and those by piece.
+
+    By piece they are ∫ phi_i phi_j (pieces, v, w) with the functions of side 2.
+    """
     k, v, w = len(looks.nodes), looks.polygons.shape[1], pieces.seen.shape[1]
     own, mixed = np.zeros((len(pieces.look), v * v)), np.zeros((len(pieces.look), v * w))
     orders = np.maximum(order_of(looks.polygons)[pieces.look], order_of(pieces.seen))
@@ -62,9 +66,11 @@ def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
 
 
 def order_of(polygons: Array) -> Indices:
-    """Return how many Gauss points a way (k,) integrate products of the shape functions of facets:
-    exactly on triangles and parallelograms, to round-off on distorted quadrilaterals, on which the
-    functions are no polynomials."""
+    """Return how many Gauss points a way (k,) integrate products of the shape functions of facets.
+
+    They do so exactly on triangles and parallelograms, to round-off on distorted quadrilaterals, on
+    which the functions are no polynomials.
+    """
     if polygons.shape[1] == 3:
         return np.full(len(polygons), 2)
     corner = turns(polygons)
@@ -94,9 +100,11 @@ def dual(looks: Looks, own: Array, whole: Mask) -> Array:
 
 
 def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
-    """Return b at the nodes of looks (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and where b = (1, 0,
-    0): the middles (looks, 1, 2) of what is in front of side 2. Lengths are over the reach of the
-    facet."""
+    """Return b at the nodes of looks (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and the middles.
+
+    There b = (1, 0, 0): the middles (looks, 1, 2) of what is in front of side 2. Lengths are over
+    the reach of the facet.
+    """
     D = own.sum(axis=2)
     middle = np.einsum("kv,kvc->kc", D, looks.polygons) / D.sum(axis=1)[:, None]
     linear = np.concatenate([np.ones((*D.shape, 1)), looks.polygons - middle[:, None, :]], axis=2)
@@ -105,8 +113,10 @@ def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
 
 
 def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
-    """Return values (k, v, w) summed at their rows (k, v) and columns (k, w); column -1 stands for
-    none."""
+    """Return values (k, v, w) summed at their rows (k, v) and columns (k, w).
+
+    Column -1 stands for none.
+    """
     places = [place.ravel() for place in np.broadcast_arrays(rows[:, :, None], columns[:, None, :])]
     used = places[1] >= 0
     return sp.csr_matrix(
@@ -115,9 +125,11 @@ def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> s
 
 
 def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
-    """Return (psi (k, v, v), D (k, v), forces (k, v, v)) where nodes (k, v) are ``common`` to both
-    sides (``mortar``): others of their facet share their functions. ``forces``: shares of ∫ psi_t,
-    which they pass to the former."""
+    """Return (psi (k, v, v), D (k, v), forces (k, v, v)) where nodes (k, v) are ``common``.
+
+    They are common to both sides (``mortar``): others of their facet share their functions.
+    ``forces`` are shares of ∫ psi_t, which they pass to the former.
+    """
     if not common.any():
         return functions, D, np.zeros_like(functions)
     share = ~common / np.maximum(np.sum(~common, axis=1), 1)[:, None]
@@ -132,9 +144,11 @@ def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array,
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Hold some looks with something in front of them: what they share with side 2 (``pieces``),
-    the covered share (looks,) of each, and ``integrals`` of the functions of side 1, and of both
-    sides."""
+    """Hold some looks with something in front of them.
+
+    This is what they share with side 2 (``pieces``), the covered share (looks,) of each, and
+    ``integrals`` of the functions of side 1, and of both sides.
+    """
 
     looks: Looks
     pieces: Pieces
@@ -150,8 +164,10 @@ class _Block:
         return np.asarray(found >= 1.0 - WHOLE)
 
     def middles(self) -> Array:
-        """Return the middles (looks, 3) of the covered parts: means of those of the pieces,
-        weighted with areas."""
+        """Return the middles (looks, 3) of the covered parts.
+
+        They are means of those of the pieces, weighted with areas.
+        """
         size, looks = areas(self.pieces.polygons), self.looks
         seen = summed(
             self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes)
@@ -184,8 +200,10 @@ def in_space(one: Side, two: Side) -> Coupled:
 
 
 def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
-    """What is covered of the looks of these blocks, of each for the nodes that ask; ``common``:
-    nodes (m,) of both sides."""
+    """Return what is covered of the looks of these blocks.
+
+    It is told of each for the nodes that ask; ``common``: nodes (m,) of both sides.
+    """
     v = ours.nodes.shape[1]
     weights, full, inside = [], [], []
     for block in blocks:
@@ -219,8 +237,10 @@ def _whole_weights(looks: Looks) -> Array:
 def _assembled(
     one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
-    """D (m,), M (m, n) and by how much facets of one curved face may overlap at each node of side 1
-    (m,) [m]."""
+    """Return D (m,), M (m, n) and by how much facets of one curved face may overlap.
+
+    They may overlap so at each node of side 1 (m,) [m].
+    """
     m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
     D, overlap, parts, start = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))], 0
     points, H = one.nodes.points, curvatures(theirs.corners, theirs.nodes, theirs.normals)
@@ -254,9 +274,11 @@ def _assembled(
 
 
 def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
-    """By how much the pieces (k,) of looks with these corners (looks, v, 3) may overlap facets of
-    side 2, of curvature H, that are of one curved face [m]: at the corners and in the middle of
-    each."""
+    """Return by how much the pieces (k,) of looks may overlap facets of one curved face [m].
+
+    The looks have these corners (looks, v, 3), the facets are of side 2, of curvature H. It is told
+    at the corners and in the middle of each.
+    """
     looks, pieces = block.looks, block.pieces
     points = np.concatenate([pieces.polygons, pieces.polygons.mean(axis=1, keepdims=True)], axis=1)
     one = hats(looks.polygons[pieces.look], points), corners[pieces.look]
@@ -267,8 +289,10 @@ def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
 def _carry(
     D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, borne: Mask, n: int
 ) -> sp.coo_matrix:
-    """Add to D what the nodes ``by`` (looks, v) of other facets carry of nodes (looks, v) that are
-    ``borne``, and return what belongs to it in M (``covering``)."""
+    """Add to D what the nodes ``by`` (looks, v) of other facets carry of those ``borne``.
+
+    The borne nodes are (looks, v). Return what belongs to it in M (``covering``).
+    """
     looks, pieces = block.looks, block.pieces
     rows = np.flatnonzero(borne.any(axis=1))
     some, place = looks.pick(rows), np.full(len(looks.nodes), -1)

@@ -4,7 +4,8 @@ Conditions are numbered in the order of the nodes' original numbers, or of the l
 asked for them: no number of ranks changes it. For that the numbers alone are gathered, 8 bytes a
 condition on every rank; what belongs to nodes stays with their owners, but for the two sides of a
 pair of bodies, which every rank searches for partners: some 120 bytes a node in space with its
-share of facets, 25 MB for two sides of 10⁵ nodes (``pairs.side_of``)."""
+share of facets, 25 MB for two sides of 10⁵ nodes (``pairs.side_of``).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -26,9 +27,11 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Nodes(Rows):
-    """Hold nodes of a boundary, those of this rank or all: original numbers, coordinates, body
-    normals, weights, held components, and the numbers over all ranks of their free unknowns, -1 for
-    held ones."""
+    """Hold nodes of a boundary, those of this rank or all.
+
+    This is original numbers, coordinates, body normals, weights, held components, and the numbers
+    over all ranks of their free unknowns, -1 for held ones.
+    """
 
     numbers: Indices
     points: Array
@@ -46,15 +49,19 @@ def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
 
 
 def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
-    """Return the nodes of all ranks on every rank, by their numbers: about 90 bytes for each in
-    space. Collective."""
+    """Return the nodes of all ranks on every rank, by their numbers. Collective.
+
+    It takes about 90 bytes for each in space.
+    """
     found = joined_nodes(from_each(comm, nodes))
     return found.pick(np.argsort(found.numbers))
 
 
 def slots_of(comm: Comm, keys: Indices) -> Indices:
     """Return the places (m,) of this rank's ascending keys among all; equal ones are of one rank.
-    Collective."""
+
+    Collective.
+    """
     every = np.sort(np.concatenate(from_each(comm, keys)))
     return np.asarray(
         np.searchsorted(every, keys) + np.arange(len(keys)) - np.searchsorted(keys, keys)
@@ -64,9 +71,11 @@ def slots_of(comm: Comm, keys: Indices) -> Indices:
 def asked(
     comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *values: Any
 ) -> tuple[Any, ...]:
-    """Return what ``ask`` answers for this rank's rows of the values. Where it raises on some rank
-    it is asked for the rows of all, in the order of their slots, so that all ranks raise what one
-    rank alone would. Collective."""
+    """Return what ``ask`` answers for this rank's rows of the values.
+
+    Where it raises on some rank it is asked for the rows of all, in the order of their slots, so
+    that all ranks raise what one rank alone would. Collective.
+    """
     if comm.size == 1:
         return ask(*values)
     answer, failed = (), False

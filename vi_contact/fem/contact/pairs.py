@@ -1,5 +1,6 @@
-"""Make contact between two deformable bodies: the unknowns of side 1 become displacements relative
-to side 2.
+"""Make contact between two deformable bodies.
+
+The unknowns of side 1 become displacements relative to side 2.
 
 Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s
 = Q_sᵀ u_s, the unknowns û of the nodal frames are written in new ones ǔ,
@@ -9,7 +10,8 @@ Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j
 so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0 is the condition,
 friction acts on ǔ_t, and the work of a reaction on ǔ is that of the pair of forces r on side 1 and
 -P_sjᵀ r on side 2: action is reaction. n is the outward normal of side 1, from side 1 to side 2.
-Displacements are small: nobody's partner changes."""
+Displacements are small: nobody's partner changes.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -56,8 +58,9 @@ def contact_pair(
     feature_angle: float = FEATURE_ANGLE,
     hinges: bool = False,
 ) -> ContactSurface:
-    """Make the contact conditions between two boundaries of deformable bodies, or two faces of a
-    crack.
+    """Make the contact conditions between two deformable boundaries.
+
+    They are those of two bodies, or two faces of a crack.
 
     Each node of side 1 has a condition, with the normals, weights (times the section's thickness)
     and forces of side 1; r_n / weights is the pressure. Either side may be the first. Pressures are
@@ -78,6 +81,9 @@ def contact_pair(
     by ``joined_surfaces``.
 
     Args:
+        system: the system of both bodies, of ``assemble``.
+        facets1: side 1, whose nodes have the conditions.
+        facets2: side 2.
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in
             this order.
@@ -90,39 +96,9 @@ def contact_pair(
             each other, bodies that overlap, sides of one and the same boundary, contact directions
             that are partly prescribed, clamped nodes that face free ones.
     """
-    space = contact_space(
-        "contact_pair",
-        system,
-        {"facets1": facets1, "facets2": facets2},
-        points,
-        matching=matching,
-        feature_angle=feature_angle,
-    )
-    optional(
-        provides,
-        "contact_pair",
-        "matching",
-        matching,
-        ("match",),
-        "give NodeToNode() or DualMortar(), or None",
-    )
-    angle = checked_angle("contact_pair", feature_angle)
+    space, angle = _checked_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
-    if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
-        raise InputError(
-            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
-            "both "
-            "sides alike, or use degree=1"
-        )
-    one, two = side_of(space, facets1), side_of(space, facets2)
-    shared = np.isin(one.nodes.numbers, two.nodes.numbers)
-    if shared.all():
-        raise InputError(
-            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
-            "mesh the "
-            "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
-        )
-    _refuse_common(one, two)
+    one, two, shared = _two_sides(space, facets1, facets2)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
     places = _tied_over(space, one, two)
     one = replace(one, tied=places)
@@ -152,10 +128,7 @@ def contact_pair(
     kinds["in front of nothing"] &= ~kinds["tied to the other side"]
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
-        chosen = listed(space, nodes, points, one.name)
-        rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
-        kinds["not listed"] = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
-        nodes, matched = nodes.pick(rows), matched.pick(rows)
+        nodes, matched, kinds["not listed"] = _pick_listed(space, one, nodes, matched, points)
     alone = nodes.numbers
     directions = snapped(nodes.normals)
     gap, P = _gap(space, one.name, two, nodes, directions, matched), matched.P
@@ -185,9 +158,77 @@ def contact_pair(
     return replace(surface, **prescribed_motion(space, conditions))
 
 
+def _checked_pair(
+    system: SemiDiscreteSystem,
+    facets1: Facets,
+    facets2: Facets,
+    points: Sequence[Sequence[float]] | None,
+    matching: Matching | None,
+    feature_angle: float,
+) -> tuple[FemSpace, float]:
+    """Return the space of the system and the angle [rad]; InputError for wrong arguments."""
+    space = contact_space(
+        "contact_pair",
+        system,
+        {"facets1": facets1, "facets2": facets2},
+        points,
+        matching=matching,
+        feature_angle=feature_angle,
+    )
+    optional(
+        provides,
+        "contact_pair",
+        "matching",
+        matching,
+        ("match",),
+        "give NodeToNode() or DualMortar(), or None",
+    )
+    angle = checked_angle("contact_pair", feature_angle)
+    if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
+        raise InputError(
+            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
+            "both "
+            "sides alike, or use degree=1"
+        )
+    return space, angle
+
+
+def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side, Side, Mask]:
+    """Return both sides, and which nodes of side 1 are shared; InputError unless they can part.
+
+    Collective.
+    """
+    one, two = side_of(space, facets1), side_of(space, facets2)
+    shared = np.isin(one.nodes.numbers, two.nodes.numbers)
+    if shared.all():
+        raise InputError(
+            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
+            "mesh the "
+            "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
+        )
+    _refuse_common(one, two)
+    return one, two, shared
+
+
+def _pick_listed(
+    space: FemSpace,
+    one: Side,
+    nodes: Nodes,
+    matched: Matched,
+    points: Sequence[Sequence[float]],
+) -> tuple[Nodes, Matched, Mask]:
+    """Return the nodes nearest to the points, in their order, and which of side 1 are not."""
+    chosen = listed(space, nodes, points, one.name)
+    rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
+    others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
+    return nodes.pick(rows), matched.pick(rows), others
+
+
 def side_of(space: FemSpace, facets: Facets) -> Side:
     """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers.
-    Collective."""
+
+    Collective.
+    """
     nodes = everywhere(space.comm, nodes_on(space, facets))
     rows = np.concatenate(
         space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices)))
@@ -197,8 +238,10 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 
 def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
-    """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers
-    of those in front of side 2, and of those that are clamped."""
+    """Return kind -> mask of the nodes of side 1 without a condition.
+
+    ``opposite``, ``clamped``: numbers of those in front of side 2, and of those that are clamped.
+    """
     numbers = one.nodes.numbers
     return {
         "shared by both sides": shared,
@@ -228,7 +271,9 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
 
 def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
     """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved.
-    Collective."""
+
+    Collective.
+    """
     sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
     moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
@@ -237,8 +282,10 @@ def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
 def _watched(
     space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
-    """What watches nodes of side 1, given of all ranks, that are held in every component in front
-    of others that are. Collective."""
+    """Return what watches nodes of side 1 that are held in every component. Collective.
+
+    They are given of all ranks, and in front of others that are held so too.
+    """
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
     nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
@@ -255,8 +302,10 @@ def _watched(
 def _borrowed(
     space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
-    """What nodes of side 1 without a pressure of their own take of neighbours, not those in front
-    of nothing."""
+    """Return what nodes of side 1 without a pressure of their own take of neighbours.
+
+    Those in front of nothing are left out.
+    """
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
     ]
@@ -264,8 +313,11 @@ def _borrowed(
 
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
-    """Return which nodes of side 1 only glue bodies together; InputError unless they are
-    ``allowed``. Collective."""
+    """Return which nodes of side 1 only glue bodies together. Collective.
+
+    Raises:
+        InputError: there are some, and they are not ``allowed``.
+    """
     numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
     found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
@@ -280,9 +332,11 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
 
 
 def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all
-    components; of several, as where ties meet, the nearest; -1 for others. They cannot part, as the
-    two sides of a weld."""
+    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied.
+
+    They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
+    They cannot part, as the two sides of a weld.
+    """
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
@@ -309,8 +363,10 @@ def _refuse_common(one: Side, two: Side) -> None:
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1, with normals and weights of their own, and the nodes' over
-    the whole side."""
+    """Return the smooth faces of side 1, with normals and weights of their own.
+
+    The nodes' normals and weights over the whole side are returned too.
+    """
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
@@ -339,11 +395,13 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
 def _by_face(
     faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
-    """(nodes with the normals and weights of their faces, what they face), ordered by number;
-    ``carried`` are numbers of nodes then.
+    """Return (nodes with the normals and weights of their faces, what they face).
+
+    They are ordered by number; ``carried`` are numbers of nodes then.
 
     Faces in front of nothing are left out where the matching leaves out parts of sides, unless all
-    are."""
+    are.
+    """
     refusal, found = None, []
     for side, mean in faces:
         try:
@@ -377,9 +435,12 @@ def _by_face(
 
 
 def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
-    """What a face of side 1 faces: along its own normals or, since across a gap the partner of a
-    corner lies on the bisector, along the ``mean`` normals of its nodes; not where a matching
-    leaves out what faces nothing: sides of a block would see the ground beside its base."""
+    """Return what a face of side 1 faces.
+
+    It is sought along its own normals or, since across a gap the partner of a corner lies on the
+    bisector, along the ``mean`` normals of its nodes. This is not so where a matching leaves out
+    what faces nothing: sides of a block would see the ground beside its base.
+    """
     try:
         return matching.match(side, two, size)
     except InputError:
@@ -393,8 +454,11 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 
 def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Return what is matched and not clamped; InputError for clamped nodes facing free ones, or
-    with none left."""
+    """Return what is matched and not clamped.
+
+    Raises:
+        InputError: clamped nodes face free ones, or none are left.
+    """
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
@@ -417,8 +481,10 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
 def _gap(
     space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
-    """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of
-    polygons count as 0."""
+    """Return initial gaps n·(P x_2 - x_1) >= 0.
+
+    Overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0.
+    """
     gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:

@@ -4,7 +4,8 @@ Nodes of different bodies, or of both faces of a joint, may coincide. Which of t
 follows from the facets around it: a partner must have facets of side 2 in front of them. If one
 partner has all of these it is the one, and what the others have lies beside it, as in a column of
 stones beside another column. If each has a part of them, as two stones under the middle of a third
-one have, no single partner is right."""
+one have, no single partner is right.
+"""
 
 from dataclasses import dataclass
 
@@ -30,8 +31,10 @@ class Surface:
 
 
 def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int) -> Mask:
-    """Return in front of which facets at a node of side 1 (m,) the facets at its partner lie, seen
-    along the normal."""
+    """Return in front of which facets at a node of side 1 (m,) those at its partner lie.
+
+    They are seen along the normal.
+    """
     frame = nodal_frames(normal[None])[0][:, 1:]
     ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
     arms = (two.around(partner) - two.points[partner]) @ frame
@@ -53,10 +56,15 @@ def one_of(
     """Return which of several partners a node of side 1 faces; -1 where no single one is right.
 
     Args:
+        one: side 1.
+        node: the place of the node on side 1.
+        normal: (d,) its normal.
+        two: side 2.
         partners: (k,) places on side 2, of nodes that face this one. The first is taken where none
             has a facet in front of one of side 1, as where bodies meet at a corner only.
         apart: (k,) their distances [m]; partners that differ by up to ``close`` [m] are at one
             place.
+        close: that distance [m].
     """
     seen = np.array([in_front(one, node, normal, two, partner) for partner in partners])
     facing = np.flatnonzero(seen.any(axis=1))
@@ -68,8 +76,10 @@ def one_of(
 
 
 def _within(ways: Array, arm: Array) -> Mask:
-    """Return which directions (m, d - 1) lie in the corner of a facet whose nodes are seen at
-    ``arm`` (v, d - 1)."""
+    """Return which directions (m, d - 1) lie in the corner of a facet.
+
+    The nodes of the facet are seen at ``arm`` (v, d - 1).
+    """
     length = np.linalg.norm(arm, axis=1)
     seen = length > FLAT * length.max(initial=0.0)
     if arm.shape[1] == 0:  # a bar: its end is all there is

@@ -1,5 +1,7 @@
-"""Make contact conditions of listed nodes: of a user's own matrices, where nothing is known of
-facets."""
+"""Make contact conditions of listed nodes.
+
+They are for a user's own matrices, where nothing is known of facets.
+"""
 
 from typing import Any
 
@@ -30,8 +32,9 @@ def contact_points(
     obstacle: Obstacle | None = None,
     opposite: Any = None,
 ) -> ContactSurface:
-    """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order; also node
-    against node.
+    """Make one contact condition gap0 - u·n >= 0 at each listed node.
+
+    They are in this order; also node against node.
 
     All ranks give the same. Nodes at which the normal is oblique get frames of their own, and
     tangents for friction.
@@ -128,7 +131,7 @@ def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") ->
 def _nodes(
     space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array
 ) -> Nodes:
-    """What all ranks need to know of nodes. Collective."""
+    """Return what all ranks need to know of nodes. Collective."""
     d, own = (
         space.dimension,
         np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers]),

@@ -1,9 +1,11 @@
-"""Find what the nodes of side 1 see of side 2 in space, along their normals, as polygons of a
-plane.
+"""Find what the nodes of side 1 see of side 2 in space.
+
+It is seen along their normals, as polygons of a plane.
 
 A facet of side 1 is seen along the normal of each of its nodes; where all nodes have its normal, on
 plane sides, they look at once. What a look shares with the facets in front of it is cut out; of
-several layers the nearest counts."""
+several layers the nearest counts.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -29,8 +31,11 @@ PAIRS = 2**18  # of pieces that are cut at once
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Hold the facets of a side: rows of nodes (k, v), corners (k, v, 3), middles, outward normals,
-    and the largest distance of a corner from the middle."""
+    """Hold the facets of a side.
+
+    This is rows of nodes (k, v), corners (k, v, 3), middles, outward normals, and the largest
+    distance of a corner from the middle.
+    """
 
     nodes: Indices
     corners: Array
@@ -40,8 +45,13 @@ class Facets:
 
 
 def facets_of(side: Side, sense: int) -> Facets:
-    """Return the facets of a side, anticlockwise (sense 1) or clockwise (-1) seen from outside;
-    InputError for slivers and for quadrilaterals that are not convex."""
+    """Return the facets of a side.
+
+    They are anticlockwise (sense 1) or clockwise (-1) seen from outside.
+
+    Raises:
+        InputError: slivers, and quadrilaterals that are not convex.
+    """
     nodes = np.sort(side.facets, axis=1)
     corners = side.nodes.points[nodes]
     middles = corners.mean(axis=1)
@@ -75,10 +85,11 @@ class Looks(Rows):
     """Hold facets of side 1, each seen along the normals of some of its nodes.
 
     Attributes:
-        nodes, middles, reach: of the facets, as in `Facets`; asking: for which of its nodes (k, v)
-            each is seen.
-        normals: along which they are seen; frames: two unit vectors (k, 3, 2) beside that; slant:
-            its cosine to the facet's own normal, the share of the area that is seen.
+        nodes, middles, reach: of the facets, as in `Facets`.
+        asking: for which of its nodes (k, v) each is seen.
+        normals: along which they are seen.
+        frames: two unit vectors (k, 3, 2) beside that.
+        slant: its cosine to the facet's own normal, the share of the area that is seen.
         polygons: the facets as they are seen (k, v, 2), from their middles.
     """
 
@@ -119,8 +130,11 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
 
 @dataclass(frozen=True, eq=False)
 class Pieces(Rows):
-    """Hold what looks share with facets of side 2: numbers of both, polygons (k, m, 2), the facet
-    as it is seen (k, v, 2), and its height h along the look, h_0 + h_1 x + h_2 y."""
+    """Hold what looks share with facets of side 2.
+
+    This is numbers of both, polygons (k, m, 2), the facet as it is seen (k, v, 2), and its height h
+    along the look, h_0 + h_1 x + h_2 y.
+    """
 
     look: Indices
     facet: Indices
@@ -144,8 +158,10 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 
 def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
-    """Return what these looks share with these facets of side 2, where they face each other and
-    share something."""
+    """Return what these looks share with these facets of side 2.
+
+    They do where they face each other and share something.
+    """
     offset, normals = theirs.middles[facet] - looks.middles[look], looks.normals[look]
     away = np.linalg.norm(offset - np.sum(offset * normals, axis=1)[:, None] * normals, axis=1)
     slope = np.sum(theirs.normals[facet] * normals, axis=1)
@@ -164,8 +180,11 @@ def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Piece
 
 
 def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
-    """Return (what looks share with the facets of side 2 that are nearest in front of them, share
-    of each covered); ``tree``: of the middles of the facets of side 2."""
+    """Return (what looks share with the nearest facets of side 2, share of each covered).
+
+    The facets are the nearest in front of them; ``tree``: that of the middles of the facets of side
+    2.
+    """
     k, size = len(looks.nodes), areas(looks.polygons)
     found, radius = nearby(looks, theirs, tree)
     sure = complete(found, looks, theirs, radius)
@@ -181,9 +200,11 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
 
 
 def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
-    """Return (what looks share with facets of side 2 in a ball around each, the balls' radii [m]):
-    large enough for the facets next to the one with the nearest middle; where it holds too many
-    nothing is looked at."""
+    """Return (what looks share with facets of side 2 in a ball around each, the radii [m]).
+
+    The balls are large enough for the facets next to the one with the nearest middle; where it
+    holds too many nothing is looked at.
+    """
     radius = (tree.query(looks.middles)[0] + looks.reach + float(theirs.reach.max())) * (
         1.0 + WHOLE
     )
@@ -194,12 +215,14 @@ def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
 
 
 def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask:
-    """Return whether nothing that is nearer to a look than what was found can lie outside of its
-    ball.
+    """Return whether nothing that is nearer to a look can lie outside of its ball.
+
+    It would be nearer than what was found.
 
     Where one layer, at most h away along the normal, covers all of a look, a nearer facet has its
     middle at most h along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 +
-    reach_2)²) of the look's middle."""
+    reach_2)²) of the look's middle.
+    """
     covered, farthest = (
         np.bincount(found.look, areas(found.polygons), len(radius)),
         np.zeros(len(radius)),
@@ -211,8 +234,10 @@ def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask
 
 
 def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
-    """Yield what these rows of looks share with any facet of side 2, without those whose normal
-    misses a ball around all of it."""
+    """Yield what these rows of looks share with any facet of side 2.
+
+    Rows whose normal misses a ball around all of it are left out.
+    """
     middle = 0.5 * (theirs.middles.min(axis=0) + theirs.middles.max(axis=0))
     span = (
         looks.reach
@@ -236,8 +261,10 @@ def beside(looks: Looks, rows: Indices, points: Array) -> Array:
 
 
 def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
-    """Return how many parts without a common node the pieces in front of each look are of: one may
-    hide another."""
+    """Return how many parts without a common node the pieces in front of each look are of.
+
+    One may hide another.
+    """
     nodes = pieces.look[:, None] * (int(theirs.nodes.max()) + 1) + theirs.nodes[pieces.facet]
     nodes = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape)
     links = np.repeat(np.arange(len(nodes)), nodes.shape[1]), len(nodes) + nodes.ravel()

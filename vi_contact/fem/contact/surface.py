@@ -1,5 +1,7 @@
-"""Make contact conditions of facets of a mesh: nodal normals, weights, gaps and the rotated
-basis."""
+"""Make contact conditions of facets of a mesh.
+
+They have nodal normals, weights, gaps and the rotated basis.
+"""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -60,6 +62,8 @@ def contact_surface(
     direction, as a HalfSpace does, the node has one condition.
 
     Args:
+        system: the system of the body, of ``assemble``.
+        facets: the part of the boundary.
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
             every face of a node.
         points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is
@@ -140,8 +144,10 @@ def contact_surface(
 
 
 def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
-    """Return ``motion`` and ``slide`` of this rank's conditions where what they face, or bubbles
-    are measured from, is moved. Collective."""
+    """Return ``motion`` and ``slide`` of this rank's conditions. Collective.
+
+    There are some where what they face, or bubbles are measured from, is moved.
+    """
     parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
     moves = bool(parts) and any(condition.moves for condition in space.prescribed)
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
@@ -154,9 +160,12 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
 def moved_by_held(
     space: FemSpace, conditions: Sequence[NodalConditions]
 ) -> Callable[[Array], tuple[Array, Array]]:
-    """Return a function that tells how far nodal displacements (k, d) of held components move the
-    obstacles of these conditions towards their nodes, (m,), and along their tangents, (m, d-1).
-    Both are collective."""
+    """Return a function that tells how far held components move obstacles.
+
+    Given nodal displacements (k, d) of held components, it tells how far the obstacles of these
+    conditions move towards their nodes, (m,), and along their tangents, (m, d-1). Both are
+    collective.
+    """
     frames, free = (
         NodalFrames(*given(conditions)),
         ~joined_nodes([one.nodes for one in conditions]).held,
@@ -195,8 +204,11 @@ def moved_by_held(
 def _obstacle(
     obstacle: Obstacle | None, size: float, name: str, angle: float, count: int
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """What an obstacle answers: directions and initial gaps at points with these normals, of all
-    ``count`` of a boundary or of those of a rank."""
+    """Return what an obstacle answers at points with these normals.
+
+    This is directions and initial gaps, of all ``count`` points of a boundary or of those of a
+    rank.
+    """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         if not len(points):  # users' functions need not cope with none
@@ -213,9 +225,11 @@ def _obstacle(
 def _watched(
     space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None
 ) -> tuple[Watched, ...]:
-    """What watches nodes of this rank that are prescribed in every component, at each of their
-    faces that looks towards the obstacle. InputError where such a face is in the obstacle at the
-    start. Collective."""
+    """Return what watches nodes that are prescribed in every component. Collective.
+
+    They are nodes of this rank, watched at each of their faces that looks towards the obstacle.
+    There is an InputError where such a face is in the obstacle at the start.
+    """
     slots = slots_of(space.comm, nodes.numbers)
     directions, gap = asked(
         space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals
@@ -227,8 +241,10 @@ def _watched(
 def _looking(
     obstacle: Obstacle | None, size: float
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """What an obstacle answers at points with these normals, directions of zero where they do not
-    lead out of the body or the obstacle has no answer."""
+    """Return what an obstacle answers at points with these normals.
+
+    Directions are zero where they do not lead out of the body or the obstacle has no answer.
+    """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         directions, gap = np.zeros_like(points), np.zeros(len(points))
@@ -254,14 +270,16 @@ def _looking(
 
 
 def _rows_of(nodes: Nodes, chosen: Indices) -> Indices:
-    """The rows of those nodes that are chosen, in the order of the choice."""
+    """Return the rows of those nodes that are chosen, in the order of the choice."""
     rows = np.flatnonzero(np.isin(nodes.numbers, chosen))
     return np.asarray(rows[np.argsort(_places(nodes.pick(rows), chosen))])
 
 
 def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
-    """What orders the conditions of all ranks: the numbers of their nodes, or their places in a
-    list of nodes."""
+    """Return what orders the conditions of all ranks.
+
+    This is the numbers of their nodes, or their places in a list of nodes.
+    """
     if chosen is None:
         return nodes.numbers
     order = np.argsort(chosen)
@@ -271,10 +289,12 @@ def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
 def one_per_direction(
     whole: Nodes, nodes: Nodes, directions: Array, gap: Array
 ) -> tuple[Nodes, Array, Array]:
-    """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights
-    added, smaller gap.
+    """Return (nodes, directions, gaps).
 
-    ``whole``: the nodes with the weights of all their faces."""
+    Faces of one direction at a node are one condition: weights added, smaller gap.
+
+    ``whole``: the nodes with the weights of all their faces.
+    """
     if len(nodes.numbers) == len(whole.numbers):
         return nodes, directions, gap
     weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
@@ -302,8 +322,12 @@ def one_per_direction(
 def contact_space(
     owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any, **others: Any
 ) -> FemSpace:
-    """Return the space of a system; InputError for another kind, groups of another mesh, and a list
-    of no points, and where ranks give other ``groups``, ``points`` or ``others``. Collective."""
+    """Return the space of a system. Collective.
+
+    Raises:
+        InputError: another kind, groups of another mesh, a list of no points, and where ranks give
+            other ``groups``, ``points`` or ``others``.
+    """
     space = space_of(owner, system)
     agree(space.comm, owner, {**groups, "points": points, **others})
     for meaning, group in groups.items():
@@ -357,8 +381,10 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
 
 
 def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
-    """Return the numbers of those nodes, given of all ranks, that are nearest to the listed points,
-    in their order."""
+    """Return the numbers of those nodesthat are nearest to the listed points.
+
+    The nodes are given of all ranks; the numbers are in the order of the points.
+    """
     rows = []
     for point in points:
         x = np.asarray(point, dtype=float)
@@ -397,12 +423,14 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
 def merged(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float
 ) -> tuple[Nodes, Array, Any]:
-    """Return (nodes, directions, shares (k, m)) of the k conditions that are left of the m of all
-    ranks when nodes that move as one (tied boundaries) have one for each face: sums of weights,
-    means with shares by weight.
+    """Return (nodes, directions, shares (k, m)) of the k conditions that are left.
+
+    They are left of the m of all ranks when nodes that move as one (tied boundaries) have one for
+    each face: sums of weights, means with shares by weight.
 
     InputError for a node that is tied in some components only, or to one without such a
-    condition."""
+    condition.
+    """
     leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
     for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
         alike = np.flatnonzero(nodes.numbers == leaders[row])
@@ -437,7 +465,9 @@ def with_ties(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float
 ) -> Any:
     """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``.
-    Collective."""
+
+    Collective.
+    """
     tied = np.isin(nodes.numbers, space.tied_nodes)
     parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
     every, (n, g) = (

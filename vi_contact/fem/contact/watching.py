@@ -1,5 +1,6 @@
-"""Watch the nodes of a contact boundary that are prescribed in every component, and so have no
-condition.
+"""Watch the nodes of a contact boundary that have no condition.
+
+They are prescribed in every component.
 
 Where they are depends on the time alone. The gap of such a node s with the direction n, in front of
 nodes j that are prescribed too,
@@ -7,7 +8,8 @@ nodes j that are prescribed too,
     g_s(t) = gap0_s - n·(U_s(t) - sum_j P_sj U_j(t))
 
 less what a moving obstacle advances, counts in the smallest gap of the contact, and a motion that
-drives the node into what it faces is refused."""
+drives the node into what it faces is refused.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -26,10 +28,12 @@ ROUND_OFF = 1e-9  # of the largest motion and gap of the nodes
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """Hold nodes of this rank without conditions on the boundary ``name``, their directions (k, d)
-    and gaps (k,), and what they face, on side 2 (``side``); None where that is a rigid obstacle.
-    ``advance``: how far a moving obstacle has come towards them at time t, minus infinity where it
-    is not known."""
+    """Hold nodes of this rank without conditions on the boundary ``name``.
+
+    This is their directions (k, d) and gaps (k,), and what they face, on side 2 (``side``); None
+    where that is a rigid obstacle. ``advance``: how far a moving obstacle has come towards them at
+    time t, minus infinity where it is not known.
+    """
 
     space: Any
     name: str
@@ -41,9 +45,11 @@ class Watched:
     advance: Callable[[float], Any] | None = None
 
     def before_moving(self, towards: Callable[[float], Any] | None) -> "Watched":
-        """Return the same nodes before an obstacle that moves towards them, t [s] -> [m]. Where it
-        moves by another value at every condition it is not known how far it moves at nodes without
-        one."""
+        """Return the same nodes before an obstacle that moves towards them, t [s] -> [m].
+
+        Where it moves by another value at every condition it is not known how far it moves at nodes
+        without one.
+        """
         if towards is None:
             return self
 
@@ -67,12 +73,16 @@ class Watched:
 
     def smallest(self, t: float) -> float:
         """Return the smallest gap of the nodes of all ranks at time t [m], infinite for none.
-        Collective."""
+
+        Collective.
+        """
         return -largest(self.space.comm, np.max(-self.gaps(t), initial=-np.inf))
 
     def refuse_driven(self, t: float) -> None:
         """Raise InputError, on all ranks, for a node that is in what it faces at time t.
-        Collective."""
+
+        Collective.
+        """
         moved, size = self._towards(t)
         behind = moved - self.gap0
         size = np.append(self.gap0, size).max()
@@ -95,8 +105,10 @@ class Watched:
         )
 
     def _towards(self, t: float) -> tuple[Array, float]:
-        """How far the nodes have moved towards what they face (k,), and the largest displacement
-        [m]. Collective."""
+        """Return how far the nodes have moved towards what they face (k,). Collective.
+
+        The largest displacement [m] is returned too.
+        """
         space = self.space
         values = np.asarray(space.prescribed_values(t)).reshape(-1, space.dimension)
         moved = values[space.blocks_of(self.nodes.numbers)]
@@ -117,7 +129,9 @@ def watched_nodes(
     side: str | None = None,
 ) -> tuple[Watched, ...]:
     """Return what watches these nodes of this rank; none where nothing moves that is prescribed.
-    Collective."""
+
+    Collective.
+    """
     if not largest(space.comm, len(nodes.numbers)) or not any(
         one.moves for one in space.prescribed
     ):
@@ -126,8 +140,11 @@ def watched_nodes(
 
 
 def clamped_or_prescribed(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, Mask]:
-    """Return kind -> mask (k,) of the nodes in ``mask``, those of this rank, prescribed in every
-    component: those that some condition moves are "prescribed", the others "clamped"."""
+    """Return kind -> mask (k,) of the nodes in ``mask``.
+
+    They are those of this rank, prescribed in every component: those that some condition moves are
+    "prescribed", the others "clamped".
+    """
     moved = np.zeros(len(space.nodes), dtype=bool)
     for one in space.prescribed:
         if one.moves:

@@ -1,2 +1,4 @@
-"""Write fields of a run, and resultants that need elements: reactions, section forces, nodal
-work."""
+"""Write fields of a run, and resultants that need elements.
+
+These are reactions, section forces, nodal work.
+"""

@@ -1,9 +1,11 @@
-"""Integrate over what lies on one side of a plane that goes through cells: parts of these cells and
-of their facets.
+"""Integrate over what lies on one side of a plane that goes through cells.
+
+These are parts of these cells and of their facets.
 
 They are cut as simplices, a quadrilateral as the 2 triangles and a hexahedron as the 6 tetrahedra
 round a diagonal, in which nodal values are taken for linear: exact for linear fields on cells with
-parallel sides."""
+parallel sides.
+"""
 
 from collections.abc import Callable
 from itertools import permutations
@@ -27,12 +29,14 @@ def work_beyond(
     density: Array | float,
     load: Traction | BodyForce | None,
 ) -> Array:
-    """Return (motions, owned components) ∫ density motion·phi_i over parts of cells, or of the
-    facets of a traction.
+    """Return (motions, owned components) ∫ density motion·phi_i over parts of cells.
+
+    Or it is over parts of the facets of a traction.
 
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not
     positive. ``motion``: points (k, d) -> virtual displacements (motions, k, d), linear in them;
-    ``density``: one for all or one of each local cell. Collective."""
+    ``density``: one for all or one of each local cell. Collective.
+    """
     d = space.dimension
     cells, nodes = _entities(
         space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None
@@ -70,8 +74,10 @@ def work_beyond(
 
 
 def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
-    """(cells, geometry nodes) of the crossed cells of this rank, or the nodes of those outer facets
-    beside them."""
+    """Return (cells, geometry nodes) of the crossed cells of this rank.
+
+    Or the nodes are those of the outer facets beside them.
+    """
     dim, owned = mesh.topology.dim, mesh.topology.index_map
     if facets is None:
         cells = np.flatnonzero(crossed[: owned(dim).size_local])
@@ -84,8 +90,10 @@ def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
 
 
 def simplices(vertices: int, dimension: int) -> Array:
-    """Return (k, n, vertices) shares of the vertices in the corners of the simplices that make up a
-    cell."""
+    """Return (k, n, vertices) shares of the vertices in the corners of simplices.
+
+    These simplices make up a cell.
+    """
     paths = [range(vertices)]
     if vertices > dimension + 1:  # from the first vertex to the last along the axes, in every order
         paths = [
@@ -95,9 +103,11 @@ def simplices(vertices: int, dimension: int) -> Array:
 
 
 def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
-    """Return (shares of the vertices in corners (p, n, v), entity (p,)) of simplices: what of the
-    simplices ``whole`` (k, n, v) of each entity lies where the level of its vertices (entities, v),
-    linear in them, is not positive."""
+    """Return (shares of the vertices in corners (p, n, v), entity (p,)) of simplices.
+
+    They are what of the simplices ``whole`` (k, n, v) of each entity lies where the level of its
+    vertices (entities, v), linear in them, is not positive.
+    """
     owner = np.repeat(np.arange(len(level)), len(whole))
     corners = np.tile(whole, (len(level), 1, 1))
     corners = np.concatenate(

@@ -1,12 +1,14 @@
-"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several, in the order
-of the input mesh.
+"""Write fields for ParaView.
+
+They are ``fields.xdmf`` and HDF5 files of one frame or several, in the order of the input mesh.
 
 Every file is replaced as a whole and the index names only frames that are complete, so that
 ParaView can open it at any moment, also while the run goes on or after it was killed. Nothing in
 the files depends on the number of ranks.
 
 What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all
-closed nodes stick."""
+closed nodes stick.
+"""
 
 import logging
 import os
@@ -41,15 +43,19 @@ log = logging.getLogger(__name__)
 
 
 class VonMises:
-    """Compute the mean von Mises stress of owned cells [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s =
-    dev(sigma).
+    """Compute the mean von Mises stress of owned cells [Pa].
+
+    It is ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma).
 
     Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without
-    viscous stresses."""
+    viscous stresses.
+    """
 
     def __init__(self, forms: Any) -> None:
-        """``forms``: the ElasticForms of a system, whose constants carry the thickness as a
-        factor."""
+        """Take ``forms``, the ElasticForms of a system.
+
+        Their constants carry the thickness as a factor.
+        """
         import ufl  # late, as compat: frames of own matrices need no DOLFINx
 
         from .. import compat
@@ -95,8 +101,9 @@ _RUBBING = ("contact_traction_t", "slip")
 
 @dataclass(frozen=True)
 class XDMF:
-    """Write a frame every so many steps, and one of the initial state. InputError unless both
-    numbers are >= 1.
+    """Write a frame every so many steps, and one of the initial state.
+
+    InputError unless both numbers are >= 1.
 
     ``frames_per_file``: each time so many frames have files of their own they are put into one:
     some systems want few.
@@ -112,7 +119,9 @@ class XDMF:
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
     ) -> "FrameWriter":
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder.
-        Collective."""
+
+        Collective.
+        """
         space = problem.system.space
         if isinstance(space, MatrixSpace):
             cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
@@ -123,8 +132,10 @@ class XDMF:
 
 @dataclass(frozen=True)
 class Cells:
-    """Hold the cells of a frame: XDMF's name of them, nodes of the owned ones, their numbers, and
-    their stress."""
+    """Hold the cells of a frame.
+
+    This is XDMF's name of them, nodes of the owned ones, their numbers, and their stress.
+    """
 
     kind: str
     nodes: Indices
@@ -193,7 +204,9 @@ class FrameWriter:
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
         """Write a frame of state, acceleration of its step (both in the rotated basis) and report.
-        Collective."""
+
+        Collective.
+        """
         problem, space = self._problem, self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)
@@ -297,9 +310,11 @@ class FrameWriter:
 
 
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
-    """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of
-    several faces of a node the pressure of the one that is pressed most, and the highest status.
-    Collective."""
+    """Return (contact pressure, status), (k, 1) at the owned nodes. Collective.
+
+    They are made of those of the conditions: of several faces of a node the pressure of the one
+    that is pressed most, and the highest status.
+    """
     space, blocks = cast(NodalSpace, problem.system.space), blocks_of_conditions(problem)
     surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
@@ -317,9 +332,11 @@ def blocks_of_conditions(problem: ContactProblem) -> Indices:
 
 
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:
-    """Return nodal values (k, c), where conditions are those of vertices only with those of the
-    mid-points of contact facets: linear from end to end, zero at ends without a condition, so that
-    ∫ p = sum r_n. Collective."""
+    """Return nodal values (k, c) with those of the mid-points of contact facets. Collective.
+
+    These are added where conditions are those of vertices only: linear from end to end, zero at
+    ends without a condition, so that ∫ p = sum r_n.
+    """
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:
         return nodal
@@ -339,7 +356,7 @@ def slipped(report: Report) -> Mask:
 
 
 def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:
-    """A DataItem in an HDF5 file."""
+    """Return a DataItem in an HDF5 file."""
     dimensions, kind = " ".join(map(str, shape)), f'NumberType="{number}" Precision="{size}"'
     return f'<DataItem Dimensions="{dimensions}" {kind} Format="HDF">{where}</DataItem>'
 
@@ -350,7 +367,10 @@ def _three(nodal: Array) -> Array:
 
 
 def _cells_of_body(problem: ContactProblem) -> Cells:
-    """The cells of a mesh by the numbers of their nodes, in the order of VTK. Collective."""
+    """Return the cells of a mesh by the numbers of their nodes. Collective.
+
+    The order is that of VTK.
+    """
     from .. import compat
     from ..space import known_matrices, space_of
 

@@ -1,5 +1,6 @@
-"""Hand out states and stored frames as DOLFINx Functions, along the axes and with the values of
-ghosts.
+"""Hand out states and stored frames as DOLFINx Functions.
+
+They are along the axes and with the values of ghosts.
 
 u and v are on the space of the system, ``system.space.V``, with the components that are prescribed
 or tied. The stress sigma(u), without viscous parts, is the L2 projection onto discontinuous fields:
@@ -8,7 +9,8 @@ and Q2 one degree higher. The contact pressure r_n / weight is nodal, zero off t
 of several faces of a node it is that of the one which is pressed most. Nodes of the contact
 boundary without a condition (held ones, and those that both sides share) and those that are hardly
 covered take the mean of their neighbours on its facets: there ∫ p is more than the sum of
-reactions."""
+reactions.
+"""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -38,8 +40,9 @@ SAME = 1e-9  # of the size of the mesh, and of the longest time
 def as_function(
     problem: ContactProblem, state: State, name: str, *, continuous: bool = False
 ) -> Any:
-    """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or
-    "contact_pressure" [Pa].
+    """Return a state as a DOLFINx Function.
+
+    It is "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
 
     Where a node of the contact boundary has no pressure of its own, as one that is held, the
     function has the mean of those of its neighbours, so that the error of a right pressure falls
@@ -48,7 +51,8 @@ def as_function(
     ``state``: of simulate, march, static_equilibrium or quasi_static of this problem.
     ``continuous``: the stress projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau.
     Every call makes a Function of its own. Collective. InputError for a state of another problem,
-    and a system without a mesh."""
+    and a system without a mesh.
+    """
     space = _checked("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
@@ -65,8 +69,11 @@ def as_function(
 
 
 def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
-    """Return nodal contact pressures (k, 1) in which the nodes of contact boundaries that have none
-    of their own take the mean of those of their neighbours (``contact.borrowing``). Collective."""
+    """Return nodal contact pressures (k, 1) with those of borrowing nodes. Collective.
+
+    The nodes of contact boundaries that have none of their own take the mean of those of their
+    neighbours (``contact.borrowing``).
+    """
     space, surface = space_of("contact_pressure", problem.system), problem.surface
     blocks = blocks_of_conditions(problem)
     told = np.zeros(len(space.nodes), dtype=bool)
@@ -91,12 +98,14 @@ def read_function(
     frame: int | None = None,
     continuous: bool = False,
 ) -> Any:
-    """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a
-    state.
+    """Return a frame in the folder of a run (``fields=fem.XDMF(…)``).
+
+    It is as ``as_function`` returns a state.
 
     ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the
     last. The run may have had any number of ranks. Collective. InputError for a time without a
-    frame, and fields of another mesh."""
+    frame, and fields of another mesh.
+    """
     space = _checked("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
     optional(
@@ -128,7 +137,11 @@ def read_function(
 
 
 def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
-    """The space of the problem; InputError when there is none, or no such quantity."""
+    """Return the space of the problem.
+
+    Raises:
+        InputError: there is none, or no such quantity.
+    """
     check_problem_given(owner, problem)
     flag(owner, "continuous", continuous)
     if not isinstance(name, str) or name not in NAMES:
@@ -141,8 +154,10 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
 def _function(
     problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False
 ) -> Any:
-    """The Function of values at the owned nodes, (k,) or (k, d), at a time; the stress is that of
-    displacements."""
+    """Return the Function of values at the owned nodes, (k,) or (k, d), at a time.
+
+    The stress is that of displacements.
+    """
     system, space = problem.system, space_of(name, problem.system)
     V = (
         system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
@@ -161,7 +176,10 @@ def _function(
 
 
 def _blocks(of: Any, among: Any) -> Indices:
-    """The blocks of unknowns of a space (owned) among those of another one of the same element."""
+    """Return the owned blocks of unknowns of a space among those of another one.
+
+    Both have the same element.
+    """
     owned, ghosts = of.dofmap.index_map.size_local, of.dofmap.index_map.num_ghosts
     blocks = np.zeros(owned + ghosts, dtype=np.int64)
     blocks[compat.cell_blocks(of)] = compat.cell_blocks(among)
@@ -169,8 +187,10 @@ def _blocks(of: Any, among: Any) -> Indices:
 
 
 class Stress:
-    """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate
-    gradients."""
+    """Project sigma(u) by conjugate gradients.
+
+    M sigma_c = ∫ sigma(u) : tau_c for every component c.
+    """
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
         d, degree = (
@@ -259,7 +279,7 @@ def _stored(
 
 
 def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
-    """The number of the frame of a time, or of this number."""
+    """Return the number of the frame of a time, or of this number."""
     told = ", ".join(f"{one:.9g}" for one in times[:12]) + (
         f", … {times[-1]:.9g}" if len(times) > 12 else ""
     )

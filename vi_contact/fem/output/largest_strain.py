@@ -15,13 +15,15 @@ from ..space import space_of
 
 
 class LargestStrain:
-    """Record the largest shear strain since the start, and keep that of every cell in ``values``
-    (owned cells,).
+    """Record the largest shear strain since the start.
+
+    That of every cell is kept in ``values`` (owned cells,).
 
     gamma² = 2 dev(eps):dev(eps) of the mean eps of a cell, in the plane of the body or in space: in
     the plane the difference of the principal strains, in simple shear gamma_xy. Strains of the
     start, of gravity say, do not count. InputError for a run that is continued, and for a body on a
-    line."""
+    line.
+    """
 
     values: Array
 
@@ -53,6 +55,7 @@ class LargestStrain:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._row(report.new)
 
     def _nodal(self, state: State) -> Array:

@@ -1,10 +1,12 @@
-"""Work of a group of cells on virtual displacements: the resultants of nodal forces without making
-the forces.
+"""Compute the work of a group of cells on virtual displacements.
+
+This gives the resultants of nodal forces without making the forces.
 
 The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these
 cells alone, with a the absolute acceleration and f their loads. For a nodal field r, rᵀq is a
 number, and as K, C, M are symmetric it is (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products
-a step, however many cells there are."""
+a step, however many cells there are.
+"""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -105,8 +107,10 @@ class NodalWork:
         self._tell_constant_loads(owner)
 
     def _tell_constant_loads(self, owner: str) -> None:
-        """Warn when the system has constant loads and none were given: who forgets the weight
-        measures reactions that do not carry it. Collective."""
+        """Warn when the system has constant loads and none were given. Collective.
+
+        Who forgets the weight measures reactions that do not carry it.
+        """
         system, space = self._problem.system, self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
         if (
@@ -175,8 +179,10 @@ class NodalWork:
         self._still: dict[int, Array] = {}
 
     def at_rest(self, state: State) -> Array:
-        """Return the work of a state without acceleration, (count,): a static one, or the start of
-        a run."""
+        """Return the work of a state without acceleration, (count,).
+
+        It is a static one, or the start of a run.
+        """
         problem, space, t = self._problem, self.space, state.t
         motion = [
             space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))
@@ -186,11 +192,13 @@ class NodalWork:
         )
 
     def of_step(self, report: Report) -> Array:
-        """Return the work in a step's equation of motion (``Report.balance``), with absolute
-        accelerations, (count,).
+        """Return the work in a step's equation of motion (``Report.balance``), (count,).
+
+        It takes absolute accelerations.
 
         Loads, prescribed and ground motion are taken between the ends of the step where the balance
-        has its u."""
+        has its u.
+        """
         problem, space, balance = self._problem, self.space, report.balance
         late, t0, t1 = self._place(report), report.old.t, report.new.t
 
@@ -210,7 +218,7 @@ class NodalWork:
         return self._sum(motion, between, balance)
 
     def _place(self, report: Report) -> float:
-        """w of u = (1 - w) u_old + w u_new; the end where nothing moved."""
+        """Return w of u = (1 - w) u_old + w u_new; the end where nothing moved."""
         way, here = report.new.u - report.old.u, report.balance.u - report.old.u
         both, square = self.space.comm.sum(np.array([here @ way, way @ way]))
         return float(min(max(both / square, 0.0), 1.0)) if square > 0.0 else 1.0
@@ -218,8 +226,10 @@ class NodalWork:
     def _sum(
         self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance
     ) -> Array:
-        """The numbers for nodal u, v, a (owned, d), less contact forces on held ones; ``at``
-        evaluates functions."""
+        """Return the numbers for nodal u, v, a (owned, d), less contact forces on held ones.
+
+        ``at`` evaluates functions.
+        """
         total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
@@ -256,8 +266,10 @@ class NodalWork:
 
 
 def rigid_motions(points: Array, centre: Array) -> Array:
-    """Return (motions, k, d) unit translations and, but on a line, rotations about a centre of
-    points (k, d)."""
+    """Return (motions, k, d) unit translations and rotations of points (k, d).
+
+    The rotations are about a centre of the points; on a line there are none.
+    """
     d, arms = points.shape[1], points - centre
     shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
     turns = [np.column_stack([-arms[:, 1], arms[:, 0]])] if d == 2 else []

@@ -32,8 +32,10 @@ def longest_edge(mesh: Any, cells: Indices) -> float:
 
 
 def facets_with_cells(mesh: Any, facets: Indices) -> tuple[Array, Array, Indices]:
-    """Return middles (k, d), mean distances of their corners (k,) [m] and cells (k,) of those local
-    facets whose cell this rank owns."""
+    """Return middles (k, d), mean distances of their corners (k,) [m] and cells (k,) of facets.
+
+    They are those local facets whose cell this rank owns.
+    """
     tdim = mesh.topology.dim
     cell_of = mesh.topology.connectivity(tdim - 1, tdim)
     cells = cell_of.array[cell_of.offsets[:-1][facets]]
@@ -49,9 +51,11 @@ def facets_with_cells(mesh: Any, facets: Indices) -> tuple[Array, Array, Indices
 def outline(
     space: FemSpace, tags: Mapping[str, Any], regions: Sequence[Indices]
 ) -> list[dict[str, Any]]:
-    """Return on rank 0 the lines (x0, y0, x1, y1) [m] of the boundary, group "", and of each group
-    of it; in space and on a line the edges of a box around each region of local cells. The same on
-    any ranks. Collective."""
+    """Return on rank 0 the lines (x0, y0, x1, y1) [m] of the boundary and its groups. Collective.
+
+    They are those of the boundary, group "", and of each group of it; in space and on a line the
+    edges of a box around each region of local cells. The same on any ranks.
+    """
     mesh, d = space.mesh, space.dimension
     if d != 2:
         edges = [(i, i | 1 << c) for i in range(2**d) for c in range(d) if not i >> c & 1]

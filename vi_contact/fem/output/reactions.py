@@ -18,8 +18,9 @@ from .nodal_work import Loads, NodalWork, check_actions
 
 @dataclass
 class Reactions:
-    """Record what a prescribed or absorbing boundary does to its body: force [N] and moment about a
-    centre [N m].
+    """Record what a prescribed or absorbing boundary does to its body.
+
+    It is a force [N] and a moment about a centre [N m].
 
     On the components c of the nodes of the facets that are held, and on all of those with dashpots,
     with the loads f on them, K, C, M of the elements and the absolute acceleration a + a_g:
@@ -82,7 +83,9 @@ class Reactions:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Prepare the work of rigid motions of the held nodes; return the row of the state at rest.
-        Collective."""
+
+        Collective.
+        """
         owner = f"reactions '{self.name}'"
         self._work = NodalWork(owner, problem, self.loads, self.gravity)
         space: FemSpace = self._work.space
@@ -109,6 +112,7 @@ class Reactions:
         return self._named(self._work.at_rest(state))
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._named(self._work.of_step(report))
 
     def _named(self, values: np.ndarray) -> Row:

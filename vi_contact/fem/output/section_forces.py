@@ -1,5 +1,7 @@
-"""Record section forces N, V, M of plane cuts through walls, slabs and columns, along element sides
-or through them."""
+"""Record section forces N, V, M of plane cuts through walls, slabs and columns.
+
+The cuts go along element sides or through elements.
+"""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -34,20 +36,24 @@ _QUANTITIES = tomllib.loads(
 
 @dataclass
 class SectionForces:
-    """Record the resultants of plane cuts: label -> its ends a, b in the plane, corners a, b, c of
-    a rectangle [m].
+    """Record the resultants of plane cuts.
+
+    A cut is label -> its ends a, b in the plane, corners a, b, c of a rectangle [m].
 
     In the plane e is the unit vector from a to b and n the one to its left, F the force that the
     part on the left exerts through the cut on the part on the right, and c the middle of the cut:
 
-        N = F·n  (tension positive),   V = F·e,   M = (moment of F about c, anticlockwise) = ∫ s sigma_n ds
+        N = F·n    (tension positive)
+        V = F·e
+        M = (moment of F about c, anticlockwise) = ∫ s sigma_n ds
 
     so that M > 0 is tension at b. In space e_2 points from a to b, e_3 from a to c at right angles,
     n = e_2 x e_3, and F is what the part before the cut, where n points, exerts on the one behind
     it. With the moment M of F about the middle of the rectangle, s_2 and s_3 the distances from
     there, the columns are
 
-        N = F·n,  V_2 = F·e_2,  V_3 = F·e_3,  M_t = M·n,  M_2 = M·e_2 = ∫ s_3 sigma_n,  M_3 = M·e_3 = -∫ s_2 sigma_n
+        N = F·n,    V_2 = F·e_2,                   V_3 = F·e_3
+        M_t = M·n,  M_2 = M·e_2 = ∫ s_3 sigma_n,   M_3 = M·e_3 = -∫ s_2 sigma_n
 
     A cut may run along element sides or, of P1 and Q1, through elements, at any inclination. F is
     minus the sum of the nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at
@@ -61,8 +67,8 @@ class SectionForces:
     Args:
         cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both
             sides needs it.
-        loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of ``with_weight``, if
-            these cells weigh.
+        loads: those given to ``assemble``.
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, if these cells weigh.
 
     Raises:
         InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes
@@ -103,8 +109,10 @@ class SectionForces:
         check_actions("SectionForces", self.loads, self.gravity)
 
     def columns(self) -> Columns:
-        """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2,
-        M_3."""
+        """Return the columns N_<label>, V_<label>, M_<label>.
+
+        In space they are N, V_2, V_3, M_t, M_2, M_3.
+        """
         return {
             f"{quantity}_{label}": (unit, f"{text}, section {label}")
             for label, ends in self.cuts.items()
@@ -117,7 +125,9 @@ class SectionForces:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Find the cuts; return the row of the state at rest, of a static stage for example.
-        Collective."""
+
+        Collective.
+        """
         work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
         found = [find_cut(work.space, *item, self.cells) for item in self.cuts.items()]
         work.take([part for part, _ in found])
@@ -125,6 +135,7 @@ class SectionForces:
         return self._named(work.at_rest(state))
 
     def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
         return self._named(self._work.of_step(report))
 
     def _named(self, values: Array) -> Row:
@@ -132,8 +143,10 @@ class SectionForces:
 
 
 def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
-    """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of
-    a cut (d, d)."""
+    """Return (unit vectors (d, d), lengths (d - 1,) of the sides) of a cut (d, d).
+
+    The vectors are along the normal and the sides.
+    """
     size = np.linalg.norm(corners[1:] - corners[0], axis=1)
     if not size.all():
         raise InputError(
@@ -150,12 +163,14 @@ def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
 
 
 def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tuple[Rigid, Array]:
-    """Return (what moves on one side of a cut with ends or corners (d, d), the matrix that makes N,
-    V, M, … of its work). InputError, on all ranks, unless the cut goes through all of the group
-    that it reaches. Collective.
+    """Return (what moves on one side of a cut, the matrix that makes N, V, M, … of its work).
+
+    The cut has ends or corners (d, d). Collective. There is an InputError, on all ranks, unless the
+    cut goes through all of the group that it reaches.
 
     The nodes on the cut and behind it move, and the cells before them hold them; the other way
-    round where sides of cells lie on the cut behind it only, as at a foot."""
+    round where sides of cells lie on the cut behind it only, as at a foot.
+    """
     corners, mesh = np.asarray(given, dtype=float), space.mesh
     if len(corners) != space.dimension:
         raise InputError(
@@ -222,13 +237,15 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
 
 class _Trace:
-    """What the plane of a cut leaves in cells, by boxes round it along the sides of the cut, low,
-    high (cells, d - 1).
+    """Hold what the plane of a cut leaves in cells.
+
+    It is held by boxes round it along the sides of the cut, low, high (cells, d - 1).
 
     left, right: cells with vertices before and behind the plane; touches: with a point of the cut;
     beyond: (2 (d - 1), cells) those of them that go on over one of its ends; cover: (3, cells) how
     much [m] of the cut (in space, [m²], of boxes round it) sides of cells on its left, of cells on
-    its right, and cells that it goes through cover."""
+    its right, and cells that it goes through cover.
+    """
 
     def __init__(self, s: Array, d: Array, size: Array, tol: float) -> None:
         self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0

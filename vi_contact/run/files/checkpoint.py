@@ -1,11 +1,13 @@
-"""Write and read checkpoints: the state of a run in numbers that do not depend on the ranks that go
-on with it.
+"""Write and read checkpoints.
+
+They hold the state of a run in numbers that do not depend on the ranks that go on with it.
 
 ``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the
 order of ``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps
 done, what problem it is of (``identity``), checksums of the histories and of itself, and the number
 of its format. It is of the end of a base step, never inside a halved one, so that a restart takes
-the steps of the straight run, and always replaced as a whole."""
+the steps of the straight run, and always replaced as a whole.
+"""
 
 import hashlib
 import io
@@ -64,7 +66,8 @@ class RestartPoint:
     """Hold the end of a base step, where a run can be left and continued.
 
     t_start, k_start: of the state the whole run began with; ``steps`` and ``t_end`` of a restart
-    count from there. base: base steps done since then; halved: attempts thrown away since then."""
+    count from there. base: base steps done since then; halved: attempts thrown away since then.
+    """
 
     state: State
     t_start: float
@@ -87,10 +90,12 @@ def write_checkpoint(
     rows: str = "",
     safe: bool = True,
 ) -> None:
-    """Replace the checkpoint in the folder. ``of``: the "run", as ``identity`` sees it over a
-    "span" of times [s]; ``rows``: checksum of the histories up to here; ``safe``: whether these are
-    on the medium, and the checkpoint shall be. Collective; ViContactError on all ranks when the
-    disk refuses it."""
+    """Replace the checkpoint in the folder.
+
+    ``of``: the "run", as ``identity`` sees it over a "span" of times [s]; ``rows``: checksum of the
+    histories up to here; ``safe``: whether these are on the medium, and the checkpoint shall be.
+    Collective; ViContactError on all ranks when the disk refuses it.
+    """
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
@@ -156,8 +161,9 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
 def read_checkpoint(
     folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
 ) -> tuple[RestartPoint, str]:
-    """Return (where a run was left, with the state on the ranks of this one; checksum of its
-    histories). Collective.
+    """Return (where a run was left, checksum of its histories). Collective.
+
+    The state is that on the ranks of this run.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem,
     dt (or plan of them) or scheme; unless ``changed`` allows the latter: another dt counts steps
@@ -188,7 +194,9 @@ def read_checkpoint(
 
 def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
     """Return this rank's rows of arrays that rank 0 has as a whole; they are sent rank by rank.
-    Collective."""
+
+    Collective.
+    """
     comm, own = problem.system.algebra.comm, dict[str, Any]()
     parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [((), ())] * comm.size
     every = np.sort(np.concatenate([ids for ids, _ in parts]))
@@ -209,8 +217,12 @@ def _compare(
     about: Mapping[str, Any],
     changed: bool,
 ) -> list[str]:
-    """The names of what is another problem's; InputError unless that was allowed, or can be.
-    Collective."""
+    """Return the names of what is another problem's.
+
+    InputError is raised unless that was allowed, or can be.
+
+    Collective.
+    """
     start, end = about["span"]
     found = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
     for name, how in found.items():
@@ -234,7 +246,7 @@ def _damaged(file: Path, why: Any) -> InputError:
 
 
 def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
-    """Description and whole arrays of a checkpoint that fits the problem in its sizes."""
+    """Return description and whole arrays of a checkpoint that fits the problem in its sizes."""
     if not is_own(file):
         raise InputError(
             f"there is no checkpoint '{file}' to restart from: give the folder of a run"
@@ -278,8 +290,10 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
 
 
 def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
-    """ValueError for an array that announces more numbers than the archive holds of it, before
-    memory is taken."""
+    """Raise ValueError for an array that announces more numbers than the archive holds of it.
+
+    This is done before memory is taken.
+    """
     with archive.open(one) as file:
         version = npy.read_magic(file)
         read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(version)
@@ -291,8 +305,10 @@ def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
 
 
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
-    """InputError or KeyError for missing, misshapen or senseless values; of another problem nothing
-    need fit."""
+    """Raise InputError or KeyError for missing, misshapen or senseless values.
+
+    Of another problem nothing need fit.
+    """
     n, m, d = (
         problem.system.space.unknowns,
         problem.surface.total,

@@ -1,5 +1,6 @@
-"""Make and lock the folder a run writes into, so that no data are lost and no rank waits for
-another for ever.
+"""Make and lock the folder a run writes into.
+
+So no data are lost, and no rank waits for another for ever.
 
 Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to
 all ranks, which then raise the same sentence together. Files that must be whole are written beside
@@ -7,7 +8,8 @@ their name and renamed.
 
 A run takes a folder by writing ``format.json`` into it. Only in a folder with this mark are files
 replaced or deleted that were there before, and of those only the ones with names that runs write.
-All others are left alone."""
+All others are left alone.
+"""
 
 import fcntl
 import json
@@ -100,10 +102,12 @@ _held: dict[Path, int] = {}  # locks that this process has -> the thread that to
 
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
-    """Make the folder, with parents, and try to write into it, before any work is done; InputError
-    if not.
+    """Make the folder, with parents, and try to write into it, before any work is done.
 
-    InputError also when files of others have names that a run replaces."""
+    Where that fails there is an InputError.
+
+    InputError also when files of others have names that a run replaces.
+    """
     folder = Path(path)
     if find_spec("h5py") is None:
         raise InputError(
@@ -129,8 +133,10 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
 
 
 def is_marked(folder: Path) -> bool:
-    """Return whether a run has taken this folder: it has the mark, or a history as only runs write
-    it."""
+    """Return whether a run has taken this folder.
+
+    It then has the mark, or a history as only runs write it.
+    """
     if is_own(folder / ABOUT):
         return True
     if not is_own(folder / HISTORY_CSV):
@@ -152,16 +158,21 @@ def refuse_files_of_others(folder: Path) -> None:
 
 
 def take(folder: Path) -> None:
-    """Write the mark of runs into a folder, with its lock; InputError as of
-    ``refuse_files_of_others``."""
+    """Write the mark of runs into a folder, with its lock.
+
+    Raises:
+        InputError: as of ``refuse_files_of_others``.
+    """
     refuse_files_of_others(folder)
     about = {"format": FORMAT, "vi_contact": __version__}
     write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
 
 def _written_by_runs(folder: Path) -> list[Path]:
-    """What is in a folder under names that runs write, but for the copy of a case, which has a mark
-    of its own."""
+    """Return what is in a folder under names that runs write.
+
+    It leaves out the copy of a case, which has a mark of its own.
+    """
     fields = inner_folder(folder, FIELDS)
     files = [
         folder / name
@@ -172,8 +183,10 @@ def _written_by_runs(folder: Path) -> list[Path]:
 
 
 def _is_model(path: Path) -> bool:
-    """Whether a file describes a model, as ``vi-contact run --check`` writes it into a folder
-    without a run."""
+    """Return whether a file describes a model.
+
+    ``vi-contact run --check`` writes it into a folder without a run.
+    """
     if not is_own(path):
         return False
     try:
@@ -184,7 +197,7 @@ def _is_model(path: Path) -> bool:
 
 
 def _frames(fields: Path) -> list[Path]:
-    """The files in the folder of fields that have names of ours."""
+    """Return the files in the folder of fields that have names of ours."""
     known = sorted(os.listdir(fields)) if fields.is_dir() else []
     return [
         fields / name
@@ -204,8 +217,10 @@ def check_format(file: Path, found: Any) -> None:
 
 
 def check_folder_format(folder: Path) -> None:
-    """Raise InputError likewise for a run folder; one without a number, of which files were copied,
-    is not asked."""
+    """Raise InputError likewise for a run folder.
+
+    One without a number, of which files were copied, is not asked.
+    """
     if not is_own(folder / ABOUT):
         return
     try:
@@ -225,10 +240,12 @@ def check_folder_format(folder: Path) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove what an earlier run left in the folder and a new one could be mistaken for; histories
-    are overwritten.
+    """Remove what an earlier run left in the folder and a new one could be mistaken for.
 
-    The mark of runs stays. Nothing is removed from a folder without it."""
+    Histories are overwritten.
+
+    The mark of runs stays. Nothing is removed from a folder without it.
+    """
     if not is_marked(folder):
         return
     for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
@@ -238,8 +255,10 @@ def clear(folder: Path) -> None:
 
 
 def remove_run(folder: Path) -> None:
-    """Remove the files of a run with its reports, and the folder if nothing else is in it. A folder
-    that no run has taken, and all files of others, stay as they are."""
+    """Remove the files of a run with its reports, and the folder if nothing else is in it.
+
+    A folder that no run has taken, and all files of others, stay as they are.
+    """
     if not is_marked(folder):
         return
     fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
@@ -257,8 +276,10 @@ def remove_run(folder: Path) -> None:
 
 
 def move_run(folder: Path, target: Path) -> None:
-    """Move the files of a run, with its fields and stages, into another folder; files of others
-    stay."""
+    """Move the files of a run, with its fields and stages, into another folder.
+
+    Files of others stay.
+    """
     fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
     for stage in filter(is_marked, _inside(stages)):
         os.replace(stage, make_inner_folder(target, STAGES) / stage.name)
@@ -273,7 +294,7 @@ def move_run(folder: Path, target: Path) -> None:
 
 
 def _inside(folder: Path) -> list[Path]:
-    """The folders inside a folder; no links."""
+    """Return the folders inside a folder; no links."""
     found = [folder / name for name in sorted(os.listdir(folder))] if folder.is_dir() else []
     return [one for one in found if one.is_dir() and not one.is_symlink()]
 
@@ -285,8 +306,10 @@ def remove_if_empty(folder: Path) -> None:
 
 
 def remove_litter(folder: Path) -> None:
-    """Remove what killed processes left of files they were about to replace; with the folder's lock
-    only."""
+    """Remove what killed processes left of files they were about to replace.
+
+    It is called with the folder's lock only.
+    """
     for place in (folder, inner_folder(folder, FIELDS)):
         for name in os.listdir(place) if place.is_dir() else ():
             if _is_temporary(name) or (_TRIAL.fullmatch(name) and place is folder):
@@ -294,8 +317,10 @@ def remove_litter(folder: Path) -> None:
 
 
 def _is_temporary(name: str) -> bool:
-    """Whether this is the name of a file that was to take the place of one of a run:
-    ".NAME.PROCESS.tmp"."""
+    """Return whether this is the name of a file that was to replace one of a run.
+
+    Such names are ".NAME.PROCESS.tmp".
+    """
     inside, _, process = name.removesuffix(".tmp").removeprefix(".").rpartition(".")
     return name == f".{inside}.{process}.tmp" and process.isdecimal() and _is_name_of_runs(inside)
 
@@ -309,12 +334,14 @@ def _is_name_of_runs(name: str) -> bool:
 
 @contextmanager
 def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
-    """Refuse other runs that want the folder, or this part of it, while it lasts, on all their
-    ranks. Collective.
+    """Refuse other runs that want the folder, or this part of it, while it lasts.
+
+    They are refused on all their ranks. Collective.
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody
     up. Within the same thread it may be taken again. On a file system that knows no locks there is
-    none, which is logged."""
+    none, which is logged.
+    """
     mine = None if folder is None else on_root(comm, lambda: _take(folder, name))
     try:
         yield
@@ -328,7 +355,7 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
 
 
 def _take(folder: Path, name: str) -> Any:
-    """The open, locked file; None when this thread has the lock already."""
+    """Return the open, locked file; None when this thread has the lock already."""
     if _held.get(folder.resolve() / name) == threading.get_ident():
         return None
     while True:

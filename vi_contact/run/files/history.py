@@ -1,11 +1,15 @@
-"""Keep the rows of a run in files from the step they were computed in; the memory need not hold
-them.
+"""Keep the rows of a run in files from the step they were computed in.
 
-``history.csv``      one line per step with all numbers, written at least once a second and before every checkpoint:
-                     a killed run loses no more.
-``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
-                     at checkpoints, every ten seconds if it has grown by a quarter, and at the end.
-``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row)."""
+The memory need not hold them.
+
+``history.csv``      one line per step with all numbers, written at least once a second and before
+                     every checkpoint: a killed run loses no more.
+``history.h5``       numbers and arrays with units as attributes, and the contact geometry;
+                     replaced as a whole at checkpoints, every ten seconds if it has grown by a
+                     quarter, and at the end.
+``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the
+                     row).
+"""
 
 import hashlib
 import os
@@ -50,8 +54,9 @@ GROWTH = 1.25
 
 
 class HistoryFiles:
-    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points. Every method may
-    raise OSError.
+    """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points.
+
+    Every method may raise OSError.
 
     ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are
     dropped) or another.
@@ -113,8 +118,10 @@ class HistoryFiles:
         self._rows, self._last = self._rows + len(rows), int(rows[-1]["k"])
 
     def checksum(self, k: int) -> str:
-        """Return the checksum of the rows up to step k; later ones are of a base step that is not
-        at its end."""
+        """Return the checksum of the rows up to step k.
+
+        Later ones are of a base step that is not at its end.
+        """
         if k == self._last:
             return self._hash.hexdigest()
         stored = StoredRows(self._folder, self._table, k)
@@ -123,8 +130,11 @@ class HistoryFiles:
         return stored.hash.hexdigest()
 
     def sync(self) -> bool:
-        """Push rows onto the medium unless that was done a moment ago, history.h5 when it has grown
-        enough; say whether a checkpoint can rely on them even when the power fails."""
+        """Push rows onto the medium unless that was done a moment ago.
+
+        history.h5 is pushed when it has grown enough. The answer says whether a checkpoint can rely
+        on them even when the power fails.
+        """
         now = time.monotonic()
         if now - self._pushed < PUSH:
             return False
@@ -137,8 +147,10 @@ class HistoryFiles:
         return True
 
     def save(self) -> None:
-        """Write history.h5 with all rows, from the memory if they are there; the journal starts
-        anew."""
+        """Write history.h5 with all rows, from the memory if they are there.
+
+        The journal starts anew.
+        """
         if self._rows == self._table.count and (known := self._table.remembered()) is not None:
             self._replace(
                 iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved
@@ -179,8 +191,10 @@ class HistoryFiles:
             file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
 
     def close(self) -> None:
-        """Write all rows into history.h5 and leave no journal; what cannot be written stays in the
-        other files."""
+        """Write all rows into history.h5 and leave no journal.
+
+        What cannot be written stays in the other files.
+        """
         try:
             push(self._folder / HISTORY_CSV)
             self.save()
@@ -192,8 +206,10 @@ class HistoryFiles:
 
 
 def _append(*pairs: tuple[Any, bytes]) -> None:
-    """Write these bytes to the files that there are; what one has no room for is cut off from all
-    of them."""
+    """Write these bytes to the files that there are.
+
+    What one has no room for is cut off from all of them.
+    """
     begun: list[tuple[Any, int]] = []
     try:
         for file, data in pairs:

@@ -1,10 +1,12 @@
-"""Tell what makes two runs runs of the same problem, in few numbers that any ranks, machine or
-release give alike.
+"""Tell what makes two runs runs of the same problem.
+
+It is told in few numbers that any ranks, machine or release give alike.
 
 Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw,
 w·f(t), and vᵀCw of two where a matrix may be skew. Such numbers depend neither on the ranks nor on
 their order, and round-off changes them in the last digits only; they are kept with their sizes and
-compared relative to these. Laws and schemes are texts, with numbers compared likewise."""
+compared relative to these. Laws and schemes are texts, with numbers compared likewise.
+"""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,8 +47,10 @@ Identity = dict[str, Any]
 def identity(
     problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float
 ) -> Identity:
-    """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end``
-    [s]. Collective."""
+    """Return name -> number, text or numbers with sizes, of all ranks. Collective.
+
+    Histories are those from ``start`` to ``end`` [s].
+    """
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
     pairs = [(w, w) for w in probes] + (
@@ -79,8 +83,10 @@ def identity(
 
 
 def text_of(value: Any) -> str:
-    """Return the repr of a law without addresses, and without what releases of numpy write
-    differently."""
+    """Return the repr of a law without addresses.
+
+    What releases of numpy write differently is left out too.
+    """
     return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
 
 
@@ -132,7 +138,10 @@ def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
 def _loads(
     system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array
 ) -> Numbers:
-    """The load in the first steps, and the histories of its separable parts through the run."""
+    """Return the load in the first steps and the histories of its separable parts.
+
+    The histories are those through the run.
+    """
     forces = [system.load(t) for t in early]
     size = max(float(np.sqrt(system.algebra.dot(f, f))) for f in forces)
     length = float(np.sqrt(system.algebra.dot(probes[0], probes[0])))
@@ -144,7 +153,7 @@ def _loads(
 
 
 def _sampled(values: Array) -> Numbers:
-    """Sums of a row of numbers, with weights that see each of them."""
+    """Return sums of a row of numbers, with weights that see each of them."""
     *sums, size = _sums(values, np.arange(len(values)))
     return [(value, size) for value in sums]
 
@@ -165,8 +174,10 @@ def _excitation(problem: ContactProblem, times: Array) -> Numbers:
 
 
 def _numbers_in(value: Any) -> Iterator[float]:
-    """All numbers of a value object: every sample of a record, also those between the times that
-    are looked at."""
+    """Return all numbers of a value object.
+
+    These are every sample of a record, also those between the times that are looked at.
+    """
     if is_dataclass(value):
         for one in fields(value):
             yield from _numbers_in(getattr(value, one.name))
@@ -203,13 +214,13 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
 
 
 def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
-    """Sums of values (m,) of the contact conditions of all ranks. Collective."""
+    """Return sums of values (m,) of the contact conditions of all ranks. Collective."""
     sums = surface.comm.sum(np.array([_sums(values, surface.slots) for values in arrays]))
     return [(value, size) for *values, size in sums.tolist() for value in values]
 
 
 def _of_all_points(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The values of all contact points in place of this rank's."""
+    """Return the values of all contact points in place of this rank's."""
     parts = from_each(surface.comm, (surface.slots.tolist(), values))
     if any(len(slots) != len(values) for slots, values in parts):
         return values
@@ -218,7 +229,10 @@ def _of_all_points(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[An
 
 
 def _friction(problem: ContactProblem) -> Numbers:
-    """The largest tangential reactions under a pressure, and their slopes at several slip rates."""
+    """Return the largest tangential reactions under a pressure, and their slopes.
+
+    They are those at several slip rates.
+    """
     law, weights = problem.friction, problem.surface.weights
     rates = [law.at(np.full(len(weights), speed)).slope(weights) for speed in SPEEDS]
     return _columns(problem.surface, [law.limit(weights, weights, 1.0), *rates])

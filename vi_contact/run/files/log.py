@@ -1,5 +1,7 @@
-"""Tell what a run does while it works: ``run.log`` through the logging module, and progress with
-the time left."""
+"""Tell what a run does while it works.
+
+It is told in ``run.log`` through the logging module, and as progress with the time left.
+"""
 
 import logging
 import platform
@@ -22,8 +24,10 @@ SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or t
 
 
 class _LogFile(logging.Handler):
-    """Write lines into a file of the run folder, and keep the error of one that could not be
-    written, for the run to raise on all ranks."""
+    """Write lines into a file of the run folder.
+
+    The error of a line that could not be written is kept, for the run to raise on all ranks.
+    """
 
     def __init__(self, path: Path, *, append: bool) -> None:
         super().__init__()
@@ -47,11 +51,13 @@ class _LogFile(logging.Handler):
 
 
 class RunLog:
-    """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the
-    terminal: on rank 0.
+    """Send everything logged under ``vi_contact`` to a file while it is open.
+
+    Warnings go to the terminal too; all this on rank 0.
 
     While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The
-    root logger is left out: form compilers make it print every line."""
+    root logger is left out: form compilers make it print every line.
+    """
 
     turn: ClassVar[object] = None
     _open: ClassVar[int] = 0
@@ -100,8 +106,10 @@ def turn_of(run: object) -> Iterator[None]:
 
 
 def versions(*needed: str) -> dict[str, str]:
-    """Return the version of everything that computes in this process, and of what else is needed to
-    write."""
+    """Return the version of everything that computes in this process.
+
+    What else is needed to write is there too.
+    """
     for name in needed:
         with suppress(ModuleNotFoundError):  # nothing is written, else the folder was refused
             import_module(name)
@@ -115,8 +123,11 @@ def versions(*needed: str) -> dict[str, str]:
 
 
 class Progress:
-    """Show the progress: by tqdm on a terminal, and a line in the log every tenth of the run or
-    every 30 s."""
+    """Show the progress.
+
+    It is shown by tqdm on a terminal, and by a line in the log every tenth of the run or every 30
+    s.
+    """
 
     def __init__(self, total: int, *, shown: bool) -> None:
         self._total, self._done = total, 0

@@ -1,5 +1,7 @@
-"""Read what a run left in its folder: histories, units, facts and the geometry of the contact
-points."""
+"""Read what a run left in its folder.
+
+This is histories, units, facts and the geometry of the contact points.
+"""
 
 import json
 from collections.abc import Callable, Mapping
@@ -60,10 +62,10 @@ class RunFolder:
     """Hold a run read from its files, as ``Solution`` has it.
 
     Attributes:
-        folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per contact
-            point.
-        columns: column -> (unit, meaning). facts: summary.json; empty while a run goes on or after
-            it was killed.
+        folder: where it is.
+        history: column -> values, (rows,) or (rows, …) for arrays per contact point.
+        columns: column -> (unit, meaning).
+        facts: summary.json; empty while a run goes on or after it was killed.
         contact: None when history.h5 is missing, as early in a run, or the problem has no contact
             points.
     """
@@ -77,12 +79,14 @@ class RunFolder:
 
 @checked
 def read_run(folder: str | Path) -> RunFolder:
-    """Read a run folder of ``simulate``. For a run that is still going on or was killed, return
-    what is there.
+    """Read a run folder of ``simulate``.
+
+    For a run that is still going on or was killed, return what is there.
 
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has
     all steps too (it does once the run has ended). InputError when there is no history, or a file
-    is damaged."""
+    is damaged.
+    """
     folder = Path(folder)
     if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
@@ -96,8 +100,11 @@ def read_run(folder: str | Path) -> RunFolder:
 
 
 def _of(path: Path, read: Callable[[Path], T]) -> T:
-    """What is read from a file of a run; InputError that names the file when it is missing or
-    damaged."""
+    """Return what is read from a file of a run.
+
+    Raises:
+        InputError: names the file when it is missing or damaged.
+    """
     try:
         return read(path)
     except InputError:
@@ -118,13 +125,16 @@ def _of(path: Path, read: Callable[[Path], T]) -> T:
 
 
 def _short(error: Exception) -> str:
-    """The reason on one line; that of a damaged table may be as long as the table."""
+    """Return the reason on one line; that of a damaged table may be as long as the table."""
     return shorten(" ".join(part[:SHOWN] for part in str(error).split()), 200, placeholder=" …")
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be
-    printed."""
+    """Return the JSON object of a file.
+
+    Raises:
+        ValueError: anything else, NaN, and texts that cannot be printed.
+    """
     with open_to_read(path) as file:
         data = file.read(BYTES + 1)
     if len(data) > BYTES:
@@ -151,7 +161,7 @@ def _columns(described: dict[str, Any], history: Mapping[str, Array]) -> dict[st
 
 
 def _facts(facts: dict[str, Any]) -> dict[str, Any]:
-    """The summary, its entries of the kinds that ``Solution`` writes."""
+    """Return the summary, its entries of the kinds that ``Solution`` writes."""
     for name, kinds in _KINDS.items():
         value = facts.get(name)
         if value is not None and not _fits(value, kinds):
@@ -195,8 +205,10 @@ def _numbers(path: Path) -> dict[str, Array]:
 
 
 def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, Any]) -> None:
-    """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one
-    of the summary."""
+    """Raise InputError when history.csv has lost rows.
+
+    Numbers of steps follow each other, up to the one of the summary.
+    """
     rows, steps = len(history["t"]), facts.get("steps")
     gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
     if len(gaps):
@@ -214,8 +226,10 @@ def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, 
 
 
 def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
-    """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that
-    both have."""
+    """Raise InputError when history.csv and history.h5 differ in a row that both have.
+
+    They hold the same numbers.
+    """
     for name, own in history.items():
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")

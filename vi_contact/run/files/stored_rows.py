@@ -1,5 +1,6 @@
-"""Read the rows that an earlier run left in its folder, block by block: what a restart goes on
-from.
+"""Read the rows that an earlier run left in its folder, block by block.
+
+They are what a restart goes on from.
 
 Numbers are in history.csv, arrays in history.h5, of later steps in history.journal; the checkpoint
 has their checksum.
@@ -25,8 +26,10 @@ from .table import Block, Table
 
 
 def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
-    """Return lines of history.csv: whole numbers stay whole, all others are floats that read back
-    to the last bit."""
+    """Return lines of history.csv.
+
+    Whole numbers stay whole, all others are floats that read back to the last bit.
+    """
     values = [
         [v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)]
         for row in rows
@@ -35,8 +38,10 @@ def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
 
 
 def records_of(table: Table, block: Block) -> list[bytes]:
-    """Return the arrays of rows as the journal has them: float64, k first; empty ones when there
-    are none."""
+    """Return the arrays of rows as the journal has them.
+
+    They are float64, k first; empty ones when there are none.
+    """
     n = len(block["k"])
     if not table.arrays:
         return [b""] * n
@@ -45,8 +50,9 @@ def records_of(table: Table, block: Block) -> list[bytes]:
 
 
 class StoredRows:
-    """Read rows up to step k in a folder. ``checksum``: what they must have, as of the checkpoint;
-    "" for one without.
+    """Read rows up to step k in a folder.
+
+    ``checksum``: what they must have, as of the checkpoint; "" for one without.
 
     After ``blocks`` has come to its end: ``length`` in bytes of their part of history.csv, ``hash``
     of what was read.
@@ -57,8 +63,10 @@ class StoredRows:
         self.length, self.hash = 0, hashlib.sha256()
 
     def blocks(self) -> Iterator[Block]:
-        """Return the rows, in order. InputError, one sentence, for what is missing, damaged or of
-        other columns."""
+        """Return the rows, in order.
+
+        InputError, one sentence, for what is missing, damaged or of other columns.
+        """
         check_folder_format(self.folder)
         path, names = self.folder / HISTORY_CSV, self._table.numbers
         if not is_own(path):
@@ -90,8 +98,10 @@ class StoredRows:
 def read_blocks(
     csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
-    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line
-    cut short."""
+    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end.
+
+    No line is cut short.
+    """
     done = first
     while True:
         lines = [line for line in islice(csv, table.block) if line.endswith(b"\n")]
@@ -120,8 +130,11 @@ def read_blocks(
 
 
 def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
-    """Return the numbers of lines (rows, width); InputError names the first line that holds
-    something else."""
+    """Return the numbers of lines (rows, width).
+
+    Raises:
+        InputError: names the first line that holds something else.
+    """
     values: list[list[float]] = []
     for i, line in enumerate(lines):
         texts = line.replace(b"_", b"?").split(b",")  # float() would read 1_0 as ten
@@ -156,8 +169,11 @@ class StoredArrays:
             self._file.close()
 
     def rows(self, first: int, steps: Array) -> Block:
-        """Return the arrays of consecutive rows, of these steps; InputError where one is
-        missing."""
+        """Return the arrays of consecutive rows, of these steps.
+
+        Raises:
+            InputError: one is missing.
+        """
         if not self._samples:
             return {}
         n = self._in_hdf5(first, steps)
@@ -228,7 +244,7 @@ class StoredArrays:
 
 
 def _journal_rows(path: Path, width: int) -> Array:
-    """The rows of the journal; one that was cut short by a crash is left out."""
+    """Return the rows of the journal; one that was cut short by a crash is left out."""
     if not is_own(path):
         return np.zeros((0, width))
     with open_to_read(path) as file:

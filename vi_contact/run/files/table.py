@@ -1,5 +1,7 @@
-"""Hold the histories of a run in memory: compact columns, of a run with a folder only so much of
-them; tally them."""
+"""Hold the histories of a run in memory, and tally them.
+
+These are compact columns; of a run with a folder only so much of them is held.
+"""
 
 import copy
 import os
@@ -35,9 +37,11 @@ class Table:
     """Hold columns and rows of a run: numbers on every rank, arrays on rank 0.
 
     Attributes:
-        columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
-        numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only HDF5
-            holds, with a sample.
+        columns: column -> (unit, meaning).
+        first: the row it was made with.
+        count: rows so far.
+        numbers: columns of history.csv, in order.
+        arrays: on rank 0 the others, which only HDF5 holds, with a sample.
         file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the
             memory lets them go.
         block: how many rows are turned into columns, read or written together.
@@ -68,8 +72,10 @@ class Table:
         self.append(first)
 
     def check(self, row: Row) -> None:
-        """Raise InputError for a row with other columns than its recorder has announced, or not of
-        numbers."""
+        """Raise InputError for a row with other columns than its recorder has announced.
+
+        So it does for a row that is not of numbers.
+        """
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
         for name in sorted(row.keys() ^ self.columns.keys()):
@@ -101,8 +107,10 @@ class Table:
             self._store(self._columns(rows))
 
     def restore(self, block: Block) -> None:
-        """Add rows of an earlier run, which are those before the one that the table was made
-        with."""
+        """Add rows of an earlier run.
+
+        They are those before the one that the table was made with.
+        """
         if self.count == 1 and self._open:
             self._open, self.count = [], 0
         self.count += len(block["k"])
@@ -123,8 +131,10 @@ class Table:
             self._blocks.append(block)
 
     def remembered(self) -> Block | None:
-        """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let
-        some go."""
+        """Return all rows, column -> values, arrays on rank 0 only.
+
+        It is None when the memory has let some go.
+        """
         self._gather()
         names = [*self.numbers, *self.arrays] if self._kept else []
         return {
@@ -139,9 +149,11 @@ class Table:
         return tally.facts()
 
     def history(self) -> Mapping[str, Array]:
-        """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of
-        too many rows for the memory, or points for every rank, as they are in the file.
-        Collective."""
+        """Return column -> values of all rows. Collective.
+
+        They are (rows,) float64, or (rows, *shape of the arrays); of too many rows for the memory,
+        or points for every rank, as they are in the file.
+        """
         kept = self.remembered() or {}
         shared = [
             name
@@ -164,10 +176,12 @@ class Table:
 
 
 class StoredHistory(Mapping[str, Array]):
-    """Hold histories that are read column by column from history.h5 when somebody asks, but for
-    those that are kept.
+    """Hold histories that are read column by column from history.h5 when somebody asks.
 
-    ViContactError when there is no file, or not any more, or it no longer holds these rows."""
+    Those that are kept are not read.
+
+    ViContactError when there is no file, or not any more, or it no longer holds these rows.
+    """
 
     def __init__(self, file: Path | None, kept: Block, names: list[str]) -> None:
         self._file, self._kept, self._names = file, kept, names
@@ -206,8 +220,10 @@ class StoredHistory(Mapping[str, Array]):
 
 
 class Tally:
-    """Step, iterations, worst certificate, contact and energy ledger of a run. Row 0 is the initial
-    state."""
+    """Step, iterations, worst certificate, contact and energy ledger of a run.
+
+    Row 0 is the initial state.
+    """
 
     def __init__(self) -> None:
         self._rows = 0
@@ -244,7 +260,7 @@ class Tally:
         self._sums[name] = self._sums.get(name, 0.0) + float(np.sum(values))
 
     def _raise(self, name: str, values: Array, larger: np.ufunc = np.maximum) -> None:
-        """The largest so far; NaN stays NaN, but is left out with ``np.fmax``."""
+        """Take the largest so far; NaN stays NaN, but is left out with ``np.fmax``."""
         if len(values):
             found = float(larger.reduce(values))
             self._most[name] = float(larger(self._most.get(name, found), found))
@@ -271,8 +287,10 @@ class Tally:
         return facts | (self._energy() if "defect" in most else {})
 
     def _energy(self) -> dict[str, Any]:
-        """The ledger at the end [J], and its largest defect relative to the largest energy or input
-        work of the run."""
+        """Return the ledger at the end [J], and its largest defect.
+
+        The defect is relative to the largest energy or input work of the run.
+        """
         most, last = self._most, self._last
         start = self._first["energy_kinetic"] + self._first["energy_strain"]
         size = max(most["energy"], most["work"])

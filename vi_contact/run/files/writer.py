@@ -1,5 +1,7 @@
-"""Write everything a run writes while it works, in one place: histories, fields, checkpoints, log
-and summary."""
+"""Write everything a run writes while it works, in one place.
+
+This is histories, fields, checkpoints, log and summary.
+"""
 
 import logging
 import time
@@ -31,24 +33,28 @@ LATEST = (
 class OpenFields(Protocol):
     """Write frames of fields; collective."""
 
-    def write(self, state: State, acceleration: Array, report: Report | None = None) -> None: ...
+    def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
+        """Write a frame of the state."""
 
 
 class FieldWriter(Protocol):
-    """Write field output (fem.XDMF). ``open`` is collective; ``kept``: step -> time of the frames
-    that are there."""
+    """Write field output (fem.XDMF).
+
+    ``open`` is collective; ``kept``: step -> time of the frames that are there.
+    """
 
     @property
-    def every(self) -> int: ...
+    def every(self) -> int:
+        """Return how many steps lie between two frames."""
 
-    def open(
-        self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
-    ) -> OpenFields: ...
+    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> OpenFields:
+        """Return the open files of fields in the folder."""
 
 
 class Writer:
-    """Write into the folder of a run, or into none: then nothing is written. Every method but
-    ``rescue`` is collective.
+    """Write into the folder of a run, or into none: then nothing is written.
+
+    Every method but ``rescue`` is collective.
 
     ``stored``: the rows of an earlier run that this one continues. Unless they are in this folder,
     ``open`` clears it.
@@ -113,8 +119,10 @@ class Writer:
         self._files = HistoryFiles(folder, self._table, geometry, self._stored)
 
     def append(self, row: Row) -> None:
-        """Take a row of the histories; it is written, with all that wait, when the next one might
-        be late."""
+        """Take a row of the histories.
+
+        It is written, with all that wait, when the next one might be late.
+        """
         if self.folder is None:
             self._table.append(row)
             return
@@ -124,8 +132,10 @@ class Writer:
             self.flush()
 
     def flush(self, *, alone: bool = False) -> None:
-        """Write rows that wait, then put them into the table. Collective, unless others may not
-        come (``alone``)."""
+        """Write rows that wait, then put them into the table.
+
+        Collective, unless others may not come (``alone``).
+        """
         if self._waiting:
             on_root(SerialComm() if alone else self._comm, self._flush)
             for row in self._waiting:
@@ -147,8 +157,10 @@ class Writer:
             self._fields.write(report.new, report.balance.a, report)
 
     def checkpoint(self, place: RestartPoint, of: Callable[[], Mapping[str, Any]]) -> None:
-        """Write a checkpoint of this place, unless there is one already. ``of``: what problem it
-        is."""
+        """Write a checkpoint of this place, unless there is one already.
+
+        ``of``: what problem it is.
+        """
         k = place.state.k
         self.flush()
         if self.folder is None or self._saved == k:
@@ -168,8 +180,10 @@ class Writer:
         on_root(self._comm, lambda: self._close(facts))
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
-        """Do the same after a failure: not collective, as others might not come; no error hides the
-        first."""
+        """Do the same after a failure.
+
+        It is not collective, as others might not come; no error hides the first.
+        """
         with suppress(
             Exception
         ):  # of any kind: the first error is told, and this one comes of it or after it

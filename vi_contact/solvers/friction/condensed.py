@@ -2,14 +2,17 @@
 
 With the unit vectors E of the normal and F of the tangential unknowns, x_free = A⁻¹b and D = [E F]:
 
-    G = DᵀA⁻¹D (+ compliance/scale on the normal diagonal),    node by node: r_n, then r_t: ``core.condensation``
-    q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free             gap, and minus the slip, without reactions
+    G = DᵀA⁻¹D (+ compliance/scale on the normal diagonal)
+        node by node: r_n, then r_t: ``core.condensation``
+    q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free
+        gap, and minus the slip, without reactions
     the small problem of ``problem`` gives r;   x = A⁻¹(b - E r_n - F r_t)
 
 A law that depends on the slip rate makes this a sequence of such problems: ``slip_rate``.
 
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a
-free spring."""
+free spring.
+"""
 
 from collections.abc import Callable
 
@@ -27,8 +30,10 @@ from .slip_rate import RateIteration
 
 
 class CondensedFriction:
-    """Solve the small problem with friction of one A, condensed onto normal and tangential
-    unknowns."""
+    """Solve the small problem with friction of one A.
+
+    It is condensed onto normal and tangential unknowns.
+    """
 
     def __init__(
         self,
@@ -57,9 +62,11 @@ class CondensedFriction:
     def reactions(
         self, step: StepProblem, free: Array, rigid: Mask
     ) -> tuple[FrictionResult, Mask, Array]:
-        """Return the reactions for contact unknowns that would be ``free``, and where they are put:
-        closed points on a rigid support on their bound, those that stick where they were, which
-        removes round-off only."""
+        """Return the reactions for contact unknowns that would be ``free``, and where they are put.
+
+        Closed points on a rigid support are put on their bound, those that stick where they were,
+        which removes round-off only.
+        """
         surface = self._surface
         assert step.slip0 is not None
         none = np.zeros(surface.count)
@@ -89,8 +96,10 @@ class CondensedFriction:
     def solve_many(
         self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
     ) -> Answers:
-        """Return the answers to several steps: ``many`` holds their rows, ``own`` makes one of
-        them."""
+        """Return the answers to several steps.
+
+        ``many`` holds their rows, ``own`` makes one of them.
+        """
         free, (m, d) = (
             self.condensed.free(many.b),
             (len(many.bound), 1 + self._surface.tangents.shape[1]),

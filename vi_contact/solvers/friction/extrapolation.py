@@ -1,14 +1,17 @@
-"""Extrapolate fixed-point iterations: the next point x from the points tried so far and their
-images g(x).
+"""Extrapolate fixed-point iterations.
+
+The next point x is found from the points tried so far and their images g(x).
 
     plain       x <- g(x)
-    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j),    g(x) - x = f = sum_j gamma_j (f_j+1 - f_j) at best
+    Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j)
+                g(x) - x = f = sum_j gamma_j (f_j+1 - f_j) at best
 
 Both need one image a step and nothing else. Anderson combines the last ``depth`` differences (J.
 ACM 12, 1965; Walker and Ni, SIAM J. Numer. Anal. 49, 2011), is the secant method for one unknown,
 and on linear problems is equivalent to GMRES. Where a plain step lets f grow along itself, f·f_old
 >= |f_old|², g expands and both would turn back: the next step is plain again, and what was tried
-before is forgotten."""
+before is forgotten.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -47,8 +50,10 @@ class Plain:
 
 @dataclass(frozen=True)
 class Anderson:
-    """Extrapolate from the last ``depth`` steps, after ``after`` plain ones. InputError for depth <
-    1 or after < 0."""
+    """Extrapolate from the last ``depth`` steps, after ``after`` plain ones.
+
+    InputError for depth < 1 or after < 0.
+    """
 
     depth: int = 5
     after: int = 0

@@ -1,10 +1,12 @@
-"""Solve Coulomb's law as a sequence of Tresca problems: s <- limit(r_n(s)), the classical fixed
-point.
+"""Solve Coulomb's law as a sequence of Tresca problems.
+
+It is s <- limit(r_n(s)), the classical fixed point.
 
 Every problem with the threshold s given is convex and has one solution; the map is a contraction
 for small friction (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980; Haslinger,
 Hlaváček and Nečas, Handbook of Numerical Analysis IV, 1996). ``extrapolation`` may shorten the
-sequence."""
+sequence.
+"""
 
 from dataclasses import dataclass, field
 
@@ -18,11 +20,12 @@ from .problem import FrictionMethod, FrictionResult, ScaledDelassus, Settings, i
 
 @dataclass(frozen=True)
 class FixedPoint(Settings):
-    """Hold the settings. ``tolerance``: change of the thresholds relative to the largest, or
-    rounding where that is more; ``tresca``: method for each problem; ``extrapolation``: Plain() or
-    Anderson(), how the next thresholds follow. What the thresholds still change by shifts points
-    that stick, and fine meshes amplify that: on 2e5 unknowns the equilibrium of a step is off by
-    1e-9 at 1e-10.
+    """Hold the settings.
+
+    ``tolerance``: change of the thresholds relative to the largest, or rounding where that is more;
+    ``tresca``: method for each problem; ``extrapolation``: Plain() or Anderson(), how the next
+    thresholds follow. What the thresholds still change by shifts points that stick, and fine meshes
+    amplify that: on 2e5 unknowns the equilibrium of a step is off by 1e-9 at 1e-10.
 
     In the result ``iterations`` counts Tresca problems and ``history`` the relative change of the
     thresholds in each.

@@ -1,17 +1,21 @@
-"""Alternate with given forces: the normal problem with r_t given, then the tangential problem with
-r_n given.
+"""Alternate between normal and tangential problems with given forces.
+
+First comes the normal problem with r_t given, then the tangential problem with r_n given.
 
 The boundary method (docs/reference/sources.md [1]) carries tangential forces C_T that are given
 (eq. 6); they enter the right-hand side, gamma of eq. 40, and what is left is the minimum of eq. 42
 over normal reactions. With friction C_T is found by turns (Panagiotopoulos, Ing.-Arch. 44, 1975),
 with the parts G_nn, G_nt, G_tt of the Delassus operator:
 
-    normal        0 <= r_n  perpendicular to  (q_n + G_nt r_t) + G_nn r_n >= 0               r_t = C_T given
-    tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)     r_n given
+    normal        0 <= r_n  perpendicular to  (q_n + G_nt r_t) + G_nn r_n >= 0
+                  r_t = C_T given
+    tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)
+                  r_n given
 
 Block Gauss-Seidel: under Tresca's law the exact minimum over one block after the other, which
 converges for every G; under Coulomb's when coupling and friction are moderate, linearly.
-``extrapolation`` acts on r_t."""
+``extrapolation`` acts on r_t.
+"""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,11 +40,13 @@ from .problem import (
 
 @dataclass(frozen=True)
 class GivenForces(Settings):
-    """Hold the settings. ``tolerance``: change of r_t over the largest; ``tangential``: method of
-    tangential problems.
+    """Hold the settings.
+
+    ``tolerance``: change of r_t over the largest; ``tangential``: method of tangential problems.
 
     In the result ``iterations`` counts pairs of problems and ``history`` the relative change in
-    each."""
+    each.
+    """
 
     tolerance: float = 1e-11
     tangential: FrictionMethod = field(default_factory=FrictionNewton)

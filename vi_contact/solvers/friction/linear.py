@@ -1,14 +1,15 @@
-"""Solve the linear problems of semismooth Newton with friction, by whichever of two matrices is the
-smaller.
+"""Solve the linear problems of semismooth Newton with friction.
+
+It is done by whichever of two matrices is the smaller.
 
 With the rows R that must hold, r = fixed + P z and w = q + G fixed:
 
-    K z = -R w,    K = R G P (+ the turns in 3D)                                                                   (1)
+    K z = -R w,    K = R G P (+ the turns in 3D)                                                (1)
 
 Where most places are in R, the others S are fewer. With H = G⁻¹, made once, and C r = 0 what holds
 there, r_S zero or growing with its normal, K z = v is r = H (v + s) with s at S only:
 
-    (C H)_S s = -C H v                                                                                             (2)
+    (C H)_S s = -C H v                                                                          (2)
 """
 
 from typing import Any
@@ -31,7 +32,8 @@ class States:
     Masks (m,) ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction. Slip
     reactions are fixed + growth r_n direction, (m, d - 1) with ``growth`` (m,); ``fixed`` (m, d).
     ``turning``: (|y_t| - limit)/limit of nodes that turn. ``exact``: none does, and the linear
-    problem depends on ``key`` only."""
+    problem depends on ``key`` only.
+    """
 
     def __init__(self, step: ScaledProblem, y: Array, before: "States | None") -> None:
         m, d = y.shape
@@ -61,9 +63,11 @@ class States:
 
 
 class LinearProblems:
-    """Solve the linear problems of one run of Newton's method. The way of solution depends on this
-    run alone, not on ``kept``, the factors of the last sets of states of one G: they save time and
-    change no digit of an answer."""
+    """Solve the linear problems of one run of Newton's method.
+
+    The way of solution depends on this run alone, not on ``kept``, the factors of the last sets of
+    states of one G: they save time and change no digit of an answer.
+    """
 
     def __init__(self, delassus: ScaledDelassus, kept: "dict[bytes, Factored]") -> None:
         self._delassus, self._kept = delassus, kept
@@ -92,7 +96,8 @@ class Reduced:
     """Hold R, P and the turns, by places in r.
 
     z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking
-    nodes, turns."""
+    nodes, turns.
+    """
 
     def __init__(self, states: States) -> None:
         m, d = self.shape = states.fixed.shape
@@ -120,8 +125,10 @@ class Reduced:
         return r
 
     def matrix(self, G: Array) -> Array:
-        """Return K, made as its transpose, whose rows are near each other in memory; G is
-        transposed too."""
+        """Return K, made as its transpose.
+
+        The rows of the transpose are near each other in memory; G is transposed too.
+        """
         places = np.concatenate([self.plain, self._turned.ravel()])
         part = _block(G, self.plain, places)
         growth = self.growth[self.closed]  # of the first rows of part
@@ -143,8 +150,10 @@ class Reduced:
 
 
 class Factored:
-    """Hold (1) of one set of states, or (2) where that is smaller, with its factor. ``sound``: it
-    is regular."""
+    """Hold (1) of one set of states, or (2) where that is smaller, with its factor.
+
+    ``sound``: it is regular.
+    """
 
     def __init__(self, reduced: Reduced, delassus: ScaledDelassus) -> None:
         self.reduced, self._delassus, self._H = reduced, delassus, None
@@ -160,7 +169,7 @@ class Factored:
             self._lu, self.sound = (lu, pivots), info == 0
 
     def _rest(self, H: Array) -> Array:
-        """The matrix of (2)."""
+        """Return the matrix of (2)."""
         growth, left = np.zeros(self.reduced.shape), np.ones(len(H), dtype=bool)
         growth[:, 1:], left[self.reduced.plain] = self.reduced.growth, False
         self._others = others = np.flatnonzero(left)
@@ -181,7 +190,7 @@ class Factored:
         return np.asarray(r[self.reduced.plain])
 
     def _whole(self, H: Array, v: Array) -> Array:
-        """r of (2)."""
+        """Return r of (2)."""
         full = np.zeros(len(H))
         full[self.reduced.plain] = v
         r = H @ full

@@ -1,5 +1,6 @@
-"""Solve contact with friction by semismooth Newton: the default. In 2D it is an active-set method
-and ends exactly.
+"""Solve contact with friction by semismooth Newton: the default.
+
+In 2D it is an active-set method and ends exactly.
 
 With y = r - w of the last iterate every node is open (y_n <= 0) or closed, and sticks (|y_t| <=
 limit) or slips along n = y_t/|y_t|. The next iterate solves the linear problem of these states,
@@ -7,7 +8,8 @@ Newton's step for the natural map (2) of ``problem`` with the limit of the augme
 max(y_n, 0) (Alart and Curnier 1991; Hüeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30, 2008):
 
     open   r_n = 0                        closed   w_n = 0
-    stick  w_t = 0                        slip     r_t = limit(r_n) n + eta t,   t·w_t + (|y_t| - limit)/limit eta = 0
+    stick  w_t = 0                        slip     r_t = limit(r_n) n + eta t
+                                                   t·w_t + (|y_t| - limit)/limit eta = 0
 
 eta is the turn of the slip direction, t perpendicular to n: in 2D there is none, the problem is
 piecewise linear, and the iterate of the right states is exact. linear.py solves these problems.
@@ -19,7 +21,8 @@ precision between them. Without a compiler Newton does all.
 
 Slip that turned back within one iteration overshot: such a node sticks in the next, which ends the
 usual cycles of slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py)
-lead to a better start."""
+lead to a better start.
+"""
 
 from ctypes import c_double
 from dataclasses import dataclass
@@ -45,19 +48,23 @@ Kept = dict[bytes, Factored]  # factors by the key of their states
 
 @dataclass(frozen=True)
 class FrictionNewton(Settings):
-    """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations`` of
-    Newton in a row.
+    """Hold the settings.
+
+    ``tolerance``: residual above which it refuses; ``max_iterations`` of Newton in a row.
 
     In the result ``iterations`` counts linear solves, fallback sweeps and, as one, the sweeps
-    before (0: no contact), ``history`` the residual after those and after each linear solve."""
+    before (0: no contact), ``history`` the residual after those and after each linear solve.
+    """
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
     tolerance: float = 1e-11
     max_iterations: int = 30
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
-        """Check and scale G (m d, m d). Answers depend on their right-hand side alone, not on steps
-        before."""
+        """Check and scale G (m d, m d).
+
+        Answers depend on their right-hand side alone, not on steps before.
+        """
         delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
         compiled = (
             library(SerialComm()) if delassus.symmetric else None
@@ -91,7 +98,10 @@ class FrictionNewton(Settings):
     def _newton(
         self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]
     ) -> tuple[Array, bool]:
-        """The best iterate r, and whether it solves the problem to rounding or to the tolerance."""
+        """Return the best iterate r, and whether it solves the problem.
+
+        It does so to rounding or to the tolerance.
+        """
         best, smallest = np.zeros_like(y), step.unit
         linear = LinearProblems(step.delassus, kept)
         states: States | None = None
@@ -112,8 +122,10 @@ class FrictionNewton(Settings):
 
 
 def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array, float]:
-    """Return r, w = q + G r and the residual after compiled sweeps; in 2D, where they are a start
-    only, w as the sweeps left it."""
+    """Return r, w = q + G r and the residual after compiled sweeps.
+
+    In 2D, where they are a start only, w is as the sweeps left it.
+    """
     of, r, w = step.delassus, np.array(r, order="C"), np.array(step.w(r), order="C")
     room = np.empty(r.size + len(r), dtype=np.float32)
     given = (*of.short, step.cohesion, step.slope, of.bilateral, r, w, room)

@@ -1,16 +1,20 @@
-"""Solve contact with friction by nonsmooth Gauss-Seidel: one node after another, each solved
-exactly.
+"""Solve contact with friction by nonsmooth Gauss-Seidel.
+
+One node is solved after another, each exactly.
 
 Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
 
-    open   r_n = 0, r_t the minimum over |r_t| <= cohesion, if w_n >= 0 then; otherwise w_n = 0 gives r_n(r_t) and
+    open   r_n = 0, r_t the minimum over |r_t| <= cohesion, if w_n >= 0 then;
+           otherwise w_n = 0 gives r_n(r_t) and
     stick  S r_t = -q'          if |r_t| <= limit(r_n(r_t))
-    slip   (S + lambda) r_t = -q',   |r_t| = limit(r_n(r_t)),   lambda > 0 by a scalar root (closed form in 2D)
+    slip   (S + lambda) r_t = -q',   |r_t| = limit(r_n(r_t))
+           lambda > 0 by a scalar root (closed form in 2D)
 
 with S and q' the tangential block and right-hand side after the elimination of r_n. Sources: Moreau
 (Comput. Methods Appl. Mech. Eng. 177, 1999) and Jean (same volume). Under Tresca's law it is
 coordinate descent of a convex function and converges for every G; under Coulomb's it converges in
-practice, linearly, for friction that is not large."""
+practice, linearly, for friction that is not large.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +29,8 @@ from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, 
 class NSGS(Settings):
     """Hold the settings. ``tolerance``: largest residual, that of r = 0 being 1.
 
-    In the result ``iterations`` counts sweeps and ``history`` the residual after each."""
+    In the result ``iterations`` counts sweeps and ``history`` the residual after each.
+    """
 
     max_iterations: int = 5000
 
@@ -79,7 +84,7 @@ class _Node:
         self.bilateral = bool(step.delassus.bilateral[i])
 
     def solve(self, q: Array) -> Array:
-        """The reactions of the node when all others give it q."""
+        """Return the reactions of the node when all others give it q."""
         q_n, q_t = float(q[0]), q[1:]
         if not self.bilateral:
             r_t = on_disk(self.tangential, q_t, lambda r_t: self.cohesion)
@@ -99,12 +104,14 @@ class _Node:
 
 
 def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
-    """Return r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r),
-    lambda > 0.
+    """Return r with S r = -q when |r| <= limit(r), and else r on the disk.
+
+    There, (S + lambda) r = -q on |r| = limit(r), lambda > 0.
 
     S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| -
     limit is bracketed in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of
-    the eigenvalues give r: a start only."""
+    the eigenvalues give r: a start only.
+    """
     if len(q) == 0 or not q.any():
         return np.zeros(len(q))
     values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)

@@ -1,8 +1,10 @@
-"""Pose the small problem of a step with friction: its residual, and the scaling all its methods
-share.
+"""Pose the small problem of a step with friction.
+
+Its residual, and the scaling all its methods share, are here.
 
     w = q + G r;    0 <= r_n  perpendicular to  w_n >= 0   (bilateral rows: w_n = 0, r_n free)
-    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0),    r_t = -limit w_t/|w_t| where w_t is not zero          (1)
+    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0)
+    r_t = -limit w_t/|w_t| where w_t is not zero                                                (1)
 
 G (m d, m d) is the Delassus operator of normal and tangential unknowns, node by node (r_n, then the
 d - 1 components of r_t), symmetric positive definite; q_n is the gap and q_t minus the slip that
@@ -14,11 +16,13 @@ of s into themselves continuously, Brouwer), and is unique for small slopes only
 (1) holds where the natural map vanishes (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92,
   1991, with y = r - w):
 
-    F_n = r_n - max(y_n, 0)   (bilateral: w_n),      F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)   (2)
+    F_n = r_n - max(y_n, 0)   (bilateral: w_n)
+    F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)                               (2)
 
 Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one number for each node
 (disks stay disks), the mean of G_tt to the same power: reactions and displacements are then both in
-sqrt(J), as in ``normal.lcp``."""
+sqrt(J), as in ``normal.lcp``.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -44,7 +48,8 @@ class FrictionResult:
     ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit;
     ``active`` (m,): r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached,
     under a limit that is not zero; ``residual``: largest |F| of (2) over that of r = 0. Each method
-    tells what ``iterations`` and ``history`` count."""
+    tells what ``iterations`` and ``history`` count.
+    """
 
     r: Array
     active: Mask
@@ -63,14 +68,18 @@ class FrictionMethod(Protocol):
         """Say True: that tells such a method from those for the problem without friction."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
-        """Check and scale G (m d, m d), ``bilateral`` (m,); return ``PreparedFriction`` or its like
-        for many q."""
+        """Check and scale G (m d, m d) and return ``PreparedFriction`` or its like for many q.
+
+        ``bilateral`` (m,) says which rows are bilateral.
+        """
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Hold what all methods here let one choose: ``tolerance``, and ``max_iterations`` that they
-    may take."""
+    """Hold what all methods here let one choose.
+
+    This is ``tolerance``, and ``max_iterations`` that they may take.
+    """
 
     carries_friction: ClassVar[bool] = True
     tolerance: float = 1e-12
@@ -102,8 +111,10 @@ class ScaledProblem:
         return len(self.cohesion)
 
     def moved(self, r: Array) -> Array:
-        """Return G r (m, d), from the rows that carry something when they are few; of the last r it
-        is known."""
+        """Return G r (m, d), from the rows that carry something when they are few.
+
+        Of the last r it is known.
+        """
         if not (self._last and np.array_equal(self._last[0], r)):
             self._last[:] = r.copy(), self.delassus.product(r.ravel()).reshape(r.shape)
         return self._last[1]
@@ -133,14 +144,18 @@ class ScaledProblem:
         return 16.0 * EPS * self.delassus.norm * max_abs(r)
 
     def admissible(self, r: Array) -> Array:
-        """Return r with r_n >= 0 and r_t within its disk: removes rounding errors, and whatever
-        else is outside."""
+        """Return r with r_n >= 0 and r_t within its disk.
+
+        This removes rounding errors, and whatever else is outside.
+        """
         r_n = np.where(self.delassus.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Return reactions to start from: those guessed; or what opens the guessed set row by row,
-        at least energy."""
+        """Return reactions to start from.
+
+        They are those guessed, or what opens the guessed set row by row, at least energy.
+        """
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:
@@ -157,8 +172,11 @@ class ScaledProblem:
         return r
 
     def result(self, method: object, tolerance: float, found: Iterated) -> FrictionResult:
-        """Return the result in newtons; StepFailure when the residual is above ``tolerance`` and
-        above rounding."""
+        """Return the result in newtons.
+
+        Raises:
+            StepFailure: the residual is above ``tolerance`` and above rounding.
+        """
         r, iterations, history = found
         r = self.admissible(r)
         w = self.w(r)
@@ -208,9 +226,11 @@ class ScaledDelassus:
 
     @cached_property
     def short(self) -> tuple[Any, ...]:
-        """Return G and, in 2D, its inverse H and the inverse of each node's block of H, in single
-        precision, for the compiled sweeps; None for what is missing, or is not positive definite to
-        that precision."""
+        """Return G in single precision for the compiled sweeps and, in 2D, inverses.
+
+        These are its inverse H and the inverse of each node's block of H, in single precision too.
+        There is None for what is missing, or is not positive definite to that precision.
+        """
         G, d = self.matrix.astype(np.float32), self.dimension
         triangle, info = lapack.spotrf(G, lower=1) if d == 2 else (G, 1)
         if info:
@@ -243,7 +263,8 @@ class ScaledDelassus:
 class PreparedFriction:
     """Solve (1) for one G and many right-hand sides.
 
-    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``."""
+    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``.
+    """
 
     method: object
     tolerance: float
@@ -253,8 +274,11 @@ class PreparedFriction:
     def solve(
         self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None
     ) -> FrictionResult:
-        """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted
-        contact set (m,), or reactions (m, d). StepFailure when the tolerance is not reached."""
+        """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,).
+
+        ``guess``: predicted contact set (m,), or reactions (m, d). StepFailure when the tolerance
+        is not reached.
+        """
         step = self.delassus.problem(q, cohesion, slope)
         found = self.loop(step, step.start(guess if step.unit > 0.0 else None))
         return step.result(self.method, self.tolerance, found)

@@ -1,7 +1,9 @@
-"""Iterate over friction coefficients that depend on the slip rate of the step itself: ordinary
-problems in turn.
+"""Iterate over friction coefficients that depend on the slip rate.
 
-    mu <- mu(|v|),    v = rate_factor w_t(mu),    w_t(mu): slip of the step with the coefficients mu given           (1)
+The rate is that of the step itself; ordinary problems are solved in turn.
+
+    mu <- mu(|v|),    v = rate_factor w_t(mu)
+    w_t(mu): slip of the step with the coefficients mu given                                    (1)
 
 It starts from rest, mu(0), and every inner problem from the reactions of the one before. With the
 mass m that a point slips with, (1) contracts with the factor c |mu'(v)|, c = r_n dt/m or, in a
@@ -10,7 +12,8 @@ falls with mu, so that (1) climbs from rest to the smallest rate that solves the
 rate at all as long as the point can stick. For c |mu'| > 1 there may be other solutions, and
 extrapolation, which begins after four plain steps, might end in one. Friction that grows with the
 rate has one solution, but plain iterations need c mu' < 1; beyond that Anderson's method takes
-over, a secant method for one point."""
+over, a secant method for one point.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -29,11 +32,13 @@ from .extrapolation import Anderson, Extrapolation, accelerated
 
 @dataclass(frozen=True)
 class RateIteration:
-    """Hold the settings. ``tolerance``: change of coefficients over the largest; ``extrapolation``:
-    the next guess.
+    """Hold the settings.
+
+    ``tolerance``: change of coefficients over the largest; ``extrapolation``: the next guess.
 
     ``iterations`` of the result counts those of all inner problems, ``history`` is the change in
-    each iteration."""
+    each iteration.
+    """
 
     tolerance: float = 1e-12
     max_iterations: int = 200
@@ -51,12 +56,14 @@ class RateIteration:
         solved: Callable[[Array, Any], Any],
         slip: Callable[[Any], Array],
     ) -> Any:
-        """Iterate from mu, the coefficients of all conditions under the law at ``rest``; once for
-        one without rates.
+        """Iterate from mu, the coefficients under the law at ``rest``.
+
+        They are those of all conditions. A law without rates is solved for once.
 
         ``solved``: the problem of given coefficients, starting from the last result, None at first;
         ``slip``: that of a result, B_t x - slip0 (m, d - 1) of this rank. StepFailure when the
-        tolerance is not reached. Collective."""
+        tolerance is not reached. Collective.
+        """
         if rest is step.friction:
             return solved(mu, None)
         following, spent, surface = self.extrapolation.start(), 0, step.surface

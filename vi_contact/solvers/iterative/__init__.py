@@ -1,5 +1,7 @@
-"""Solve the step in the volume by conjugate gradients, without any factor: one row of a mask is a
-contact condition."""
+"""Solve the step in the volume by conjugate gradients, without any factor.
+
+One row of a mask is a contact condition.
+"""
 
 from ...core.lazy import lazy
 

@@ -1,10 +1,12 @@
-"""Solve on the free unknowns of one contact set by PETSc's conjugate gradients, with a watch that
-may stop them.
+"""Solve on the free unknowns of one contact set by PETSc's conjugate gradients.
+
+A watch may stop them.
 
 PETSc sees the whole operator and a preconditioner that masks: directions have no part in held rows,
 so that iterates and inner products are those of the reduced system, and the residual that PETSc
 carries along is, in held rows, the reaction there. To look at the signs costs no product, and to go
-on from a known residual costs none either: PETSc solves for the correction."""
+on from a known residual costs none either: PETSc solves for the correction.
+"""
 
 import tomllib
 from collections.abc import Callable, Sequence
@@ -52,8 +54,11 @@ class ConjugateGradients:
         self.ksp.pc.setPythonContext(Lent(masked))
 
     def solve(self, residual: Array, x: Array, watch: Watch) -> tuple[Array, Array, int]:
-        """Return (x, residual, PETSc's reason) of where ``watch(iterations, residual, x)`` returned
-        a reason; its x is a function. ``residual``: that of x, with which it begins."""
+        """Return (x, residual, PETSc's reason) of where the watch stopped.
+
+        ``watch(iterations, residual, x)`` returned a reason there; its x is a function.
+        ``residual`` is that of x, with which it begins.
+        """
         self._watch, self._start = watch, x
         self._b.array[:] = residual
         self.ksp.solve(self._b, self._x)
@@ -72,8 +77,10 @@ class ConjugateGradients:
 
 
 def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
-    """Return the failure of a solver that stopped for PETSc's ``reason``; ``history``: residuals
-    over the forces."""
+    """Return the failure of a solver that stopped for PETSc's ``reason``.
+
+    ``history`` are residuals over the forces.
+    """
     words, remedy = SAID.get(str(reason), SAID["cg"])
     return StepFailure(
         f"{name} stopped after {iterations} linear iterations, {words} (residuals "

@@ -1,10 +1,12 @@
-"""Hold the contact conditions of a step on the full-size vectors: which are closed, and which of
-them have wrong signs.
+"""Hold the contact conditions of a step on the full-size vectors.
+
+It is known which are closed, and which of them have wrong signs.
 
 A closed rigid condition holds its unknown on the bound; the residual there is the reaction. A
 closed spring, of stiffness k = scale / compliance, leaves its unknown free and adds k to the
 diagonal and k bound to the load; its reaction is k (x - bound). An infinite bound is never closed.
-Arrays have one entry for each condition of this rank."""
+Arrays have one entry for each condition of this rank.
+"""
 
 import zlib
 
@@ -19,8 +21,10 @@ CLOSING = 1e-12  # penetration, relative to |x|, that closes a condition at the 
 
 
 class Contact:
-    """Hold the closed set of one step. ``rows``: where the normal unknowns stand in the padded
-    vectors of ``size``."""
+    """Hold the closed set of one step.
+
+    ``rows`` say where the normal unknowns stand in the padded vectors of ``size``.
+    """
 
     def __init__(
         self,
@@ -43,8 +47,10 @@ class Contact:
         self.closed: Mask = np.zeros(len(rows), dtype=bool)
 
     def begin(self, step: StepProblem) -> None:
-        """Take the bounds of a step, and its predicted set with the points that the guess lets
-        penetrate."""
+        """Take the bounds of a step, and its predicted set.
+
+        The points that the guess lets penetrate are added to it.
+        """
         if step.surface.some(np.isnan(step.bound)):
             raise InputError(
                 "the bound of the contact conditions contains NaN: check the gap and the time "
@@ -80,11 +86,13 @@ class Contact:
         return load
 
     def weights(self) -> Array:
-        """Return the mask of the free unknowns: 1, 0 where held or missing, and less than 1 at
-        closed springs.
+        """Return the mask of the free unknowns.
+
+        It is 1, 0 where held or missing, and less than 1 at closed springs.
 
         w M⁻¹ w is the preconditioner: sqrt(A_ii / (A_ii + k)) at a spring gives M the diagonal of A
-        + k there, and tends to the mask as the spring becomes rigid."""
+        + k there, and tends to the mask as the spring becomes rigid.
+        """
         w = np.ones(self._size)
         w[self._missing] = 0.0
         w[self.held] = 0.0
@@ -95,8 +103,10 @@ class Contact:
         return w
 
     def reactions(self, x: Array, residual: Array) -> Array:
-        """Return r_n of the closed conditions, zero of the others; ``residual``: load - (A + K_s)
-        x."""
+        """Return r_n of the closed conditions, zero of the others.
+
+        ``residual`` is load - (A + K_s) x.
+        """
         return np.where(
             self.soft, self.spring_forces(x), np.where(self.closed, residual[self.rows], 0.0)
         )
@@ -117,7 +127,8 @@ class Contact:
         """Return the conditions whose signs are wrong by more than ``error``, the largest residual.
 
         A closed one pulls: r below -error and -least_force; an open one has penetrated by more than
-        the error moves its unknown, error / A_ii, and by more than round-off."""
+        the error moves its unknown, error / A_ii, and by more than round-off.
+        """
         stiff = np.where(self.soft, self.k / (self.diagonal + self.k), 1.0)
         pulls = self.closed & ~self.bilateral & (r < -np.maximum(least_force, error * stiff))
         inside = x[self.rows] - self.bound > np.maximum(CLOSING * x_ref, error / self.diagonal)
@@ -152,6 +163,8 @@ class Contact:
         return float(np.sum(k * np.maximum(x[rows] + t * d[rows] - bound, 0.0) * d[rows]))
 
     def fingerprint(self) -> float:
-        """Return a number of the closed set of this rank, whose sum over ranks tells sets apart, in
-        all likelihood."""
+        """Return a number of the closed set of this rank.
+
+        Its sum over ranks tells sets apart, in all likelihood.
+        """
         return float(zlib.crc32(np.packbits(self.closed).tobytes()))

@@ -1,11 +1,13 @@
-"""Solve a step with friction by semismooth Newton on all unknowns: closed normals and sticking
-tangents are a mask.
+"""Solve a step with friction by semismooth Newton on all unknowns.
+
+Closed normals and sticking tangents are a mask.
 
 Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES
 (``friction_krylov``), to a hundredth of its residual. The first states are those of the reactions
 of the last step, with the slip that the step predicts: A x - b at a predicted x is no contact
 force. In the end every residual is formed afresh; reactions are put on their cone, and tangents
-that stick where they were."""
+that stick where they were.
+"""
 
 import numpy as np
 
@@ -33,8 +35,10 @@ STEPS = 150  # of Newton
 
 
 class Friction:
-    """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer
-    before."""
+    """Solve steps with friction of one A.
+
+    ``last`` holds r_n (m,), r_t and slip (m, d - 1) of the answer before.
+    """
 
     def __init__(
         self,
@@ -59,8 +63,11 @@ class Friction:
         self.worth = Worth(surface.comm, 3, tolerance)
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure, on all ranks, with the history of residuals when there is
-        no answer."""
+        """Return the step.
+
+        Raises:
+            StepFailure: on all ranks, with the history of residuals, when there is no answer.
+        """
         newton = Newton(self, step)
         while not newton.solved():
             newton.advance()
@@ -70,8 +77,10 @@ class Friction:
 
 
 class Newton:
-    """Iterate over one step. ``history``: residuals over the forces; ``steps``: linear problems
-    solved."""
+    """Iterate over one step.
+
+    ``history``: residuals over the forces; ``steps``: linear problems solved.
+    """
 
     def __init__(self, of: Friction, step: StepProblem) -> None:
         self.of = of
@@ -88,8 +97,10 @@ class Newton:
         self._take(self._predicted())
 
     def _predicted(self) -> States:
-        """The states of the last reactions and the predicted slip; without any, points stick where
-        they touch."""
+        """Return the states of the last reactions and the predicted slip.
+
+        Without any, points stick where they touch.
+        """
         of, slip = self.of, self._slip()
         if of.last is None:
             none = np.zeros(len(slip))
@@ -118,9 +129,11 @@ class Newton:
         return np.where(of.surface.tangents >= 0, of.tangents.of(self.x) - self.slip0, 0.0)
 
     def _take(self, states: States, changed: Mask | None = None) -> None:
-        """Take states and the closed set of the contact: hold what they hold, and form the
-        residual, a product, unless nothing moved. ``changed``: conditions that closed or opened,
-        None before the first residual."""
+        """Take states and the closed set of the contact.
+
+        What they hold is held, and the residual is formed, a product, unless nothing moved.
+        ``changed``: conditions that closed or opened, None before the first residual.
+        """
         of, contact, x = self.of, self.of.contact, self.x.copy()
         self.states = states
         contact.place(x)
@@ -149,8 +162,10 @@ class Newton:
         return self.law(slip, r_n, np.linalg.norm(y_t, axis=1) / self.of.tangents.c)
 
     def _rubbed(self) -> Array:
-        """The friction (m, d - 1) that the law allows next to r_t: along a slip that is certain, or
-        the projection."""
+        """Return the friction (m, d - 1) that the law allows next to r_t.
+
+        It is along a slip that is certain, or the projection.
+        """
         limit, size = self.limits(self.r_n), np.linalg.norm(self.slip, axis=1)
         y_t = self.r_t + self.of.tangents.c[:, None] * self.slip
         along = self.slip * (limit / np.where(size > 0.0, size, 1.0))[:, None]
@@ -161,8 +176,11 @@ class Newton:
         return np.where(certain[:, None], along, project(y_t, limit))
 
     def solved(self) -> bool:
-        """Say whether x solves the step. StepFailure when it is not a number, or there were too
-        many steps."""
+        """Say whether x solves the step.
+
+        Raises:
+            StepFailure: x is not a number, or there were too many steps.
+        """
         of = self.of
         error = np.where(of.contact.weights() > 0.0, self.residual, 0.0)
         error[of.tangents.rows] = of.tangents.flat(self.r_t - self._rubbed())
@@ -227,7 +245,7 @@ class Newton:
         self._take(*self._next(left))
 
     def _next(self, error: float) -> tuple[States, Mask]:
-        """The states at x, and the conditions that close or open with them."""
+        """Return the states at x, and the conditions that close or open with them."""
         of, contact = self.of, self.of.contact
         wrong = self._wrong(0.0 if error <= self.goal else error)
         stiffness = np.where(contact.soft, contact.k, contact.diagonal)
@@ -264,7 +282,7 @@ class Newton:
         return result, (self.r_n, r_t, slip)
 
     def _stopped(self, words: str, remedy: str) -> StepFailure:
-        """The failure, with the history of residuals."""
+        """Return the failure, with the history of residuals."""
         return StepFailure(
             f"{self.of.name} stopped after {self.steps} Newton steps, {words} (residuals "
             f"{told(self.history)}): {remedy}"

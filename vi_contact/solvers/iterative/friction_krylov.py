@@ -1,5 +1,7 @@
-"""Solve the linear problem of given friction states by PETSc's GMRES: it is not symmetric where
-points slip. Where none does, conjugate gradients serve, which do not stagnate on weak springs.
+"""Solve the linear problem of given friction states by PETSc's GMRES.
+
+It is not symmetric where points slip. Where none does, conjugate gradients serve, which do not
+stagnate on weak springs.
 
 The preconditioner is that of the frictionless step, made once: w W M⁻¹ W w, with zeros in w for
 closed normals and sticking tangents, and in the tangent plane of a point that slips
@@ -8,7 +10,8 @@ closed normals and sticking tangents, and in the tangent plane of a point that s
 
 which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g is that of A⁻¹, and tends
 to the mask of a point that cannot turn. About half of the diagonal of A is what its neighbours
-leave a node of stiffness."""
+leave a node of stiffness.
+"""
 
 from typing import Any
 
@@ -63,9 +66,11 @@ class Turned(Masked):
 
 
 class Gmres:
-    """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips, on
-    the matrix of the linear problem, as whose context it serves. ``free``: 1 in rows that are not
-    held, and 0."""
+    """Run PETSc's KSP ``gmres``, or ``cg`` where no point slips, on the linear problem.
+
+    ``gmres`` is preconditioned from the right. The object serves as the context of the matrix of
+    the linear problem. ``free`` is 1 in rows that are not held, and 0.
+    """
 
     def __init__(
         self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int
@@ -101,8 +106,10 @@ class Gmres:
         values *= self.free
 
     def solve(self, residual: Array, share: float, goal: float) -> tuple[Array, float, int]:
-        """Return (dx, norm of what is left, PETSc's reason): ``share`` is left, or about ``goal``
-        in a row."""
+        """Return (dx, norm of what is left, PETSc's reason).
+
+        ``share`` is left, or about ``goal`` in a row.
+        """
         self._b.array[:] = residual
         self._x.set(0.0)
         spread = min(self._b.norm() / (self._b.norm(PETSc.NormType.INFINITY) or 1.0), SPREAD)

@@ -1,5 +1,6 @@
-"""Hold which contact points are open, stick and slip, and the linear problem of these states on the
-full-size vectors.
+"""Hold which contact points are open, stick and slip.
+
+The linear problem of these states on the full-size vectors is here too.
 
 With the force r_t = (b - A x)_t on the tangents, the slip s = x_t - slip0, a stiffness c of each
 point (the diagonal of A) and y = r_t + c s, a point sticks where |y| <= limit(r_n) and else slips
@@ -11,11 +12,13 @@ vanishes at the solution (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92
 step for it is the linear problem of the states (Hüeber, Stadler and Wohlmuth, SIAM J. Sci. Comput.
 30, 2008):
 
-    stick  s = 0        slip  r_t = (cohesion + slope r_n) n + kappa (s - n n·s),  kappa = limit c / (|y| - limit)
+    stick  s = 0
+    slip   r_t = (cohesion + slope r_n) n + kappa (s - n n·s),  kappa = limit c / (|y| - limit)
 
 in which kappa, the friction limit over the slip, is the curvature of the disk; it turns n along the
 slip. Coefficients that depend on the slip rate add their derivative times n n·s. Arrays have one
-row for each condition of this rank."""
+row for each condition of this rank.
+"""
 
 from dataclasses import dataclass
 
@@ -34,8 +37,10 @@ DIFFERENCE = 1e-6  # of the slip, for the derivative of coefficients
 
 
 class Tangents:
-    """Read the tangential unknowns of padded vectors. ``rows`` (L,): where the free ones are, point
-    by point."""
+    """Read the tangential unknowns of padded vectors.
+
+    ``rows`` (L,): where the free ones are, point by point.
+    """
 
     def __init__(self, surface: ContactSurface, places: Indices, diagonal: Array) -> None:
         self._free = surface.tangents >= 0
@@ -57,8 +62,10 @@ class Tangents:
 
 @dataclass(frozen=True)
 class Limits:
-    """Hold the friction limit cohesion + slope r_n of every point, its ``rise`` [A] with the slip,
-    and that at rest."""
+    """Hold the friction limit cohesion + slope r_n of every point.
+
+    Its ``rise`` [A] with the slip, and the limit at rest, are held too.
+    """
 
     cohesion: Array
     slope: Array
@@ -70,8 +77,10 @@ class Limits:
         return self.cohesion + self.slope * np.maximum(r_n, 0.0)
 
     def sticking(self, r_n: Array) -> Array:
-        """Return the limit (m,) below which a point sticks: of a slip that is slower under the law,
-        or of rest."""
+        """Return the limit (m,) below which a point sticks.
+
+        It is that of a slip that is slower under the law, or of rest.
+        """
         return self(r_n) if self.rest is None else np.minimum(self(r_n), self.rest(r_n))
 
 
@@ -81,11 +90,13 @@ def dot(a: Array, b: Array) -> Array:
 
 
 class States:
-    """Take the states at y_n (m,), y_t (m, d - 1), and with them the linear problem. ``slip``: s
-    where y was taken.
+    """Take the states at y_n (m,), y_t (m, d - 1), and with them the linear problem.
+
+    ``slip``: s where y was taken.
 
     Slip that turned back since ``before`` overshot, and sticks first. ``stuck``: points that stick,
-    whatever y says."""
+    whatever y says.
+    """
 
     def __init__(
         self,
@@ -139,24 +150,29 @@ class States:
         )
 
     def apply(self, contact: Contact, p: Array, y: Array) -> None:
-        """Turn y = A p into the product of p with the matrix of the linear problem, in the rows of
-        the tangents."""
+        """Turn y = A p into the product of p with the matrix of the linear problem.
+
+        It changes the rows of the tangents.
+        """
         tangents = self._tangents
         rise = np.where(contact.soft, contact.k * p[contact.rows], -y[contact.rows])
         extra = self.turned(tangents.of(p)) + (self._growth * rise)[:, None] * self.direction
         y[tangents.rows] += tangents.flat(extra)
 
     def residual(self, r_n: Array, r_t: Array, slip: Array) -> Array:
-        """Return the residual (m, d - 1) of the linear problem, of all points as if they did not
-        stick."""
+        """Return the residual (m, d - 1) of the linear problem.
+
+        It is that of all points as if they did not stick.
+        """
         limit = self._cohesion + self._growth * r_n - self._rise * self._base
         return np.asarray(r_t - limit[:, None] * self.direction - self.turned(slip))
 
 
 class LawOfStep:
-    """Evaluate the friction law of a step: limits that are affine in r_n, with coefficients that
-    may depend on the slip rate. ``settled``: its coefficients are constant, or follow the slip by
-    now.
+    """Evaluate the friction law of a step.
+
+    Its limits are affine in r_n, with coefficients that may depend on the slip rate. ``settled``:
+    the coefficients are constant, or follow the slip by now.
 
     A law with rates may have several solutions where it weakens. As in ``friction.slip_rate`` the
     step begins with the coefficients of rest and takes those of the slip found in a few rounds;
@@ -165,7 +181,8 @@ class LawOfStep:
     Where Newton's steps go in circles, which large coefficients may bring about, limits are given
     for some rounds, those of the r_n found last: Tresca problems, which are convex (Nečas, Jarušek
     and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980). A law that weakens steeply goes back to the
-    coefficients of rest, and climbs for more rounds than before."""
+    coefficients of rest, and climbs for more rounds than before.
+    """
 
     def __init__(self, step: StepProblem) -> None:
         self._step = step
@@ -180,8 +197,10 @@ class LawOfStep:
         return self._left == 0 and self._tresca == 0
 
     def advance(self, slip: Array, r_n: Array) -> None:
-        """Take the coefficients of this slip (m, d - 1), or the limits of r_n; after some rounds
-        they follow."""
+        """Take the coefficients of this slip (m, d - 1), or the limits of r_n.
+
+        After some rounds they follow.
+        """
         if self._tresca:
             self._tresca -= 1
             self._limit = self._at(slip)(r_n)
@@ -190,16 +209,21 @@ class LawOfStep:
             self._left -= 1
 
     def give(self, rounds: int, slip: Array, r_n: Array) -> None:
-        """Begin rounds of given coefficients, those of rest, or of given limits where coefficients
-        are constant."""
+        """Begin rounds of given coefficients, those of rest.
+
+        Where coefficients are constant, the rounds are of given limits.
+        """
         if self._constant:
             self._limit, self._tresca = self._at(slip)(r_n), rounds
         else:
             self._given, self._left = np.zeros_like(slip), rounds
 
     def __call__(self, slip: Array, r_n: Array, reach: Array) -> Limits:
-        """Return the limits at this slip, or at the one that is given. ``reach`` (m,): slips that
-        points at rest may come to; they rise with the law where it grows."""
+        """Return the limits at this slip, or at the one that is given.
+
+        ``reach`` (m,): slips that points at rest may come to; they rise with the law where it
+        grows.
+        """
         if self._tresca:
             none = np.zeros_like(self._limit)
             return Limits(self._limit, none, none)

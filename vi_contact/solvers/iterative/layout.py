@@ -1,10 +1,12 @@
-"""Number the unknowns in whole nodes, so that matrices can be stored in blocks of the components of
-two nodes.
+"""Number the unknowns in whole nodes.
+
+Matrices can then be stored in blocks of the components of two nodes.
 
 A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric
 matrix serves for all of it (SBAIJ): it takes a third of the time. Prescribed components are no
 unknowns, and a node that keeps others would break the blocks: it gets them back here as unknowns
-that are always held at zero."""
+that are always held at zero.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,10 +22,12 @@ from ..volume.bounded_system import assembled
 
 @dataclass(frozen=True)
 class Layout:
-    """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``,
-    ``width`` a node.
+    """Say where this rank's unknowns stand among those of whole nodes.
 
-    ``complete``: on no rank is there a component of a node that is no unknown."""
+    They stand in ``places`` (n,) of ``size``, ``width`` a node.
+
+    ``complete``: on no rank is there a component of a node that is no unknown.
+    """
 
     width: int
     places: Indices
@@ -31,8 +35,10 @@ class Layout:
     complete: bool
 
     def padded(self, x: Array) -> Array:
-        """Return the values of all components of the nodes, zero where there is no unknown; a
-        copy."""
+        """Return the values of all components of the nodes, a copy.
+
+        They are zero where there is no unknown.
+        """
         if self.complete:
             return np.array(x)
         values = np.zeros(self.size)
@@ -51,7 +57,9 @@ class Layout:
 
 def layout_of(A: EffectiveMatrix) -> Layout:
     """Return the layout of the unknowns of A; one unknown a block where nothing is known of nodes.
-    Collective."""
+
+    Collective.
+    """
     n = A.matrix.rows
     if A.space is None or A.space.dimension == 1:
         return Layout(1, np.arange(n), n, complete=True)
@@ -77,7 +85,9 @@ class Nodewise:
 
     def blocks(self) -> Any:
         """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry.
-        Collective."""
+
+        Collective.
+        """
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         stored = getattr(self.A.matrix, "stored", None)
         if d == 1:
@@ -101,10 +111,12 @@ class Nodewise:
         return made
 
     def entries(self, result: Any = None) -> Any:
-        """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an
-        earlier one to refill.
+        """Return A as an AIJ matrix of whole nodes, each block stored in full.
 
-        Rows of missing components hold the largest diagonal entry of A."""
+        ``result`` is an earlier one to refill.
+
+        Rows of missing components hold the largest diagonal entry of A.
+        """
         mat = self.source.PtAP(self._selected, result=result)
         mat.setBlockSize(self.layout.width)
         mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
@@ -116,8 +128,10 @@ class Nodewise:
 
     @cached_property
     def _selected(self) -> Any:
-        """P of A -> PᵀAP, with zeros stored for the other components of a node: that fills the
-        blocks."""
+        """Return P of A -> PᵀAP, with zeros stored for the other components of a node.
+
+        They fill the blocks.
+        """
         layout, kind, d = self.layout, PETSc.IntType, self.layout.width
         n = len(layout.places)
         first = self.source.comm.tompi4py().scan(layout.size) - layout.size

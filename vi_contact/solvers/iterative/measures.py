@@ -1,5 +1,7 @@
-"""Measure an iterate as the certificate of the step will (``core.verify``), with reductions of a
-few numbers."""
+"""Measure an iterate as the certificate of the step will (``core.verify``).
+
+It takes reductions of a few numbers.
+"""
 
 from dataclasses import dataclass
 
@@ -20,7 +22,9 @@ ROUND_OFF = 1e-15  # of |A||x| and of the forces: what a residual cannot fall be
 @dataclass(frozen=True)
 class Measures:
     """Hold what residuals are relative to: forces, reactions, displacements; and their round-off.
-    Maxima over ranks."""
+
+    Maxima over ranks.
+    """
 
     force: float
     reaction: float
@@ -54,9 +58,11 @@ class Measured:
 
 
 class Worth:
-    """Estimate how small a residual has to be for x and reactions that are known to ``tolerance``
-    of the largest so far: from what they changed by since it was larger. What the last step showed
-    of the conditioning is kept."""
+    """Estimate how small a residual has to be for the accuracy that is asked for.
+
+    x and reactions are to be known to ``tolerance`` of the largest so far. It is estimated from
+    what they changed by since it was larger. What the last step showed of the conditioning is kept.
+    """
 
     def __init__(self, comm: Comm, parts: int, tolerance: float) -> None:
         self._comm, self._goal = comm, GOAL * tolerance
@@ -68,9 +74,11 @@ class Worth:
         self._largest = np.maximum(self._largest, self._sizes)
 
     def goal(self, norm: float, of: Measures, *answer: Array, begin: bool) -> float:
-        """Return the residual to stop at: what x and reactions need, but for round-off, or a share
-        of the tolerance. ``norm``: the present one; ``begin``: there is no larger one to compare
-        with. Collective."""
+        """Return the residual to stop at.
+
+        It is what x and reactions need, but for round-off, or a share of the tolerance. ``norm``:
+        the present one; ``begin``: there is no larger one to compare with. Collective.
+        """
         last, seen = self._seen
         if begin or norm <= HALVED * last:
             changes = [] if begin else [one - old for one, old in zip(answer, seen, strict=True)]
@@ -87,7 +95,9 @@ class Worth:
 
 
 def largest_free(comm: Comm, residual: Array, weights: Array) -> float:
-    """Return the largest residual of the unknowns that are not held, infinite where it is not a
-    number. Collective."""
+    """Return the largest residual of the unknowns that are not held. Collective.
+
+    It is infinite where it is not a number.
+    """
     value = max_abs(np.where(weights > 0.0, residual, 0.0))
     return float(comm.max(np.array([np.inf if np.isnan(value) else value]))[0])

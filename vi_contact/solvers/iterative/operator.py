@@ -1,5 +1,7 @@
-"""Apply A, and the springs of closed points, to what PETSc hands over, and count what the solver
-has done."""
+"""Apply A, and the springs of closed points, to what PETSc hands over.
+
+What the solver has done is counted.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +20,8 @@ class Work:
     ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES;
     ``newton_steps`` with friction; ``products`` with A; ``renewals`` of the preconditioner after
     the first; ``fallbacks``: steps that ended by projected gradients, or with limits of friction
-    given for some rounds."""
+    given for some rounds.
+    """
 
     linear_iterations: int = 0
     newton_steps: int = 0
@@ -31,7 +34,8 @@ class Operator:
     """Multiply by A + the stiffness of closed springs: the context of a PETSc shell matrix.
 
     Held rows are multiplied too. Conjugate gradients whose preconditioner leaves these rows alone
-    never move them, and the residual that they carry along is the reaction there."""
+    never move them, and the residual that they carry along is the reaction there.
+    """
 
     def __init__(self, blocks: Any, work: Work) -> None:
         self.blocks, self.work = blocks, work
@@ -55,8 +59,10 @@ class Operator:
         return np.array(self._y.array_r)
 
     def shell(self) -> Any:
-        """Return a PETSc matrix that applies this operator, which must outlive it: to hold it is
-        not PETSc's, whose clean-up loses whatever only its contexts kept alive."""
+        """Return a PETSc matrix that applies this operator, which must outlive it.
+
+        To hold it is not PETSc's, whose clean-up loses whatever only its contexts kept alive.
+        """
         mat = PETSc.Mat().createPython(self.blocks.getSizes(), Lent(self), comm=self.blocks.comm)
         mat.setUp()
         return mat

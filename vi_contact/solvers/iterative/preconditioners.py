@@ -11,7 +11,8 @@ or a stiff body on a soft one, are enough. Factors are then made of A with a lar
 
 GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids
 would believe the contact open; the interpolation is kept, Galerkin products are renewed when over a
-tenth of the set has moved since."""
+tenth of the set has moved since.
+"""
 
 from typing import Any
 
@@ -64,9 +65,11 @@ def courant(A: EffectiveMatrix) -> float:
 
 
 def chosen(number: float, modes: bool) -> str:
-    """Return the preconditioner for a Courant number: Jacobi up to 0.5, ICC up to 30 or where it is
-    not known, GAMG beyond. ``modes``: whether rigid motions are known, without which GAMG is no
-    use."""
+    """Return the preconditioner for a Courant number.
+
+    It is Jacobi up to 0.5, ICC up to 30 or where it is not known, GAMG beyond. ``modes``: whether
+    rigid motions are known, without which GAMG is no use.
+    """
     if number <= SMALL:
         return JACOBI
     return GAMG if number > LARGE and modes else ICC
@@ -78,8 +81,10 @@ def defaults(kind: str, ranks: int) -> Options:
 
 
 def shares(inverse: Any, template: Any) -> Array:
-    """Return 1/sqrt(k) of every row, k the number of a PETSc preconditioner's subdomains that hold
-    it. Collective."""
+    """Return 1/sqrt(k) of every row.
+
+    Here k is the number of a PETSc preconditioner's subdomains that hold it. Collective.
+    """
     ones, count = template.duplicate(), template.duplicate()
     ones.set(1.0)
     count.set(1.0)
@@ -97,8 +102,11 @@ def shares(inverse: Any, template: Any) -> Array:
 
 
 class Masked:
-    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner. ``inverse``: M⁻¹ as a PETSc
-    preconditioner, without the shares of its subdomains, which are in w."""
+    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner.
+
+    ``inverse``: M⁻¹ as a PETSc preconditioner, without the shares of its subdomains, which are in
+    w.
+    """
 
     def __init__(self, inverse: Any, template: Any) -> None:
         self._inverse, self._r, self._z = inverse, template.duplicate(), template.duplicate()
@@ -127,8 +135,11 @@ class Masked:
 
 
 class Inverse:
-    """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the
-    contact set; made of the matrix with a diagonal larger by the factor 1 + ``raised``."""
+    """Hold M⁻¹ as the PETSc preconditioner ``pc``.
+
+    It is Jacobi or ICC, which do not depend on the contact set, made of the matrix with a diagonal
+    larger by the factor 1 + ``raised``.
+    """
 
     def __init__(self, matrix: Any, layers: OptionLayers, raised: float = 0.0) -> None:
         made_of = matrix
@@ -141,16 +152,20 @@ class Inverse:
         """Begin a step."""
 
     def follow(self, held: Indices) -> None:
-        """Make M anew for the rows that closed conditions and sticking points hold, if it is time
-        to. Collective."""
+        """Make M anew for the rows that are held, if it is time to. Collective.
+
+        Closed conditions and sticking points hold them.
+        """
 
 
 class Multigrid(Inverse):
-    """Hold GAMG, or what else the options say, of an AIJ matrix that is renewed for the contact
-    set.
+    """Hold GAMG, or what else the options say, of an AIJ matrix.
+
+    It is renewed for the contact set.
 
     The interpolation is that of the whole A with its rigid modes, in which no set has left a
-    trace."""
+    trace.
+    """
 
     def __init__(
         self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work
@@ -171,8 +186,10 @@ class Multigrid(Inverse):
         self._left = RENEWALS
 
     def follow(self, held: Indices) -> None:
-        """Make the Galerkin products anew when more than a tenth of the held rows have changed
-        since."""
+        """Make the Galerkin products anew when they are out of date.
+
+        They are when more than a tenth of the held rows have changed since.
+        """
         mask = np.zeros_like(self._built)
         mask[held] = True
         moved, size = self._comm.sum(
@@ -196,8 +213,10 @@ class Multigrid(Inverse):
 
 
 def made(matrix: Any, layers: OptionLayers) -> Any:
-    """Return a PETSc preconditioner of a matrix, from the options. InputError when PETSc does not
-    take them."""
+    """Return a PETSc preconditioner of a matrix, from the options.
+
+    InputError when PETSc does not take them.
+    """
     pc = PETSc.PC().create(matrix.comm)
     pc.setOptionsPrefix(layers.prefix)
     pc.setOperators(matrix)
@@ -225,8 +244,10 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
 def rigid_modes(
     A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any
 ) -> list[Any]:
-    """Return orthonormal PETSc vectors of the rigid motions, in nodal frames and relative at two
-    bodies."""
+    """Return orthonormal PETSc vectors of the rigid motions.
+
+    They are in nodal frames, and relative at two bodies.
+    """
     space, comm = A.space, A.algebra.comm
     d, points = int(space.dimension), np.asarray(space.coordinates)
     component = np.asarray(space.ids) % d
@@ -244,8 +265,10 @@ def rigid_modes(
 
 
 def orthonormal(vectors: list[Any]) -> list[Any]:
-    """Return the vectors made orthonormal in place (Gram and Schmidt, twice); those that vanish are
-    left out."""
+    """Return the vectors made orthonormal in place (Gram and Schmidt, twice).
+
+    Those that vanish are left out.
+    """
     kept: list[Any] = []
     for vector in vectors:
         before = vector.norm()

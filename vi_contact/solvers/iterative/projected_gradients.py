@@ -1,5 +1,6 @@
-"""Solve a step by projected conjugate gradients on all unknowns (MPRGP), after a search that went
-in circles.
+"""Solve a step by projected conjugate gradients on all unknowns (MPRGP).
+
+It serves after a search that went in circles.
 
 min ½ rᵀG r + qᵀr over r >= lower (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer
 2009, algorithm 5.8). With g = q + G r, the free gradient is phi = g where r is off its bound, and
@@ -12,7 +13,8 @@ Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <
 bound and lengths and forces compare; on a face the preconditioner of the route is used. The springs
 that are closed are given while the bounds are searched; then they are taken from the answer, and a
 search along the line to it, which makes the energy as small as can be, keeps this Newton iteration
-from cycling."""
+from cycling.
+"""
 
 import numpy as np
 
@@ -63,8 +65,10 @@ class Projected:
         return self._root * masked(self._root * phi)
 
     def solve(self, x: Array) -> tuple[Array, int]:
-        """Return (x, reason) of the search from x; the closed set of ``contact`` is then that of
-        x."""
+        """Return (x, reason) of the search from x.
+
+        The closed set of ``contact`` is then that of x.
+        """
         of = self.of
         x = of.contact.feasible(x)
         start = np.maximum(-self._root * x, self.lower)
@@ -99,8 +103,11 @@ class Projected:
 
 
 class Face:
-    """Hold the iterate: r, its gradient split into phi and beta, and the conjugate direction on the
-    present face."""
+    """Hold the iterate.
+
+    This is r, its gradient split into phi and beta, and the conjugate direction on the present
+    face.
+    """
 
     def __init__(self, problem: Projected, start: Array, gradient: Array, step: float) -> None:
         self._problem, self._step = problem, step
@@ -178,8 +185,10 @@ def largest_eigenvalue(of: Search, diagonal: Array, rounds: int = 15) -> float:
 def projected_gradients(
     of: Search, diagonal: Array, norm: float, x: Array
 ) -> tuple[Array, Array, int]:
-    """Return (x, residual formed afresh, reason) of the step from x: SOLVED, or why there is no
-    answer. Collective."""
+    """Return (x, residual formed afresh, reason) of the step from x.
+
+    The reason is SOLVED, or why there is no answer. Collective.
+    """
     contact, residual = of.contact, of.load
     for _ in range(ROUNDS):
         try:
@@ -200,8 +209,10 @@ def projected_gradients(
 
 
 def _length(of: Search, x: Array, d: Array) -> float:
-    """The t in (0, 1] at which ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)² is smallest along d: a
-    zero of its slope."""
+    """Return the t in (0, 1] at which the energy is smallest along d.
+
+    The energy is ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)², and t a zero of its slope.
+    """
     contact = of.contact
     contact.close_springs(None)
     of.take_set()

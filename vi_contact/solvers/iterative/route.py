@@ -1,12 +1,14 @@
-"""Solve the step on all unknowns by conjugate gradients: nothing is factorised, condensed or
-gathered.
+"""Solve the step on all unknowns by conjugate gradients.
+
+Nothing is factorised, condensed or gathered.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
 The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not
 end, goes to projected gradients, which decrease the energy in every step and so cannot cycle
 (``projected_gradients``). Steps with friction take semismooth Newton and GMRES instead
-(``friction``)."""
+(``friction``).
+"""
 
 import logging
 from collections.abc import Mapping
@@ -53,8 +55,9 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Iterative:
-    """Solve each step on all unknowns by conjugate gradients, on any number of ranks, and hold the
-    settings for it.
+    """Solve each step on all unknowns by conjugate gradients, and hold the settings for it.
+
+    It does so on any number of ranks.
 
     Attributes:
         preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg"
@@ -96,21 +99,28 @@ class Iterative:
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of
-        values."""
+        """Raise InputError for friction that does not fit.
+
+        It has no tangential direction, or a wrong number of values.
+        """
         check_laws("Iterative()", problem)
 
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedIterative":
-        """Choose and make the preconditioner; collective. InputError for options that cannot
-        work."""
+        """Choose and make the preconditioner; collective.
+
+        InputError for options that cannot
+        work.
+        """
         return PreparedIterative(self, A, surface, scale)
 
 
 class PreparedIterative:
-    """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``:
-    PETSc's object."""
+    """Solve steps of one A.
+
+    ``work``: what it has done; ``kind``: its preconditioner; ``ksp``: PETSc's object.
+    """
 
     def __init__(
         self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float
@@ -142,7 +152,7 @@ class PreparedIterative:
         self._surface, self._worth = surface, Worth(surface.comm, 2, settings.tolerance)
 
     def _chosen(self, A: EffectiveMatrix) -> str:
-        """The preconditioner, said in the log."""
+        """Return the preconditioner, said in the log."""
         number, asked = courant(A), self._settings.preconditioner
         kind = chosen(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
@@ -168,8 +178,11 @@ class PreparedIterative:
         return self._cg.ksp
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure, on all ranks, with the history of residuals when there is
-        no answer."""
+        """Return the step.
+
+        Raises:
+            StepFailure: on all ranks, with the history of residuals, when there is no answer.
+        """
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:
@@ -188,7 +201,7 @@ class PreparedIterative:
         return self._attempt(step)
 
     def _attempt(self, step: StepProblem) -> StepResult:
-        """The step with the preconditioner that there is."""
+        """Return the step with the preconditioner that there is."""
         try:
             return self._solve(step) if step.slip0 is None else self._friction.solve(step)
         except PETSc.Error as error:

@@ -8,7 +8,8 @@ S the closed set and F = A x - b,
 
 Whenever the residual off S has fallen tenfold the signs are looked at; one that is wrong by more
 than the residual will not come right, and the set changes there and then. In the end F is formed
-afresh, and the signs have to hold to the last digit that the certificate sees."""
+afresh, and the signs have to hold to the last digit that the certificate sees.
+"""
 
 from collections.abc import Callable
 
@@ -52,8 +53,10 @@ class Search:
         self.take_set()
 
     def take_set(self) -> bool:
-        """Take the closed set of ``contact``: mask, springs, load, preconditioner. False for one
-        met before."""
+        """Take the closed set of ``contact``: mask, springs, load, preconditioner.
+
+        False for one met before.
+        """
         contact = self.contact
         self.masked.weights = contact.weights()
         self.operator.set_springs(*contact.sprung)
@@ -65,8 +68,11 @@ class Search:
         return not known
 
     def watch(self, iteration: int, residual: Array, at: Callable[[], Array]) -> int:
-        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on. ``at()``:
-        x."""
+        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on.
+
+        ``at()``:
+        x.
+        """
         norm = largest_free(self.comm, residual, self.masked.weights)
         if not np.isfinite(norm):
             return NOT_A_NUMBER
@@ -92,8 +98,10 @@ class Search:
         self.history.append(norm / self.scales.force if self.scales.force > 0.0 else norm)
 
     def wrong(self, x: Array, residual: Array, error: float) -> Mask:
-        """Return the conditions of this rank whose signs are wrong by more than the error, the
-        largest residual."""
+        """Return the conditions of this rank whose signs are wrong by more than the error.
+
+        The error is the largest residual.
+        """
         r = self.contact.reactions(x, residual)
         least = 0.5 * self.tolerance * self.scales.reaction
         return self.contact.wrong(
@@ -111,9 +119,11 @@ class Search:
         return norm <= self.tolerance * self.scales.force
 
     def change(self, wrong: Mask, x: Array, residual: Array) -> tuple[Array, Array, bool]:
-        """Change the set, and return (x, residual, whether the set is a new one): a product where a
-        rigid support closes. One that opens leaves the residual as it is, and springs change it in
-        their rows alone."""
+        """Change the set, and return (x, residual, whether the set is a new one).
+
+        It takes a product where a rigid support closes. One that opens leaves the residual as it
+        is, and springs change it in their rows alone.
+        """
         contact = self.contact
         moves = largest(self.comm, np.any(wrong & ~contact.closed & ~contact.soft))
         before = contact.spring_forces(x)
@@ -129,9 +139,11 @@ class Search:
 def search(
     of: Search, cg: ConjugateGradients, x: Array, changes: int
 ) -> tuple[Array, Array, int, int]:
-    """Return (x, residual, changes of the set, reason) of the search from x. The reason is SOLVED,
-    or PETSc's for stopping, or WRONG_SIGNS when a set came twice or the set changed more often than
-    ``changes``. Collective."""
+    """Return (x, residual, changes of the set, reason) of the search from x.
+
+    The reason is SOLVED, or PETSc's for stopping, or WRONG_SIGNS when a set came twice or the set
+    changed more often than ``changes``. Collective.
+    """
     contact, count, refinements = of.contact, 0, 0
     contact.place(x)
     residual = of.load - (of.operator @ x)

@@ -1,10 +1,12 @@
-"""Solve dense contact problems by the primal-dual active-set method with a finite fallback: the
-default.
+"""Solve dense contact problems by the primal-dual active-set method.
 
-Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the wrong sign (r < 0 in
-the set, w < 0 out of it) to the other side, repeat until no sign is wrong: then r solves the problem exactly. This is
-the semismooth Newton method for  r = max(0, r - c w)  of Hintermüller, Ito and Kunisch (SIAM J. Optim. 13, 2002); after
-the first guess r or w is zero in every row, so that c drops out. The same iteration is Newton-min and full exchange.
+It has a finite fallback, and is the default.
+
+Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the
+wrong sign (r < 0 in the set, w < 0 out of it) to the other side, repeat until no sign is wrong:
+then r solves the problem exactly. This is the semismooth Newton method for  r = max(0, r - c w)  of
+Hintermüller, Ito and Kunisch (SIAM J. Optim. 13, 2002); after the first guess r or w is zero in
+every row, so that c drops out. The same iteration is Newton-min and full exchange.
 
 It ends in at most m changes for M-matrices but may cycle for others from m = 3 on (Ben Gharbia and
 Gilbert, Math. Program. 134, 2012), or wander when G is ill-conditioned. When a set comes back, or
@@ -12,7 +14,8 @@ the count of wrong signs has not fallen below its minimum for PATIENCE changes, 
 and Hanson (Solving Least Squares Problems, 1974, ch. 23, there for least squares) takes over: it
 admits one row at a time and keeps r >= 0, so that ½ rᵀG r + qᵀr falls at every set it completes. No
 such set can return: it ends, in practice after about as many changes as there are rows. (Murty's
-single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)"""
+single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
+"""
 
 from ctypes import c_double
 from dataclasses import dataclass
@@ -36,8 +39,9 @@ PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Hold the settings. ``max_iterations``: set changes allowed; ``tolerance``: residual above
-    which it refuses.
+    """Hold the settings.
+
+    ``max_iterations``: set changes allowed; ``tolerance``: residual above which it refuses.
 
     In the result ``iterations`` counts changes of the set (0: the guess was right), ``history`` the
     rows moved in each.
@@ -53,15 +57,18 @@ class ActiveSet:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.
 
         The factors of the last sets are remembered: a step on the same set costs triangular solves
-        only."""
+        only.
+        """
         scaled = scaled_dense(G, bilateral)
         cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
         return PreparedSets(self, scaled, _Sets(self, scaled).search)
 
 
 class PreparedSets(PreparedLCP):
-    """Solve problem (1) of one G, or several at once, by compiled exchanges first where rows are
-    few."""
+    """Solve problem (1) of one G, or several at once.
+
+    Compiled exchanges come first where rows are few.
+    """
 
     @cached_property
     def _compiled(self) -> "Exchanges | None":
@@ -82,8 +89,10 @@ class PreparedSets(PreparedLCP):
     def solve_many(
         self, q: Array, guess: Mask
     ) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
-        """Return r and active of several q, all (k, m), the iterations, and what those raise that
-        have no answer."""
+        """Return r and active of several q, all (k, m), the iterations, and the errors.
+
+        The errors are what those raise that have no answer.
+        """
         none = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), None, np.full(len(q), -1), None
         r, active, _, changes, _ = none if self._compiled is None else self._compiled(q, guess)
         counts, failed = changes.tolist(), dict[int, ViContactError]()
@@ -97,8 +106,10 @@ class PreparedSets(PreparedLCP):
 
 
 class Exchanges:
-    """Make the first exchanges of several problems of one G, compiled: those of ``_Sets``, which
-    has the others."""
+    """Make the first exchanges of several problems of one G, compiled.
+
+    They are those of ``_Sets``, which has the others.
+    """
 
     def __init__(self, library: Any, prepared: PreparedLCP) -> None:
         self._library, self._prepared, self._rows = library, prepared, 0
@@ -139,8 +150,10 @@ class Exchanges:
         )
 
     def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
-        """Return r, active, residual, iterations (-1: not solved) and rows that each moved; q,
-        guess (k, m) or (m,)."""
+        """Return r, active, residual, iterations (-1: not solved) and rows that each moved.
+
+        q and guess are (k, m) or (m,).
+        """
         k = len(q) if q.ndim == 2 else 1
         if k > self._rows:
             self._made(k)
@@ -173,8 +186,10 @@ class _Sets:
         raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
-        """The r and w of the first set without wrong signs; adds to ``history`` how many rows each
-        change moved."""
+        """Return the r and w of the first set without wrong signs.
+
+        How many rows each change moved is added to ``history``.
+        """
         seen: set[bytes] = set()
         fewest, patience = gap.size + 1, PATIENCE
         while True:
@@ -222,8 +237,10 @@ class _Sets:
         return factor.solve(gap)
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
-        """Rows whose sign is wrong by more than rounding: grazing rows (r = w = 0) fit either
-        side."""
+        """Return the rows whose sign is wrong by more than rounding.
+
+        Grazing rows (r = w = 0) fit either side.
+        """
         wrong = np.where(active, r, w) < -self._scaled.rounding(r)
         return wrong if self._scaled.unilateral else wrong & ~self._bilateral
 
@@ -239,8 +256,10 @@ class _Sets:
 
 
 class _Factor:
-    """Cholesky factor of G_aa of one set, and the rows of G that carry its reactions to all
-    gaps."""
+    """Hold the Cholesky factor of G_aa of one set.
+
+    The rows of G that carry its reactions to all gaps are held too.
+    """
 
     def __init__(self, active: Mask, matrix: Array) -> None:
         self._index = active.nonzero()[0]
@@ -248,10 +267,11 @@ class _Factor:
         self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
 
     def solve(self, gap: Array) -> tuple[Array, Array]:
-        """r (m,) with r = 0 off the set, and w = gap + G r.
+        """Return r (m,) with r = 0 off the set, and w = gap + G r.
 
         No iterative refinement: the residual of Cholesky is at rounding level already (measured
-        gain below a factor 2 for conditions up to 1e10)."""
+        gain below a factor 2 for conditions up to 1e10).
+        """
         r = np.zeros(gap.size)
         if self._lower is None:
             return r, gap.copy()

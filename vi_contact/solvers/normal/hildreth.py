@@ -1,5 +1,6 @@
-"""Solve the quadratic program of eq. 49 of the boundary method row after row, to convergence:
-Hildreth and d'Esopo.
+"""Solve the quadratic program of eq.
+
+49 of the boundary method row after row, to convergence: Hildreth and d'Esopo.
 
 Primal (eqs. 46, 49 there; D = G⁻¹):   v_i <- min(bound_i, v_i + (z - D v)_i / D_ii)
 Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
@@ -7,7 +8,8 @@ Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
 Both are projected Gauss–Seidel: every sweep lowers the objective. They converge for every SPD
 matrix, linearly, and slowly when contacts are strongly coupled. The primal is written in s = x_free
 - v = G r, the displacement that the reactions take back, because s carries no digits of the gap:
-min ½ sᵀD s over s >= -q, which is (49) up to the constant ½ x_freeᵀ D x_free."""
+min ½ sᵀD s over s >= -q, which is (49) up to the constant ½ x_freeᵀ D x_free.
+"""
 
 from dataclasses import dataclass
 
@@ -26,7 +28,8 @@ class Hildreth:
     Ends when the largest change of a sweep, relative to the largest unknown, and the residual are
     below ``tolerance`` (or at rounding level). In the result ``iterations`` counts sweeps; with
     ``record``, ``history`` holds the objective [J] after each: ½ sᵀD s or ½ rᵀG r + qᵀr, whose
-    minima differ in sign only."""
+    minima differ in sign only.
+    """
 
     primal: bool = True
     tolerance: float = 1e-13
@@ -45,8 +48,10 @@ class Hildreth:
 
 
 class _Sweeps:
-    """Sweeps for one G: min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s
-    or x = r."""
+    """Hold the sweeps for one G.
+
+    They solve min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r.
+    """
 
     def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
         self.method, self._scaled, bilateral = method, scaled, scaled.bilateral
@@ -103,8 +108,10 @@ class _Sweeps:
         return image if self.method.primal else gap + image
 
     def _reaction(self, x: Array, lower: Array, gradient: Array) -> Array:
-        """Scaled r: x itself, or r = D s where s is at its bound (elsewhere r = 0 by
-        complementarity)."""
+        """Return the scaled r.
+
+        It is x itself, or r = D s where s is at its bound (elsewhere r = 0 by complementarity).
+        """
         if not self.method.primal:
             return x
         r = gradient / self._unit
@@ -118,8 +125,10 @@ class _Sweeps:
         return 0.5 * float(at @ (self._H @ at)) + linear
 
     def _rounding(self, x: list[float], r: Array) -> float:
-        """Gaps that the form in use cannot tell from zero: w = q + G D s has passed through both G
-        and D."""
+        """Return the gaps that the form in use cannot tell from zero.
+
+        w = q + G D s has passed through both G and D.
+        """
         if not self.method.primal:
             return self._scaled.rounding(r)
         product = np.abs(self._H).sum(axis=1) * max_abs(np.array(x)) / self._unit
@@ -129,10 +138,12 @@ class _Sweeps:
 def sweep(
     rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array
 ) -> float:
-    """Sweep once over ``rows`` (index, row of H with unit diagonal), in place; return the largest
-    |change|.
+    """Sweep once over ``rows`` (index, row of H with unit diagonal), in place.
 
-    Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison."""
+    Returned is the largest |change|.
+
+    Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison.
+    """
     largest_change = 0.0
     for i, row in rows:
         old = x[i]

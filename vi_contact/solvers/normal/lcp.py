@@ -1,7 +1,9 @@
-"""Pose the linear complementarity problem of one contact step: its residual, and the scaling all
-its methods share.
+"""Pose the linear complementarity problem of one contact step.
 
-    w = q + G r;    unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free        (1)
+Its residual, and the scaling all its methods share, are here.
+
+    w = q + G r
+    unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free         (1)
 
 G (m, m) [m/N] symmetric positive definite: the Delassus operator; q = bound - x_free [m]: the gap
 that the step without reactions would leave, +inf where no obstacle is in reach; r [N] reaction, >=
@@ -13,7 +15,8 @@ Scaling. With d_i = G_ii^(-1/2) the numbers r_i/d_i and w_i d_i are both in sqrt
 its form with d G d in the place of G. There forces and gaps, translations and rotations compare, so
 that every tolerance is a pure number. The unit is the violation of r = 0: the largest -q_i d_i
 (|q_i| d_i in bilateral rows), the contact there is to resolve. Gaps that are far from closing do
-not enter it: a wide gap does not blunt the certificate of a narrow one."""
+not enter it: a wide gap does not blunt the certificate of a narrow one.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -35,14 +38,16 @@ Found = tuple[
 
 @dataclass(frozen=True)
 class LCPResult:
-    """Answer problem (1), within the tolerance of the method or the limit that rounding sets (else
-    StepFailure).
+    """Answer problem (1), within the tolerance of the method.
+
+    The limit that rounding sets serves too; else there is a StepFailure.
 
     ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral,
     where a grazing row (r = w = 0 but for rounding) may be either; ``residual``: max |min(r_i/d_i,
     w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, over the unit: 1 is what r = 0
     scores, 0 is exact, in all units of G and q; ``method`` the settings that made it. Each method
-    tells what ``iterations`` and ``history`` count."""
+    tells what ``iterations`` and ``history`` count.
+    """
 
     r: Array
     active: Mask
@@ -54,8 +59,10 @@ class LCPResult:
 
 @dataclass(frozen=True)
 class ScaledLCP:
-    """Hold d G d with its scale d: what the methods work on. Everything here is in sqrt(J) or
-    dimensionless."""
+    """Hold d G d with its scale d: what the methods work on.
+
+    Everything here is in sqrt(J) or dimensionless.
+    """
 
     scale: Array
     matrix: Array
@@ -63,8 +70,10 @@ class ScaledLCP:
     bilateral: Mask
 
     def reaction(self, guess: Array | Mask | None, q: Array) -> Array:
-        """Return a start for iterative methods: the guess itself, one Jacobi step on a guessed set,
-        or zero."""
+        """Return a start for iterative methods.
+
+        It is the guess itself, one Jacobi step on a guessed set, or zero.
+        """
         if guess is None:
             return np.zeros(q.size)
         start = (
@@ -101,19 +110,23 @@ class ScaledLCP:
 
 @dataclass(frozen=True)
 class PreparedLCP:
-    """Solve problem (1) for one G and many q. ``search``: (scaled gap, guess, unit of the residual)
-    -> Found."""
+    """Solve problem (1) for one G and many q.
+
+    ``search``: (scaled gap, guess, unit of the residual) -> Found.
+    """
 
     method: object
     scaled: ScaledLCP
     search: Callable[[Array, Array | Mask | None, float], Found]
 
     def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
-        """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their
-        active set.
+        """Solve the problem of q (m,) [m].
+
+        ``guess``: reactions of a similar problem, or their active set.
 
         Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf,
-        or +inf in a bilateral row, and for a guess that has not one entry a row."""
+        or +inf in a bilateral row, and for a guess that has not one entry a row.
+        """
         return self._solved(np.asarray(q, float), guess if guess is None else np.asarray(guess))
 
     def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
@@ -135,8 +148,12 @@ class PreparedLCP:
 
 
 def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
-    """Check and scale a dense G. InputError when it is not finite or, unless ``unsymmetric`` allows
-    it, not symmetric (to 1e-8) of positive diagonal."""
+    """Check and scale a dense G.
+
+    Raises:
+        InputError: G is not finite or, unless ``unsymmetric`` allows it, not symmetric (to 1e-8) of
+            positive diagonal.
+    """
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
     check_operator(G, bilateral)
@@ -145,8 +162,11 @@ def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> Sca
 
 
 def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
-    """Return d G d, exactly symmetric where it is so to 1e-8, and its norm; InputError when it
-    should be and is not."""
+    """Return d G d, exactly symmetric where it is so to 1e-8, and its norm.
+
+    Raises:
+        InputError: G should be symmetric and is not.
+    """
     matrix = np.ascontiguousarray(d[:, None] * G * d)
     if max_abs(matrix - matrix.T) <= 1e-8:
         matrix = 0.5 * (matrix + matrix.T)
@@ -160,8 +180,10 @@ def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arr
 
 
 def energy_scale(G: Array, *, signed: bool = False) -> Array:
-    """Return d = |G_ii|^(-1/2) (m,). InputError where G_ii is not positive, unless it may be: 0 is
-    then as good as the largest entry."""
+    """Return d = |G_ii|^(-1/2) (m,).
+
+    InputError where G_ii is not positive, unless it may be: 0 is then as good as the largest entry.
+    """
     if not np.isfinite(G).all():
         raise InputError(
             "the Delassus operator contains NaN or infinity: check the factorisation it came from"
@@ -179,8 +201,11 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
 
 
 def cholesky(G: Array) -> Array:
-    """Return the lower Cholesky factor (LAPACK dpotrf); InputError with the row at which G is not
-    positive definite."""
+    """Return the lower Cholesky factor (LAPACK dpotrf).
+
+    Raises:
+        InputError: G is not positive definite; it tells the row.
+    """
     if not G.size:  # LAPACK takes no empty matrix
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)

@@ -1,6 +1,6 @@
 """Solve the small problem of a G that is not symmetric: Lemke's complementary pivoting.
 
-    w = q + G r + z d,    0 <= r  perpendicular to  w >= 0,    z >= 0                                               (2)
+    w = q + G r + z d,    0 <= r  perpendicular to  w >= 0,    z >= 0                           (2)
 
 With z as large as the violation of r = 0, that r solves (2). Every pivot takes the complement of
 what left the basis into it, z moves, and when z leaves the basis r solves problem (1) of ``lcp``.
@@ -13,7 +13,8 @@ It ends in the one solution of a P-matrix (``p_matrix``); of a copositive-plus G
 positive definite symmetric part is, in a solution or, where there is none, on a ray: a basis that
 nothing has to leave. For other G a ray proves nothing, and of several solutions it finds one. About
 m pivots are usual, 2^m possible (Murty, Math. Program. Study 7, 1978); each costs 4 m² products on
-m rows. Bilateral rows are eliminated before."""
+m rows. Bilateral rows are eliminated before.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -32,12 +33,14 @@ TIED = 1e-13  # ratios that rounding alone may tell apart
 
 @dataclass(frozen=True)
 class Lemke:
-    """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations``: pivots
-    allowed.
+    """Hold the settings.
+
+    ``tolerance``: residual above which it refuses; ``max_iterations``: pivots allowed.
 
     In the result ``iterations`` counts pivots (0: the guessed set was right), ``history`` is z
     after each, over the violation of r = 0. Where (1) has several solutions the guess may choose
-    among them."""
+    among them.
+    """
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
     tolerance: float = 1e-9
@@ -47,15 +50,19 @@ class Lemke:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
-        """Check any square G (m, m) and eliminate its bilateral rows. InputError when those depend
-        on each other."""
+        """Check any square G (m, m) and eliminate its bilateral rows.
+
+        InputError when those depend on each other.
+        """
         scaled = scaled_dense(G, bilateral, unsymmetric=True)
         return PreparedLCP(self, scaled, _Pivots(self, scaled).search)
 
 
 class _Pivots:
-    """The pivots of one G: its unilateral rows with bilateral ones eliminated, and what carries the
-    q of those."""
+    """Hold the pivots of one G.
+
+    These are its unilateral rows with bilateral ones eliminated, and what carries the q of those.
+    """
 
     def __init__(self, method: Lemke, scaled: ScaledLCP) -> None:
         self.method, self._scaled = method, scaled
@@ -85,8 +92,10 @@ class _Pivots:
         return r, residual / unit, len(history), history
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
-        """r >= 0 with w = 0 on the set and bilateral rows, and its residual: infinite where that
-        has no one answer."""
+        """Return r >= 0 with w = 0 on the set and bilateral rows, and its residual.
+
+        The residual is infinite where that has no one answer.
+        """
         G, bilateral, r = self._scaled.matrix, self._scaled.bilateral, np.zeros(gap.size)
         closed = np.flatnonzero((active & (gap < np.inf)) | bilateral)
         try:
@@ -97,7 +106,7 @@ class _Pivots:
         return r, self._scaled.complementarity(r, gap + G @ r)
 
     def _closed(self, gap: Array, unit: float, history: list[float]) -> Mask:
-        """The set of a solution, by pivots; adds z after each to ``history``."""
+        """Return the set of a solution, by pivots; add z after each to ``history``."""
         bilateral, closed = self._scaled.bilateral, np.zeros(gap.size, dtype=bool)
         rows = np.flatnonzero(~bilateral & (gap < np.inf))
         m, q = len(rows), (gap[rows] - self._carry[rows] @ gap[bilateral]) / unit
@@ -130,8 +139,10 @@ class _Pivots:
 
 
 def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
-    """The row that is first at zero when a variable enters: z, or of tied rows the lexicographic
-    minimum."""
+    """Return the row that is first at zero when a variable enters.
+
+    It is that of z, or of tied rows the lexicographic minimum.
+    """
     m, column = len(tableau), tableau[:, entering]
     rows = np.flatnonzero(column > TINY * max_abs(column))
     if not rows.size:

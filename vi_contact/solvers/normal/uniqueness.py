@@ -1,8 +1,10 @@
 """Say whether contact has one solution whatever the loads are: whether G is a P-matrix.
 
-All principal minors of a P-matrix are positive. Exactly then  w = q + G r, 0 <= r ⊥ w >= 0  has one solution for every
-q (Samelson, Thrall and Wesler, Proc. Amer. Math. Soc. 9, 1958), and so has the box l <= r <= u, friction of given
-limits in the plane (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, sections 3.3 and 3.4)."""
+All principal minors of a P-matrix are positive. Exactly then  w = q + G r, 0 <= r ⊥ w >= 0  has one
+solution for every q (Samelson, Thrall and Wesler, Proc. Amer. Math. Soc. 9, 1958), and so has the
+box l <= r <= u, friction of given limits in the plane (Cottle, Pang and Stone, The Linear
+Complementarity Problem, 1992, sections 3.3 and 3.4).
+"""
 
 from dataclasses import dataclass
 
@@ -18,8 +20,10 @@ NONE = "is no P-matrix, a principal minor is not positive: contact may have no s
 
 @dataclass(frozen=True)
 class PMatrix:
-    """Hold whether a matrix is a P-matrix (``holds``; None where that is not known), and the reason
-    (``sentence``)."""
+    """Hold whether a matrix is a P-matrix, and the reason (``sentence``).
+
+    ``holds`` is None where that is not known.
+    """
 
     holds: bool | None
     sentence: str
@@ -31,7 +35,8 @@ def p_matrix(G: Array) -> PMatrix:
     One with positive definite symmetric part is. Where that is not, up to 18 rows are tested by the
     recursion of Tsatsomeros and Li (BIT 40, 2000): G is one if G_11 > 0, and G without row and
     column 1 and the Schur complement of G_11 are. Bounds of the rounding errors go along: a minor
-    within them of zero decides nothing."""
+    within them of zero decides nothing.
+    """
     G = array("p_matrix", "G", G, (None, None))
     check_operator(G, np.zeros(len(G), dtype=bool))
     if not (G.diagonal() > 0.0).all():
@@ -68,8 +73,10 @@ def p_matrix(G: Array) -> PMatrix:
 
 @np.errstate(all="ignore")  # entries that overflow decide nothing
 def _complements(parts: Array, errors: Array) -> tuple[Array, Array]:
-    """Schur complements of the first entries of many matrices, and what their entries may be wrong
-    by."""
+    """Return the Schur complements of the first entries of many matrices.
+
+    What their entries may be wrong by is returned too.
+    """
     pivots, column, row = parts[:, :1, :1], parts[:, 1:, :1], parts[:, :1, 1:]
     within, below, beside = errors[:, :1, :1], errors[:, 1:, :1], errors[:, :1, 1:]
     taken, doubt = column * row / pivots, below * (np.abs(row) + beside) + np.abs(column) * beside

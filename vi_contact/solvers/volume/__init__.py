@@ -1,5 +1,7 @@
-"""Solve the step in the volume, with PETSc's variational-inequality solvers: the whole u, no
-condensation."""
+"""Solve the step in the volume, with PETSc's variational-inequality solvers.
+
+It is solved for the whole u, without condensation.
+"""
 
 from ...core.lazy import lazy
 

@@ -26,8 +26,9 @@ from ..petsc import PETSc
 
 
 class BoundedSystem:
-    """Hold A, the contact surface and its springs as one system of ``size`` unknowns here,
-    ``bounded`` of them bounded.
+    """Hold A, the contact surface and its springs as one system.
+
+    It has ``size`` unknowns here, ``bounded`` of them bounded.
 
     Attributes:
         soft: (m,) True where the support is a spring.
@@ -73,8 +74,10 @@ class BoundedSystem:
         return np.concatenate([b, np.zeros(self.size - self.rows)])
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
-        """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free,
-        bilateral or not."""
+        """Return (lower, upper) of the owned unknowns.
+
+        An infinite bound leaves its point free, bilateral or not.
+        """
         if self.surface.some(np.isnan(step.bound)):
             raise InputError(
                 "the bound of the contact conditions contains NaN: check the gap and the time "
@@ -96,8 +99,10 @@ class BoundedSystem:
         return z
 
     def reactions(self, f: Array) -> Array:
-        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w). Valid where the
-        bound is active."""
+        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w).
+
+        Valid where the bound is active.
+        """
         return np.asarray(-f[self.bounded])
 
     def norm(self) -> float:
@@ -110,8 +115,10 @@ class BoundedSystem:
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assembled(self) -> Any:
-        """Return A with its springs as an AIJ matrix: the given one when it is a PETSc matrix
-        without springs."""
+        """Return A with its springs as an AIJ matrix.
+
+        It is the given one when that is a PETSc matrix without springs.
+        """
         mat = assembled(self.A)
         if not self.surface.some(self.soft):
             return mat
@@ -136,15 +143,19 @@ def assembled(A: EffectiveMatrix) -> Any:
 
 def aij(rows: sp.csr_matrix, comm: Any) -> Any:
     """Return the square AIJ matrix with these rows of this rank, columns numbered over all ranks.
-    Collective."""
+
+    Collective.
+    """
     size, kind = (rows.shape[0], None), PETSc.IntType
     arrays = rows.indptr.astype(kind), rows.indices.astype(kind), rows.data
     return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=comm)
 
 
 def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
-    """Return this rank's first global number, global column numbers and total, where ranks' parts
-    grow at their end."""
+    """Return this rank's first global number, global column numbers and total.
+
+    Ranks' parts grow at their end.
+    """
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)

@@ -1,7 +1,8 @@
 """Put PETSc's reasons for stopping into words, and make StepFailures of them.
 
 PETSc 3.25 has other names for some reasons and other words for some errors; both are settled
-here."""
+here.
+"""
 
 import re
 import tomllib
@@ -16,7 +17,9 @@ NOT_A_NUMBER = (
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
 ADVICE = {
-    "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
+    "DIVERGED_LINEAR_SOLVE": (
+        "check that the body is held or that mass enters A, and that A is positive definite"
+    ),
     **dict.fromkeys(
         (name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS
     ),
@@ -36,8 +39,10 @@ GENERAL_ADVICE = (
 
 
 def name_of(reasons: type, reason: int) -> str:
-    """Return the longest name of a reason in one of petsc4py's classes of reasons: CONVERGED_...,
-    DIVERGED_..."""
+    """Return the longest name of a reason in one of petsc4py's classes of reasons.
+
+    Such names are CONVERGED_..., DIVERGED_...
+    """
     names = [
         name
         for name, value in vars(reasons).items()

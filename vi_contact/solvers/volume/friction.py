@@ -1,5 +1,6 @@
-"""Solve friction on the volume route: Coulomb's law as a sequence of Tresca problems on all
-unknowns, by SNES.
+"""Solve friction on the volume route.
+
+Coulomb's law is a sequence of Tresca problems on all unknowns, by SNES.
 
     s <- cohesion + slope max(r_n(s), 0)
 
@@ -35,8 +36,10 @@ EXTRAPOLATION = Anderson(depth=5, after=3)
 
 @dataclass(frozen=True)
 class Found:
-    """Hold the solution of one problem or of a sequence: r_n (m,), slip (L,), 0 where points stick,
-    SNES iterations."""
+    """Hold the solution of one problem or of a sequence.
+
+    This is r_n (m,), slip (L,), 0 where points stick, and SNES iterations.
+    """
 
     state: FrictionUnknowns
     r_n: Array
@@ -54,8 +57,11 @@ class VolumeFriction:
         self._body, self._friction = scaled.system, scaled.friction
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure with PETSc's reason, or when the thresholds do not
-        settle."""
+        """Return the step.
+
+        Raises:
+            StepFailure: with PETSc's reason, or when the thresholds do not settle.
+        """
         surface = self._body.surface
         rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
         cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
@@ -72,9 +78,11 @@ class VolumeFriction:
     def _sequence(
         self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None
     ) -> Found:
-        """Coulomb's problem with a coefficient (m,) that is given, from the solution of another
-        one. The thresholds are those of all conditions: every rank extrapolates and judges them
-        alike."""
+        """Solve Coulomb's problem with a coefficient (m,) that is given.
+
+        It begins from the solution of another one. The thresholds are those of all conditions:
+        every rank extrapolates and judges them alike.
+        """
         following, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
         surface = self._body.surface
@@ -106,8 +114,11 @@ class VolumeFriction:
         )
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
-        """The guess, sliding as predicted, and no iterations; with disks the solution without
-        friction, whose slip gives the directions that Newton's method needs."""
+        """Return the guess, sliding as predicted, and no iterations.
+
+        With disks it is the solution without friction, whose slip gives the directions that
+        Newton's method needs.
+        """
         friction, scaled, own = self._friction, self._scaled, limit[self._body.surface.slots]
         state = FrictionUnknowns(
             self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs))
@@ -118,7 +129,7 @@ class VolumeFriction:
         return scaled.moved(free.state, free.slip, own), free.iterations
 
     def _tresca(self, step: StepProblem, limit: Array, start: FrictionUnknowns) -> Found:
-        """The problem with thresholds (m,)."""
+        """Solve the problem with thresholds (m,)."""
         scaled = self._scaled
         scaled.set_friction(step, limit, start)
         y, active, r_n, iterations = scaled.answer(self.driver, self._name)
@@ -126,8 +137,10 @@ class VolumeFriction:
         return Found(state, r_n, active, scaled.slip(state.z, scaled.sliding(y)), iterations)
 
     def _result(self, step: StepProblem, found: Found) -> StepResult:
-        """x, with sticking points put exactly where they were, and r_t within the last digit of its
-        disk."""
+        """Return x, with sticking points put exactly where they were, and r_t.
+
+        r_t is within the last digit of its disk.
+        """
         surface, friction = self._body.surface, self._friction
         law = step.friction_at(friction.by_point(found.slip))
         limit = limit_of(law, found.r_n, surface.weights, step.scale)

@@ -1,5 +1,7 @@
-"""Build the Jacobian of a step with friction: H = A x_ref/r_ref, B_t, and in 3D what lambda and
-gamma make of it."""
+"""Build the Jacobian of a step with friction.
+
+It is made of H = A x_ref/r_ref, B_t, and in 3D what lambda and gamma make of it.
+"""
 
 import weakref
 from typing import Any
@@ -16,8 +18,10 @@ Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 
 
 class FrictionJacobian:
-    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix, with the names of
-    that function."""
+    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix.
+
+    Names are those of that function.
+    """
 
     def __init__(self, scaled: ScaledFrictionStep) -> None:
         self._system: FrictionSystem = scaled.friction
@@ -38,8 +42,10 @@ class FrictionJacobian:
         self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
     def _entries(self) -> tuple[int, dict[str, Entries]]:
-        """How many columns there are on all ranks, and the parts of the matrix; zeros for what
-        changes."""
+        """Return how many columns there are on all ranks, and the parts of the matrix.
+
+        There are zeros for what changes.
+        """
         system = self._system
         body, line, pairs = system.body, system.line, system.pairs
         indptr, columns, A = _rows_of(body)
@@ -85,7 +91,7 @@ class FrictionJacobian:
             self._write()
 
     def _turn(self, y: Array) -> None:
-        """The entries of disks."""
+        """Return the entries of disks."""
         pairs, still, gamma = self._scaled.disks(y)
         c, over = self._scaled.disk_stiffness, self._scaled.disk_inverse
         by_reaction = (c[:, None] * (still + gamma[:, None] * pairs) - 2.0 * pairs) * over[:, None]

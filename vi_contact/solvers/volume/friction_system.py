@@ -1,15 +1,18 @@
-"""Write a step with Tresca's thresholds s given as a mixed complementarity problem in simple
-bounds.
+"""Write a step as a mixed complementarity problem in simple bounds.
+
+Tresca's thresholds s are given.
 
 The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that
 has one free tangent (2D) carries
 
-    F_lambda = slip0 - B_t x,     -s <= lambda <= s:     0 where lambda is inside, <= 0 where lambda = s, >= 0 at -s
+    F_lambda = slip0 - B_t x,     -s <= lambda <= s:
+    0 where lambda is inside, <= 0 where lambda = s, >= 0 at -s
 
 which is |r_t| <= s, r_t along the slip. A point with two (3D) carries the disk itself, no polygon:
 with the speed factor gamma >= 0 of the slip, slip = gamma r_t,
 
-    F_lambda = slip0 - B_t x + gamma lambda = 0,     F_gamma = (s² - |lambda|²)/s >= 0  ⊥  gamma >= 0.
+    F_lambda = slip0 - B_t x + gamma lambda = 0
+    F_gamma = (s² - |lambda|²)/s >= 0  ⊥  gamma >= 0.
 
 The equations of the body gain B_tᵀ lambda. Where s = 0 the bounds hold lambda and gamma at zero. In
 2D everything is linear and monotone; 3D has one solution too, the multiplier of a convex problem.
@@ -38,14 +41,16 @@ from .scaled_step import ScaledStep, fraction
 
 
 class FrictionSystem:
-    """Number the unknowns of a rank: z of ``body``, then lambda of the free tangents, point by
-    point, then gamma.
+    """Number the unknowns of a rank.
+
+    First comes z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
     Attributes:
         point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A of each
             lambda.
         disk: (m,) True for points with two free tangents; ``any_disk``: whether some rank has one.
-        pairs: (D, 2) places of their lambdas; line: (L,) True for the other lambdas.
+        pairs: (D, 2) places of their lambdas.
+        line: (L,) True for the other lambdas.
     """
 
     def __init__(self, body: BoundedSystem) -> None:
@@ -87,8 +92,10 @@ class FrictionUnknowns:
 
 
 class ScaledFrictionStep(ScaledStep):
-    """Evaluate F(y), y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref), with bounds, for the step and
-    limits set last."""
+    """Evaluate F(y), with bounds, for the step and limits set last.
+
+    y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref).
+    """
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
         super().__init__(friction.body, tolerance)
@@ -166,8 +173,10 @@ class ScaledFrictionStep(ScaledStep):
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the errors as without friction; the second counts what is wrong in slips and disks
-        too."""
+        """Return the errors as without friction.
+
+        The second counts what is wrong in slips and disks too.
+        """
         friction, s = self.friction, self.disk_limits
         _, reaction, gamma = friction.split(y)
         body, still, room = self._parts(y)
@@ -205,8 +214,10 @@ class ScaledFrictionStep(ScaledStep):
         return np.where(sliding[friction.point], moved, 0.0)
 
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
-        """Return the state with reactions in new disks (m,): sliding points on their edge, along
-        their slip (L,)."""
+        """Return the state with reactions in new disks (m,).
+
+        Sliding points are on their edge, along their slip (L,).
+        """
         friction, s = self.friction, limit
         way, inside = friction.by_point(slip), project(friction.by_point(state.reaction), s)
         speed = np.linalg.norm(way, axis=1)

@@ -1,10 +1,12 @@
-"""Hold PETSc's options: one prefix, three layers; refuse combinations that are known to give wrong
-answers.
+"""Hold PETSc's options; refuse combinations that are known to give wrong answers.
+
+There is one prefix and three layers.
 
 Layers, the later wins: the method's defaults, ``petsc_options`` of the settings, PETSc's own
 database (command line, PETSC_OPTIONS). SNES VI reads its options again whenever the active set
 changes, so they stay in the database for as long as a solve runs and are taken out afterwards: two
-solvers with one prefix do not meet."""
+solvers with one prefix do not meet.
+"""
 
 import ctypes
 import logging
@@ -29,23 +31,31 @@ EXACT = (*DIRECT, "redundant")  # by one application
 
 
 class OptionLayers:
-    """Hold defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's
-    database.
+    """Hold defaults and the user's own options under a prefix.
 
-    own: the user's options; read: those of them that PETSc has read."""
+    ``in_force`` puts them into PETSc's database.
+
+    own: the user's options; read: those of them that PETSc has read.
+    """
 
     def __init__(
         self, prefix: str, defaults: Options, own: Options, read: set[str] | None = None
     ) -> None:
-        """``read``: the user's own options that PETSc has read so far, shared with other layers of
-        one solver."""
+        """Take the layers of options.
+
+        ``read`` holds the user's own options that PETSc has read so far, shared with other layers
+        of one solver.
+        """
         self.prefix = prefix
         self._defaults, self.own = defaults, {key.lstrip("-"): value for key, value in own.items()}
         self.read: set[str] = set() if read is None else read
 
     def apply(self, solver: Any, check: "Callable[[Any, OptionLayers], None]") -> None:
-        """Set up a SNES, TAO or PC object from the options; InputError when PETSc or ``check`` does
-        not take them."""
+        """Set up a SNES, TAO or PC object from the options.
+
+        Raises:
+            InputError: PETSc or ``check`` does not take them.
+        """
         with self.in_force():
             try:
                 solver.setFromOptions()
@@ -83,7 +93,8 @@ class OptionLayers:
         """Raise InputError, on all ranks, for an option of the user's that no rank has read.
 
         To be called when all has been read that ever will be: after a solve with at least one
-        iteration. Collective."""
+        iteration. Collective.
+        """
         for key in self._unread(comm) if self.own else ():
             raise InputError(
                 f"{owner}: nothing reads '{key}' of petsc_options: {self._remedy(key)}"
@@ -92,7 +103,9 @@ class OptionLayers:
 
     def _unread(self, comm: Comm) -> list[str]:
         """Return the user's options that no rank has read: one without rows makes no blocks.
-        Collective."""
+
+        Collective.
+        """
         lists = comm.gather([key for key in self.own if key not in self.read])
         everywhere = (
             None if lists is None else [key for key in lists[0] if all(key in one for one in lists)]
@@ -100,8 +113,10 @@ class OptionLayers:
         return list(comm.bcast(everywhere))
 
     def _tell_unread(self, owner: str, comm: Comm) -> None:
-        """Warn, once, of options of the command line that this solver has not read: they may be for
-        another one."""
+        """Warn, once, of options of the command line that this solver has not read.
+
+        They may be for another one.
+        """
         given = [name for name in PETSc.Options().getAll() if name.startswith(self.prefix)]
         unread = [name for name in given if not was_read(name) and name not in _TOLD]
         _TOLD.update(unread)
@@ -110,8 +125,10 @@ class OptionLayers:
             log.warning("%s: nothing reads the PETSc option -%s: %s", owner, name, remedy)
 
     def excuse_known(self) -> None:
-        """Count the user's options that PETSc has as read, whether this solver has a use for them
-        or not."""
+        """Count the user's options that PETSc has as read.
+
+        This solver may have a use for them or not.
+        """
         self.read.update(key for key in self.own if key.removeprefix(_part(key)) in KNOWN)
 
     def _remedy(self, key: str) -> str:
@@ -131,16 +148,20 @@ class OptionLayers:
 
 @cache
 def _options_used() -> Any:
-    """Return PetscOptionsUsed of the PETSc library that petsc4py has loaded, which petsc4py itself
-    does not offer."""
+    """Return PetscOptionsUsed of the PETSc library that petsc4py has loaded.
+
+    That is not offered by petsc4py itself.
+    """
     call = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     call.argtypes, call.restype = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p], ctypes.c_int
     return call
 
 
 def was_read(name: str) -> bool:
-    """Return whether PETSc has read an option, by its whole name, since it came into the database;
-    on this rank."""
+    """Return whether PETSc has read an option since it came into the database.
+
+    The option is given by its whole name; the answer is that of this rank.
+    """
     found = ctypes.c_int(0)  # PetscBool is an int, and one byte since PETSc 3.24
     _options_used()(None, name.encode(), ctypes.byref(found))
     return found.value != 0
@@ -159,8 +180,10 @@ KNOWN = tuple(TABLES["known"].split())
 
 
 def _part(key: str) -> str:
-    """Return with what the name of an option begins that belongs to a part of a solver, such as
-    blocks or levels."""
+    """Return with what the name of an option begins that belongs to a part of a solver.
+
+    Such parts are blocks or levels.
+    """
     return next((one for one in TABLES["parts"] if key.startswith(one)), "")
 
 
@@ -168,12 +191,15 @@ EXCHANGE = ("umfpack", "superlu")  # solvers that exchange rows
 
 
 def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
-    """Return the options of a direct solver, "cholesky" or "lu", of what this PETSc was built with:
-    MUMPS, or one of one rank, of which every rank has a copy; the log says which where it is not
-    MUMPS. SuperLU_DIST is never taken: it ends the process where a row is zero.
+    """Return the options of a direct solver, "cholesky" or "lu".
+
+    It is one of what this PETSc was built with: MUMPS, or one of one rank, of which every rank has
+    a copy; the log says which where it is not MUMPS. SuperLU_DIST is never taken: it ends the
+    process where a row is zero.
 
     ``exchanges``: whether rows have to be exchanged, as beside zeros on the diagonal, which PETSc's
-    own does not do. InputError where nothing else is there."""
+    own does not do. InputError where nothing else is there.
+    """
     if packages.petsc_has("mumps"):
         return {**TABLES["mumps"], "pc_type": kind}
     own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
@@ -223,8 +249,10 @@ def check_semismooth(snes: Any, layers: OptionLayers) -> None:
 
 
 def check_friction(snes: Any, layers: OptionLayers) -> None:
-    """Refuse what needs a symmetric matrix, and what fails on the reduced systems of VINEWTONRSLS,
-    with friction."""
+    """Refuse what does not go with friction.
+
+    This is what needs a symmetric matrix, and what fails on the reduced systems of VINEWTONRSLS.
+    """
     pc = snes.ksp.pc.getType()
     if pc in REDUCED_PC:
         refuse(f"pc_type {pc} with friction", REDUCED_PC[pc], "use lu with MUMPS")

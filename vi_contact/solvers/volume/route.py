@@ -1,12 +1,14 @@
-"""Solve the step on all unknowns, by PETSc's solvers for variational inequalities and bounds: the
-volume route.
+"""Solve the step on all unknowns, by PETSc's solvers for inequalities and bounds.
+
+This is the volume route; the inequalities are variational.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
 In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO
 know of contact. With friction the tangential reactions become bounded unknowns too (``friction``);
 then there is nothing to minimise, and only SNES can do it. Reference: PETSc manual, chapters SNES
-(variational inequalities) and TAO."""
+(variational inequalities) and TAO.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -33,8 +35,10 @@ __all__ = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 
 
 class Method(Protocol):
-    """Say how the bounded problem is solved: settings that make a driver. One that
-    ``carries_friction`` makes two, as ReducedNewton does."""
+    """Say how the bounded problem is solved: settings that make a driver.
+
+    One that ``carries_friction`` makes two, as ReducedNewton does.
+    """
 
     @property
     def carries_friction(self) -> bool: ...
@@ -80,8 +84,10 @@ class Volume:
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction that the method cannot carry, without a tangent, or of
-        wrong length."""
+        """Raise InputError for friction that the method cannot carry.
+
+        So it does for friction without a tangent, or of wrong length.
+        """
         if problem.frictional and not self.method.carries_friction:
             raise InputError(
                 f"Volume({self.method}) only enforces bounds on displacements and would ignore "
@@ -95,8 +101,10 @@ class Volume:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedVolume":
-        """Return the solver for one effective matrix; collective. InputError for options that
-        cannot work."""
+        """Return the solver for one effective matrix; collective.
+
+        InputError for options that cannot work.
+        """
         return PreparedVolume(self, A, surface, scale)
 
 
@@ -104,7 +112,8 @@ class PreparedVolume:
     """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is
-    collective."""
+    collective.
+    """
 
     def __init__(
         self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float
@@ -131,8 +140,10 @@ class PreparedVolume:
         )
 
     def _friction_method(self) -> VolumeFriction:
-        """The problem with friction, made at the first step that has some, in the place of the
-        other one."""
+        """Return the problem with friction, in the place of the other one.
+
+        It is made at the first step that has some.
+        """
         if self._friction is None:
             self.close()
             method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
@@ -179,19 +190,23 @@ class PreparedVolume:
         return found
 
     def excuse_options(self) -> None:
-        """Take options that nothing reads: they are for another method, in whose place this one is
-        tried."""
+        """Take options that nothing reads.
+
+        They are for another method, in whose place this one is tried.
+        """
         self._all_read = True
 
     def _refuse_unread(self, iterations: int) -> None:
-        """Raise InputError for options that nothing has read, once the parts of the solver have
-        been at work."""
+        """Raise InputError for options that nothing has read.
+
+        It is asked once the parts of the solver have been at work.
+        """
         if iterations and not self._all_read:
             self._all_read = True
             self._layers.refuse_unread(self._name, self._comm)
 
     def _solve(self, step: StepProblem) -> StepResult:
-        """The step without friction."""
+        """Solve the step without friction."""
         system, scaled = self._system, self._scaled
         if self._driver is None or self._friction is not None:
             self.close()

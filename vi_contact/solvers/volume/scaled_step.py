@@ -2,7 +2,8 @@
 
 PETSc's VI and bound-constrained solvers carry absolute tolerances in unknown units. They are handed
 z / x_ref and (A z - b) / r_ref instead, with powers of two for x_ref and r_ref, so that both are
-near one in any system of units and scaling loses no digit: a bound stays exactly a bound."""
+near one in any system of units and scaling loses no digit: a bound stays exactly a bound.
+"""
 
 from typing import Any
 
@@ -21,8 +22,10 @@ INDEFINITE = 1e-8  # of the sizes in a curvature below zero: far above its round
 
 
 class ScaledStep:
-    """Evaluate F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last. ``worst``:
-    error found last."""
+    """Evaluate F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last.
+
+    ``worst``: error found last.
+    """
 
     def __init__(self, system: BoundedSystem, tolerance: float) -> None:
         self.system, self.tolerance = system, tolerance
@@ -48,8 +51,10 @@ class ScaledStep:
         self.worst = np.inf
 
     def _along(self, b: Array, b_max: float) -> float:
-        """Size of the minimiser of ½ zᵀA z - bᵀz along b: the size of z when nothing else is
-        known."""
+        """Return the size of the minimiser of ½ zᵀA z - bᵀz along b.
+
+        It is the size of z when nothing else is known.
+        """
         if b_max == 0.0:
             return 0.0
         unit = b / b_max
@@ -67,11 +72,13 @@ class ScaledStep:
         F.array[:] = self.residual(y.array_r)
 
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
-        """Return f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A
-        x_ref / r_ref.
+        """Return f(y) - f(origin) and the gradient F(y), for TAO.
+
+        f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
 
         A line search compares values, which agree in all their digits where the gradient still has
-        eight to lose."""
+        eight to lose.
+        """
         values = y.array_r
         F = self.residual(values)
         G.array[:] = F
@@ -83,8 +90,11 @@ class ScaledStep:
         self._zero = y, self.residual(y)
 
     def curves_down(self, y: Array, F: Array) -> bool:
-        """Say whether dy·H dy, dy the way from the origin of the objective, is below zero by more
-        than rounding: then H is not positive definite. Collective."""
+        """Say whether dy·H dy is below zero by more than rounding.
+
+        dy is the way from the origin of the objective. Below zero, H is not positive definite.
+        Collective.
+        """
         dy, dF = y - self._zero[0], F - self._zero[1]
         comm = self.system.surface.comm
         curvature, sizes = comm.sum(
@@ -93,15 +103,19 @@ class ScaledStep:
         return bool(curvature < -INDEFINITE * sizes)
 
     def active(self, y: Array, F: Array) -> Mask:
-        """Return (m,) what the natural map chooses: where the reaction exceeds the remaining
-        gap."""
+        """Return (m,) what the natural map chooses.
+
+        It is True where the reaction exceeds the remaining gap.
+        """
         i = self.system.bounded
         above, below = self.upper[i] - y[i] < -F[i], y[i] - self.lower[i] < F[i]
         return np.asarray(above | below | (self.lower[i] == self.upper[i]))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the largest |F| off the active set and |gap| on it, as in the certificate;
-        backward error of F."""
+        """Return the largest |F| off the active set and |gap| on it, as in the certificate.
+
+        The backward error of F follows.
+        """
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
         gap = np.where(y[i] - self.lower[i] < F[i], y[i] - self.lower[i], self.upper[i] - y[i])[
@@ -132,11 +146,13 @@ class ScaledStep:
         )
 
     def verdict(self, y: Array, F: Array) -> int:
-        """Return SNES's reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no
-        longer improving.
+        """Return SNES's reason.
+
+        It is 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.
 
         PETSc's own tests are relative to the first residual, which a good prediction makes
-        unreachable."""
+        unreachable.
+        """
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
             return NOT_A_NUMBER
@@ -150,9 +166,11 @@ class ScaledStep:
 
     def answer(self, driver: Any, name: str) -> tuple[Array, Mask, Array, int]:
         """Run a PETSc solver of this step; return (y, active (m,), r_n (m,), iterations).
+
         StepFailure with its reason.
 
-        Off the active set r_n is zero, so that what is left of F shows in the certificate."""
+        Off the active set r_n is zero, so that what is left of F shows in the certificate.
+        """
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not self.accepts(y, F):
             raise stopped(name, driver.reasons, reason, iterations, self.worst)
@@ -160,18 +178,23 @@ class ScaledStep:
         return y, active, np.where(active, self.system.reactions(F * self.r_ref), 0.0), iterations
 
     def accepts(self, y: Array, F: Array) -> bool:
-        """Return True below the tolerance: a solver whose line search fails at the floor of
-        round-off is done."""
+        """Return True below the tolerance.
+
+        A solver whose line search fails at the floor of round-off is done.
+        """
         force, gap, _ = self.errors(y, F)
         self.worst = max(force, gap)
         return self.worst <= self.tolerance
 
 
 def _power_of_two(value: float) -> float:
-    """The power of two next above the value; one for zero, infinity and NaN, which PETSc reports
-    itself."""
+    """Return the power of two next above the value.
+
+    It is one for zero, infinity and NaN, which PETSc reports itself.
+    """
     return float(np.exp2(np.ceil(np.log2(value)))) if 0.0 < value < np.inf else 1.0
 
 
 def fraction(value: float, reference: float) -> float:
+    """Return value/reference, or the value itself where the reference is not above zero."""
     return value / reference if reference > 0.0 else value

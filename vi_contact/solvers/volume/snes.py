@@ -3,7 +3,8 @@
 ``ReducedNewton`` is VINEWTONRSLS, which without a line search is the primal-dual active set method:
 solve with the active points held, project, read the next active set off the signs of the residual.
 ``SemismoothNewton`` is VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every
-iteration; of ``Condensed`` they share A, b."""
+iteration; of ``Condensed`` they share A, b.
+"""
 
 import weakref
 from collections.abc import Callable
@@ -70,8 +71,10 @@ class SnesDriver:
         return y, F, snes.getConvergedReason(), snes.getIterationNumber()
 
     def _test(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
-        """PETSc's reason to stop: our verdict, or the user's tolerance, which counts relative to
-        |b|; 0 to go on."""
+        """Return PETSc's reason to stop; 0 to go on.
+
+        It is our verdict, or the user's tolerance, which counts relative to |b|.
+        """
         reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
         if reason:
             return reason
@@ -94,7 +97,8 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     """Return the bound method without keeping its object alive: what PETSc may hold.
 
     petsc4py frees a solver late and all at once; whatever PETSc object only its callbacks kept
-    alive would then be lost to the clean-up and never be freed."""
+    alive would then be lost to the clean-up and never be freed.
+    """
     reference = weakref.WeakMethod(method)
 
     def call(*arguments: Any) -> Any:
@@ -106,8 +110,10 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Lent:
-    """Pass an object to PETSc as context without giving it away, as ``weakly`` does with a
-    method."""
+    """Pass an object to PETSc as context without giving it away.
+
+    ``weakly`` does so with a method.
+    """
 
     def __init__(self, lent: Any) -> None:
         self._lent = weakref.ref(lent)
@@ -117,15 +123,19 @@ class Lent:
 
 
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
-    """Write the bounds of a step into PETSc's vectors; only PETSc's own infinities mean no
-    bound."""
+    """Write the bounds of a step into PETSc's vectors.
+
+    Only PETSc's own infinities mean no bound.
+    """
     lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)
     upper.array[:] = np.minimum(scaled.upper, PETSc.INFINITY)
 
 
 class AssembledJacobian:
-    """Assemble H = A x_ref / r_ref as an AIJ matrix, positive definite, and symmetric where A
-    is."""
+    """Assemble H = A x_ref / r_ref as an AIJ matrix.
+
+    It is positive definite, and symmetric where A is.
+    """
 
     def __init__(self, system: BoundedSystem) -> None:
         self._A = system.assembled()
@@ -155,8 +165,10 @@ class AssembledJacobian:
 
 
 class SemismoothJacobian(AssembledJacobian):
-    """Assemble H anew for every iteration: VINEWTONSSLS overwrites it by D_a + D_b H, which is not
-    symmetric."""
+    """Assemble H anew for every iteration.
+
+    VINEWTONSSLS overwrites it by D_a + D_b H, which is not symmetric.
+    """
 
     def rescale(self, ratio: float) -> None:
         """Take the units of a step."""
@@ -170,12 +182,14 @@ class SemismoothJacobian(AssembledJacobian):
 
 @dataclass(frozen=True)
 class ReducedNewton:
-    """Solve by an active set method of PETSc, SNES VINEWTONRSLS, with a factor by MUMPS in every
-    iteration.
+    """Solve by an active set method of PETSc, SNES VINEWTONRSLS.
+
+    It makes a factor by MUMPS in every iteration.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg
     and fieldsplit are refused, they do not survive the reduction. With friction, and where A is not
-    symmetric, LU in place of Cholesky."""
+    symmetric, LU in place of Cholesky.
+    """
 
     carries_friction: ClassVar[bool] = True
 
@@ -189,9 +203,11 @@ class ReducedNewton:
         return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_reduced)
 
     def friction_defaults(self, ranks: int) -> Options:
-        """Return options before the user's: LU, the system with friction is not symmetric. Its
-        zeros on the diagonal delay pivots, for which MUMPS on several ranks needs more room than
-        usual, or stops with INFOG(1) = -9."""
+        """Return options before the user's: LU, the system with friction is not symmetric.
+
+        Its zeros on the diagonal delay pivots, for which MUMPS on several ranks needs more room
+        than usual, or stops with INFOG(1) = -9.
+        """
         return {**NEWTON, **direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
@@ -203,11 +219,13 @@ class ReducedNewton:
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS, with LU by MUMPS: a
-    diagnostic.
+    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS.
+
+    It takes LU by MUMPS, and is a diagnostic.
 
     Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer than the body its line
-    search may fail."""
+    search may fail.
+    """
 
     carries_friction: ClassVar[bool] = False
 

@@ -1,5 +1,6 @@
-"""Solve by PETSc TAO on the same bounds: minimise ½ xᵀA x - bᵀx subject to x_n <= bound, as a
-second opinion.
+"""Solve by PETSc TAO on the same bounds, as a second opinion.
+
+It minimises ½ xᵀA x - bᵀx subject to x_n <= bound.
 
 TAO's tolerances and trust regions are absolute, harmless in a scaled step; ``ScaledStep.verdict``
 judges convergence.
@@ -18,9 +19,11 @@ from .snes import AssembledJacobian, weakly, write_bounds
 
 
 def check_tao(tao: Any, layers: OptionLayers) -> None:
-    """Refuse other types and preconditioners that give wrong answers, also when they come from
-    options (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as
-    converged)."""
+    """Refuse other types and preconditioners that give wrong answers.
+
+    So it does when they come from options (docs/reference/petsc.md: many types ignore bounds, and
+    bqpip reports garbage as converged).
+    """
     if tao.getType() != "tron":
         refuse(
             f"TAO type {tao.getType()}",
@@ -79,8 +82,10 @@ class TaoDriver:
             item.destroy()
 
     def _test(self, tao: Any) -> int | None:
-        """PETSc's reason to stop: its own, which only the user's tolerances bring, then our
-        verdict; None to go on."""
+        """Return PETSc's reason to stop; None to go on.
+
+        It is its own, which only the user's tolerances bring, then our verdict.
+        """
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
@@ -95,8 +100,10 @@ class TaoDriver:
 
 @dataclass(frozen=True)
 class TaoTron:
-    """Solve by TAO TRON: trust region Newton with projected searches, conjugate gradients and
-    incomplete Cholesky.
+    """Solve by TAO TRON.
+
+    This is trust region Newton with projected searches, conjugate gradients and incomplete
+    Cholesky.
 
     Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they
     shrink its trust region.
@@ -105,8 +112,10 @@ class TaoTron:
     carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
-        """Return the options that come before the user's; PETSc has no incomplete Cholesky for
-        several ranks."""
+        """Return the options that come before the user's.
+
+        PETSc has no incomplete Cholesky for several ranks.
+        """
         return {**TABLES["tron"], "pc_type": "icc" if ranks == 1 else "bjacobi"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
