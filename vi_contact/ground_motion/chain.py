@@ -58,6 +58,10 @@ class Processing:
 
     def __call__(self, record: Record) -> Record:
         """Return the processed record; its notes tell every step taken."""
+        return self._scale(self._filter(self._cut(record)))
+
+    def _cut(self, record: Record) -> Record:
+        """Choose the time, remove the mean and taper the ends."""
         if self.trim is not None:
             record = trimmed(record, *self.trim)
         if self.pad is not None:
@@ -66,6 +70,10 @@ class Processing:
             record = without_mean(record)
         if self.taper is not None:
             record = tapered(record, fraction=self.taper)
+        return record
+
+    def _filter(self, record: Record) -> Record:
+        """Filter, change the time step and correct the baseline."""
         if self.low is not None or self.high is not None:
             record = filtered(
                 record, low=self.low, high=self.high, order=self.order, causal=self.causal
@@ -74,6 +82,10 @@ class Processing:
             record = resampled(record, self.resample)
         if self.baseline is not None:
             record = baseline_corrected(record, degree=self.baseline)
+        return record
+
+    def _scale(self, record: Record) -> Record:
+        """Scale by what was asked for."""
         if self.scale is not None:
             record = scaled(record, factor=self.scale)
         if self.pga is not None:

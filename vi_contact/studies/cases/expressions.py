@@ -80,14 +80,11 @@ class Expression:
         return _run(self.program, {"t": t, **places})
 
     def _program(self, node: Any, depth: int) -> Iterator[Any]:
+        """Yield numbers, variables and functions in the order in which they are worked off."""
         if depth > DEPTH:
             raise InputError(f"brackets, signs or powers in it are nested more than {DEPTH} deep")
         name = getattr(getattr(node, "func", node), "id", "")
-        if (
-            isinstance(node, ast.Constant)
-            and isinstance(node.value, int | float)
-            and not isinstance(node.value, bool)
-        ):
+        if _is_number(node):
             yield float(str(node.value))  # of a whole number with too many digits: infinite
         elif isinstance(node, ast.Name) and name == "pi":
             yield np.pi
@@ -97,29 +94,46 @@ class Expression:
             yield from self._program(node.operand, depth + 1)
             yield from [(np.negative, 1)] if isinstance(node.op, ast.USub) else []
         elif isinstance(node, ast.BinOp):
-            chain = isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
-            yield from self._program(node.left, depth + (not chain))
-            right = list(self._program(node.right, depth + 1))
-            if isinstance(node.op, ast.Pow):
-                if any(isinstance(one, str) for one in right):
-                    raise InputError("an exponent has a variable: write a^x as exp(x*log(a))")
-                if not abs(_run(right, {})) <= POWER:
-                    raise InputError(f"an exponent is larger than {POWER}")
-            yield from (*right, (_OF_TWO[type(node.op).__name__], 2))
+            yield from self._program_of_two(node, depth)
         elif isinstance(node, ast.Call) and (
             name in _OF_MORE if len(node.args) > 1 else node.args and name in _OF_ONE
         ):
-            yield from self._program(node.args[0], depth + 1)
-            for one in node.args[1:]:
-                yield from self._program(one, depth + 1)
-                yield _OF_MORE[name], 2
-            yield from [(_OF_ONE[name], 1)] if name in _OF_ONE else []
+            yield from self._program_of_call(node, name, depth)
         else:
             there = "".join(f", {one}" for one in self.variables)
             raise InputError(
                 f"'{name or ast.unparse(node)[:20]}' in it is not a number{there}, pi or one of "
                 f"{', '.join((*_OF_ONE, *_OF_MORE))} with its values in brackets"
             )
+
+    def _program_of_two(self, node: ast.BinOp, depth: int) -> Iterator[Any]:
+        """Yield the program of an operation with two operands."""
+        chain = isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
+        yield from self._program(node.left, depth + (not chain))
+        right = list(self._program(node.right, depth + 1))
+        if isinstance(node.op, ast.Pow):
+            if any(isinstance(one, str) for one in right):
+                raise InputError("an exponent has a variable: write a^x as exp(x*log(a))")
+            if not abs(_run(right, {})) <= POWER:
+                raise InputError(f"an exponent is larger than {POWER}")
+        yield from (*right, (_OF_TWO[type(node.op).__name__], 2))
+
+    def _program_of_call(self, node: ast.Call, name: str, depth: int) -> Iterator[Any]:
+        """Yield the program of the call of a function."""
+        yield from self._program(node.args[0], depth + 1)
+        for one in node.args[1:]:
+            yield from self._program(one, depth + 1)
+            yield _OF_MORE[name], 2
+        yield from [(_OF_ONE[name], 1)] if name in _OF_ONE else []
+
+
+def _is_number(node: ast.AST) -> bool:
+    """Tell whether a node of the syntax tree is a number."""
+    return (
+        isinstance(node, ast.Constant)
+        and isinstance(node.value, int | float)
+        and not isinstance(node.value, bool)
+    )
 
 
 @dataclass(frozen=True)

@@ -108,8 +108,11 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
         return float(value)
     if isinstance(value, int) and member is int:
         return value
-    if not isinstance(value, str):
-        return None
+    return _read_text(value, member, spot, words) if isinstance(value, str) else None
+
+
+def _read_text(value: str, member: Any, spot: Spot, words: Words) -> Node | None:
+    """Return the node of a text, or None where it is nothing of this type."""
     if member in words.groups:
         return Group(value, member, spot)
     if member in words.named:
@@ -222,36 +225,43 @@ _EXPECTED = {float: "a number", int: "a whole number", bool: "true or false", st
 
 def _expected(members: Sequence[Any], words: Words) -> str:
     """Return what would fit."""
-    found = []
-    for member in members:
-        if member in _EXPECTED:
-            found.append(_EXPECTED[member])
-        elif member in words.groups:
-            found.append(f"the name of {GROUP[member.__name__]}")
-        elif is_path(member):
-            found.append("the path of a file")
-        elif choices_of(member, words):
-            found.append(f"a table with type = one of {', '.join(choices_of(member, words))}")
-            if words.named.get(member):
-                found.append(f"one of the names {', '.join(words.named[member])}")
-        elif is_list(member):
-            inner = [one for one in get_args(member) if one is not Ellipsis]
-            found.append(
-                f"a list of {_expected(inner[:1], words).removeprefix('a ')}s"
-                if _EXPECTED.get(inner[0])
-                else "a list"
-            )
-        elif get_origin(member) in (Mapping, dict):
-            found.append("a table of names")
-        elif member in (FIELD, HISTORY, Expression):
-            vector = "expressions of x, y, z, t, one per dimension"
-            found.append(
-                "an expression of t"
-                if member == HISTORY
-                else "an expression"
-                if float in members
-                else vector
-            )
+    found = [one for member in members for one in _describe(member, members, words)]
     if not found or any(get_origin(member) is Callable or member is Callable for member in members):
         found.append("a function, which only the Python interface takes")
     return " or ".join(dict.fromkeys(found))
+
+
+def _describe(member: Any, members: Sequence[Any], words: Words) -> list[str]:
+    """Return what would fit one type of these."""
+    if member in _EXPECTED:
+        return [_EXPECTED[member]]
+    if member in words.groups:
+        return [f"the name of {GROUP[member.__name__]}"]
+    if is_path(member):
+        return ["the path of a file"]
+    if choices := choices_of(member, words):
+        table = f"a table with type = one of {', '.join(choices)}"
+        named = words.named.get(member)
+        return [table, f"one of the names {', '.join(named)}"] if named else [table]
+    if is_list(member):
+        return [_describe_list(member, words)]
+    if get_origin(member) in (Mapping, dict):
+        return ["a table of names"]
+    if member in (FIELD, HISTORY, Expression):
+        return [_describe_expression(member, members)]
+    return []
+
+
+def _describe_list(member: Any, words: Words) -> str:
+    """Return the kind of list, with that of its entries where they are numbers or texts."""
+    inner = [one for one in get_args(member) if one is not Ellipsis]
+    if not _EXPECTED.get(inner[0]):
+        return "a list"
+    return f"a list of {_expected(inner[:1], words).removeprefix('a ')}s"
+
+
+def _describe_expression(member: Any, members: Sequence[Any]) -> str:
+    """Return of what an expression may be."""
+    if member == HISTORY:
+        return "an expression of t"
+    return "an expression" if float in members else "expressions of x, y, z, t, one per dimension"

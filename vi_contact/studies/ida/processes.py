@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -103,24 +103,9 @@ class Processes:
         """Yield the row of each run as it ends, None when more is done; run what a dead process has
         left one by one."""
         for _ in range(ATTEMPTS):
-            left, said = list(runs), []
-            process = self._started(runs)
-            for line in process.stdout or ():
-                found = _read(line)
-                if "ended" in found:
-                    one = runs[found["ended"]]
-                    left.remove(one)
-                    yield one.keep(found["said"], found["status"])
-                elif "share" in found:
-                    self.shares[process] = found["share"] * len(runs)
-                    yield None
-                else:
-                    said.append(line)
-            process.wait()
-            with self._lock:
-                self._going.discard(process)
-                if self._stopped.is_set():
-                    raise KeyboardInterrupt
+            process, left = self._started(runs), list(runs)
+            said = yield from self._follow(process, runs, left)
+            self._forget(process)
             self.shares[process] = len(runs) - len(left)
             if process.returncode == os.EX_TEMPFAIL:
                 raise OutOfTime(f"{self._end.words} {AGAIN}")
@@ -132,6 +117,32 @@ class Processes:
                 yield from self.rows([one])
         elif runs:
             yield runs[0].keep("".join(said), process.returncode)
+
+    def _follow(
+        self, process: subprocess.Popen[str], runs: Sequence[OneRun], left: list[OneRun]
+    ) -> Generator[Row | None, None, list[str]]:
+        """Yield what a process tells, take runs that end from those left, return other lines."""
+        said = []
+        for line in process.stdout or ():
+            found = _read(line)
+            if "ended" in found:
+                one = runs[found["ended"]]
+                left.remove(one)
+                yield one.keep(found["said"], found["status"])
+            elif "share" in found:
+                self.shares[process] = found["share"] * len(runs)
+                yield None
+            else:
+                said.append(line)
+        return said
+
+    def _forget(self, process: subprocess.Popen[str]) -> None:
+        """Wait for the end of a process; KeyboardInterrupt where all were told to stop."""
+        process.wait()
+        with self._lock:
+            self._going.discard(process)
+            if self._stopped.is_set():
+                raise KeyboardInterrupt
 
     def _started(self, runs: Sequence[OneRun]) -> subprocess.Popen[str]:
         with self._lock:
