@@ -5,7 +5,8 @@
 >>> from vi_contact.studies import read_case
 >>> from vi_contact.studies.cases.library import located  # of the cases that ship
 >>> read_case(located("wall"), ["run.steps=10"]).tables["run"]["steps"]
-10"""
+10
+"""
 
 from ..core.lazy import lazy
 

@@ -1,10 +1,12 @@
-"""Read arithmetic of numbers and of x, y, z, t, which becomes a program for a stack of numbers;
-nothing is run as code.
+"""Read arithmetic of numbers and of x, y, z, t.
+
+It becomes a program for a stack of numbers; nothing is run as code.
 
 There are numbers, pi, brackets, + - * / ^, sqrt sin cos tan exp log abs step min max. A text is cut
 into these words; Python's parser, which runs nothing, then tells which belongs to which. Texts have
 at most 500 characters, brackets in each other 20 deep and exponents that are numbers up to 100, so
-that an evaluation is at most 500 products of arrays."""
+that an evaluation is at most 500 products of arrays.
+"""
 
 import ast
 import re
@@ -43,11 +45,13 @@ _OF_MORE: _Functions = {"min": np.minimum, "max": np.maximum}
 
 @dataclass(frozen=True)
 class Expression:
-    """Hold arithmetic of these variables; step(a) is 1 from a = 0 on and 0 before. InputError says
-    what is wrong.
+    """Hold arithmetic of these variables; step(a) is 1 from a = 0 on and 0 before.
+
+    InputError says what is wrong.
 
     Called with the time and values of the other variables, which may be arrays, it returns its own;
-    NaN where there is none, as of the root of a negative number."""
+    NaN where there is none, as of the root of a negative number.
+    """
 
     text: str
     variables: str = ""
@@ -157,8 +161,10 @@ class Places:
 
 
 def check_axes(node: Any, d: int, source: str) -> None:
-    """Raise InputError where what a case holds is an expression, or some, of a coordinate beyond d
-    dimensions."""
+    """Raise InputError where an expression has a coordinate beyond d dimensions.
+
+    What a case holds may be one expression or several.
+    """
     of = node.of if isinstance(node, Places) else node
     for one in of if isinstance(of, tuple) else (of,):
         if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):

@@ -24,7 +24,8 @@ class Words:
     choices: of every type that tables can make, by the word after ``type``; default: where it may
     be left out; groups: types that are named groups of the mesh; short: the one key that a plain
     text stands for; allowed: the packages whose classes may be named; named: nodes by type and
-    name; by "contact" the groups of contact tables."""
+    name; by "contact" the groups of contact tables.
+    """
 
     folder: Path
     choices: Mapping[Any, Mapping[str, Callee]]
@@ -36,8 +37,10 @@ class Words:
 
 
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
-    """Return the node of a value for a parameter with this hint. InputError when it does not
-    fit."""
+    """Return the node of a value for a parameter with this hint.
+
+    InputError when it does not fit.
+    """
     members = members_of(hint)
     if any(
         is_path(member) for member in members
@@ -192,8 +195,10 @@ def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) 
 def _chosen(
     word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot: Spot, words: Words
 ) -> Callee:
-    """Return what the ``type`` of a table calls: one of the choices, or a class of others of these
-    kinds."""
+    """Return what the ``type`` of a table calls.
+
+    It is one of the choices, or a class of others of these kinds.
+    """
     if isinstance(word, str) and ":" in word:
         return own_class(word, kinds, words.allowed, spot)
     if word is None:
@@ -204,8 +209,10 @@ def _chosen(
 
 
 def choices_of(member: Any, words: Words) -> Mapping[str, Callee]:
-    """Return what a table may make for this type: as listed, or an object of the value class
-    itself."""
+    """Return what a table may make for this type.
+
+    It is as listed, or an object of the value class itself.
+    """
     if member in words.choices:
         return words.choices[member]
     if isinstance(member, type) and is_dataclass(member) and member not in words.groups:
