@@ -247,7 +247,7 @@ def matching(points: Array, others: Array) -> Indices:
 def inverse(matrix: Array) -> Callable[[Array], Array]:
     """Return b -> matrix⁻¹ b.
 
-    It uses Cholesky's factors or, for a matrix of the unsymmetric form, by LU factors.
+    It uses Cholesky's factors or, for a matrix of the unsymmetric form, LU factors.
     """
     if max_abs(matrix - matrix.T) > ASYMMETRIC * max_abs(matrix):
         return partial(lu_solve, lu_factor(matrix))

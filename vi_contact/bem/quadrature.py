@@ -297,7 +297,7 @@ def _on_one_element(
 
 
 def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
-    """Return the piecesof [0, 1] that the last front has reached.
+    """Return the pieces of [0, 1] that the last front has reached.
 
     They are as those of ``pieces``. Here r is x times a distance.
     """

@@ -98,7 +98,7 @@ def _info(options: argparse.Namespace) -> str:
 
 
 def _told(record: Record) -> str:
-    """Return the table of a recordand where its data come from.
+    """Return the table of a record, and where its data come from.
 
     These are its units, its time step and its number of samples.
     """

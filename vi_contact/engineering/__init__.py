@@ -1,9 +1,12 @@
 """Answer what engineers ask of a run: resultants, racking, floor spectra, peaks, frequencies.
 
 ``Resultants`` and ``Racking`` record; the functions take the ``history`` of a run:
-docs/guide/outputs.md; ``checks`` compare it with formulas: docs/guide/checks.md. >>> import numpy
-as np >>> from vi_contact.engineering import hysteresis >>> hysteresis({"u": np.array([0.0, 1.0,
-2.0]), "F": np.array([0.0, 3.0, 6.0])}, "u", "F").work array([0. , 1.5, 6. ])
+docs/guide/outputs.md; ``checks`` compare it with formulas: docs/guide/checks.md.
+
+>>> import numpy as np
+>>> from vi_contact.engineering import hysteresis
+>>> hysteresis({"u": np.array([0.0, 1.0, 2.0]), "F": np.array([0.0, 3.0, 6.0])}, "u", "F").work
+array([0. , 1.5, 6. ])
 """
 
 from ..core.lazy import lazy

@@ -230,7 +230,7 @@ def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, 
 
 
 def _folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
-    """Tell which curved cells of entitiesare folded.
+    """Tell which curved cells of entities are folded.
 
     They are in this order; a folded one has Jacobians of both signs at points of quadrature.
     """

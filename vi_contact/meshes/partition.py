@@ -14,7 +14,7 @@ Ranks = npt.NDArray[np.int32]
 
 
 def halve(centres: Array, n: int) -> Ranks:
-    """Return the ownerof each of the points (n_points, d).
+    """Return the owner of each of the points (n_points, d).
 
     It is 0 to n - 1; shares are equal but for one point.
     """

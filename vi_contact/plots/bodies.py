@@ -180,7 +180,7 @@ def plot_deformed(
     magnified: float | None = None,
     title: str = "Deformed bodies",
 ) -> Path:
-    """Draw the deformed bodies of a runin the frames next to ``times`` [s].
+    """Draw the deformed bodies of a run in the frames next to ``times`` [s].
 
     They are coloured by von Mises stress.
 

@@ -71,7 +71,7 @@ def length_unit(size: float) -> tuple[float, str]:
 
 
 def scaled(values: Array, unit: str) -> tuple[Array, str]:
-    """Return the values over the power of 1000 , and the unit with its prefix.
+    """Return the values over the power of 1000, and the unit with its prefix.
 
     The power is the one that fits their size; "-" has no prefix.
     """

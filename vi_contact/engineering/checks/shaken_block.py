@@ -89,7 +89,7 @@ class NewmarkBlock(Check):
 
 @dataclass(frozen=True, kw_only=True)
 class Housner(Check):
-    """Expect the largest angle of a uniform block , or the time of its first impact.
+    """Expect the largest angle of a uniform block, or the time of its first impact.
 
     The block has this width and height [m].
 

@@ -8,7 +8,7 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the title of the national networkor its columns stand in the header.
+    """Tell whether the title of the national network, or its columns stand in the header.
 
     Of the columns, the count counts too.
     """

@@ -111,7 +111,7 @@ def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | No
 
 
 def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float] | None, int]:
-    """Return the line of NPTS and NPTSand that of DT and DT.
+    """Return the line of NPTS and NPTS, and that of DT and DT.
 
     They are None where they are not stated. With them comes the index of the first data line.
     """

@@ -45,7 +45,7 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
 
 
 def _is_mark(size: float) -> bool:
-    """Tell whether a number is made of nines onlyor is huge.
+    """Tell whether a number is made of nines only or is huge.
 
     At least three of the nines stand before the point.
     """
