@@ -1,5 +1,6 @@
-"""Compute rod and Timoshenko beam of Ahn (2012): contact and friction at the tip, with numpy and
-scipy only.
+"""Compute rod and Timoshenko beam of Ahn (2012).
+
+There are contact and friction at the tip, with numpy and scipy only.
 
 ``run_beam`` follows the source; demos/beam/contract.py makes of both problems for any scheme and solver:
 docs/theory/beam.md.
