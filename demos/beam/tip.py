@@ -49,7 +49,9 @@ class ExactFriction:
 
 @dataclass(frozen=True)
 class RegularisedFriction:
-    """Solve (7.9) by Newton's method from s = 0, the equation multiplied by the root:
+    """Solve (7.9) by Newton's method from s = 0.
+
+    The equation is multiplied by the root:
 
         F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
 

@@ -199,5 +199,5 @@ def contact_layer(
 
 
 def _rebound(layer: Layer, mass: float, speed: float, metric: Metric) -> float:
-    """e of a rigid body."""
+    """Return e of a rigid body."""
     return passage(layer, mass, speed, metric, rtol=1e-8).contacts[0].restitution

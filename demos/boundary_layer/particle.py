@@ -63,7 +63,7 @@ class ParticleImpact:
 
     @property
     def _time(self) -> float:
-        """m V/(a k), the unit of T [s]."""
+        """Return m V/(a k), the unit of T [s]."""
         return self.mass * self.speed / (self.layer.a * self.layer.k)
 
     @property

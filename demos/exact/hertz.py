@@ -54,7 +54,9 @@ def contact_radius(*radii: float) -> float:
 
 @dataclass(frozen=True)
 class HertzPoint:
-    """Describe spheres pressed with `force` F:
+    """Describe spheres pressed with `force` F.
+
+    The contact has
 
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
         approach = a²/R,   F = (4/3) E* sqrt(R) approach^(3/2)

@@ -65,7 +65,7 @@ def plot_snapshots(
 
 
 def _moment(t: float) -> str:
-    """t with its unit."""
+    """Return t with its unit."""
     return f"t = {1e3 * t:.4g} ms" if 0.0 < t < 0.1 else f"t = {t:.4g} s"
 
 

@@ -42,7 +42,7 @@ class Push:
         attributes(self, positive=("height", "rise"))
 
     def __call__(self, t: float) -> float:
-        """[m]"""
+        """Return the push [m] at time t [s]."""
         return (
             self.height * math.sin(0.5 * math.pi * t / self.rise) ** 2
             if 0.0 < t < 2.0 * self.rise
