@@ -243,7 +243,10 @@ def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
 
 
 def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) -> None:
-    """Draw snapshots with friction, tractions of both methods, energies with and without friction."""
+    """Draw snapshots with friction.
+
+    Tractions of both methods, and energies with and without friction, are drawn too.
+    """
     rows = {
         TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
         for name, laws in answers.items()

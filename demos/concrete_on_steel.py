@@ -134,7 +134,10 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Return a table of energies over time, and the end over the static solution without friction."""
+    """Return a table of energies over time.
+
+    The end is over the static solution without friction.
+    """
     columns = [f"E({1e3 * t:g} ms)" for t in TIMES]
     ends = ("energy", "corner", "force")
     lines = [

@@ -98,7 +98,10 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[Metric, ...]) -> dict[str
 def thin_limit(
     bar: Bar, widths: tuple[float, ...], metrics: tuple[Metric, ...], out: Path
 ) -> dict[str, float]:
-    """Compute the bar's foot for every width, and beside it the exact inequality on the same mesh."""
+    """Compute the bar's foot for every width.
+
+    Beside it stands the exact inequality on the same mesh.
+    """
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     name, t_end = type(case).__name__, T_END[type(case)]
     speed = (

@@ -174,7 +174,10 @@ def recorders() -> tuple[Any, ...]:
 
 
 def earthquake() -> list[vc.GroundMotion]:
-    """Return three made-up components of the motion of an outcrop of the rock, each with its seed."""
+    """Return three made-up components of the motion of an outcrop of the rock.
+
+    Each has its seed.
+    """
     ground = ground_motion.KanaiTajimi(s0=0.01)
     envelope = ground_motion.Envelope(rise=0.5, end=3.0, decay=2.0)  # [s], [1/s]
     components = []
@@ -215,7 +218,10 @@ def key_numbers(history: Any, weight: float) -> dict[str, float]:
 
 
 def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
-    """Draw all figures and, where there are not too many cells, the film around the largest uplift."""
+    """Draw all figures and the film around the largest uplift.
+
+    The film is drawn where there are not too many cells.
+    """
     run = vc.read_run(out)
     history, times = run.history, pictures.instants(run.history)
     pictures.plot_motions(history, out / "motions.png", weight=weight, mu=MU)

@@ -70,7 +70,10 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def published(count: int, dt: float, out: Path) -> dict[str, float]:
-    """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with READING."""
+    """Run the source's beam under every reading of its normal force.
+
+    Figs. 8.1 to 8.9 are drawn with READING.
+    """
     steps, forces = round(T_END / dt), readings(dt)
     numbers, drawn = {}, {}
     print(

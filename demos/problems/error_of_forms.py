@@ -247,7 +247,10 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
 
 
 class Differences:
-    """Give squared energy norms of differences of solutions, over that of the finest symmetric one."""
+    """Give squared energy norms of differences of solutions.
+
+    They are over that of the finest symmetric one.
+    """
 
     def __init__(self, norm: Norm, keys: list[tuple[str, int]]) -> None:
         self._norm, self._keys = norm, keys

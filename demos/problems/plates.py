@@ -44,7 +44,10 @@ class Plate:
 
 
 def square_mesh(comm: Any, side: float, cells: int) -> Any:
-    """Return so many squares along the side of a square around 0 [m], each cut into four triangles."""
+    """Return so many squares along the side of a square around 0 [m].
+
+    Each is cut into four triangles.
+    """
     half, crossed = 0.5 * side, dolfinx.mesh.DiagonalType.crossed
     ghosts = dolfinx.mesh.GhostMode.shared_facet  # edges between ranks are integrated too
     return dolfinx.mesh.create_rectangle(

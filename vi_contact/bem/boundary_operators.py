@@ -175,7 +175,10 @@ def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int
 
 
 def joined_at_nodes(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
-    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes; the end axis goes."""
+    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes.
+
+    The end axis goes.
+    """
     start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
     before = np.empty_like(mesh.after)
     before[mesh.after] = np.arange(len(before))
@@ -188,7 +191,10 @@ def tensor(m: NDArray) -> NDArray:
 
 
 def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
-    """Return (k, m) integrands of the operators at d = x - y, in the order their methods read them."""
+    """Return (k, m) integrands of the operators at d = x - y.
+
+    They come in the order their methods read them.
+    """
     xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
     g1, g2 = kernels.single
     rows = [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]

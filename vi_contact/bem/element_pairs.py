@@ -1,4 +1,7 @@
-"""Pair boundary elements, each pair once, with the distances that decide how they are integrated."""
+"""Pair boundary elements, each pair once.
+
+The pairs have the distances that decide how they are integrated.
+"""
 
 from copy import copy
 

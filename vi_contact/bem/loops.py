@@ -1,4 +1,7 @@
-"""Check closed loops of segments: which way round they run, what they enclose, whether they cross."""
+"""Check closed loops of segments.
+
+They are checked for which way round they run, what they enclose and whether they cross.
+"""
 
 import numpy as np
 
@@ -65,7 +68,10 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
 
 
 def check_simple(points: Array, after: Indices) -> None:
-    """Raise InputError when two elements cross, or a node lies on an element of which it is no end."""
+    """Raise InputError when two elements cross.
+
+    It does so too when a node lies on an element of which it is no end.
+    """
     a, b, index = points, points[after], np.arange(len(points))
     distance = distances(points[:, None], a, b)
     distance[index, index] = distance[after, index] = np.inf

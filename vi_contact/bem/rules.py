@@ -31,7 +31,10 @@ def smoothed(n: int) -> tuple[Array, Array]:
 
 @lru_cache
 def graded(n: int) -> tuple[Array, Array]:
-    """Return the Gauss rule after the substitution w³(10 - 15w + 6w²), for the logarithm at r = 0."""
+    """Return the Gauss rule after the substitution w³(10 - 15w + 6w²).
+
+    The rule is for the logarithm at r = 0.
+    """
     x, w = gauss(n)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * w * (x * (1.0 - x)) ** 2
 

@@ -1,4 +1,7 @@
-"""Measure the racking of a frame: the shear of four corner points, which no rigid rotation changes."""
+"""Measure the racking of a frame.
+
+It is the shear of four corner points, which no rigid rotation changes.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -205,7 +205,10 @@ def record_info(record: Record) -> str:
 
 
 def _period_in_words(period: Callable[[Record], float], record: Record) -> str:
-    """Return a period [s], or why the record has none: all else of the table is told all the same."""
+    """Return a period [s], or why the record has none.
+
+    All else of the table is told all the same.
+    """
     try:
         return f"{period(record):.3g} s"
     except InputError as error:  # "name: why; remedy"

@@ -61,8 +61,7 @@ class Grid:
 
 
 def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
-    """Add structured meshes to the current model as discrete entities with named physical groups.
-    """
+    """Add structured meshes to the current model as discrete entities with named physical groups."""
     model, first = gmsh.model, 1  # tag of the first node
     for grid in grids:
         points, cells, faces = grid.numbered()

@@ -96,7 +96,10 @@ def direction(way: Array) -> str:
 
 @dataclass(frozen=True)
 class Painter:
-    """Draw on faces: colours by ``norm`` and ``cmap`` of values times ``factor``, named ``label``."""
+    """Draw on faces.
+
+    The colours are by ``norm`` and ``cmap`` of values times ``factor``, named ``label``.
+    """
 
     norm: Any
     cmap: Any

@@ -1,4 +1,7 @@
-"""Read text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in gal."""
+"""Read text files of AFAD (Türkiye).
+
+They have "KEY : value" lines, then three columns N-S, E-W, U-D in gal.
+"""
 
 from ...core.errors import InputError
 from ..record import Record

@@ -132,7 +132,10 @@ def _is_words(line: str) -> bool:
 def _header(
     text: TextFile, header: list[int], lines: list[int], rows: list[list[float]]
 ) -> tuple[list[int], list[int], list[list[float]], _Found]:
-    """Return the lines of the header, those of the numbers, the numbers, and what the header says."""
+    """Return the lines of the header, those of the numbers, the numbers.
+
+    With them comes what the header says.
+    """
     found = _Found()
     ours = next((index for index in header if _OURS.match(text.heads[index])), None)
     if ours is not None and (match := _OURS.match(text.heads[ours])):

@@ -84,7 +84,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def begins_blocks(text: TextFile) -> bool:
-    """Tell whether one of the first lines announces a block of samples with its format or its step."""
+    """Tell whether one of the first lines announces a block of samples.
+
+    It does so with its format or its step.
+    """
     lines = [
         (index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()
     ]

@@ -198,7 +198,10 @@ def _first(text: TextFile, header: range, pattern: re.Pattern[str], what: str) -
 
 
 def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: float) -> None:
-    """Raise InputError unless the step agrees with the one among the reals, and with the duration."""
+    """Raise InputError unless the step agrees with the one among the reals.
+
+    It has to agree with the duration too.
+    """
     index = part.start + TEXT_LINES + INTEGER_LINES + STEP // PER_LINE
     column = STEP % PER_LINE
     word = text.lines[index][WIDTH * column : WIDTH * (column + 1)].strip()

@@ -110,7 +110,10 @@ def _line(error: BaseException) -> str:
 
 
 def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
-    """Return the call, which looks up what only objects show, and tells errors of the constructor."""
+    """Return the call, which looks up what only objects show.
+
+    It tells errors of the constructor.
+    """
 
     def made(**given: Any) -> Any:
         try:
@@ -142,7 +145,10 @@ def is_protocol(kind: Any) -> bool:
 
 
 def defect(cls: type, kind: Any) -> str:
-    """Return what a class lacks to be of this kind, "has no method …"; empty when it lacks nothing."""
+    """Return what a class lacks to be of this kind, "has no method …".
+
+    It is empty when it lacks nothing.
+    """
     if not is_protocol(kind):
         return "" if issubclass(cls, kind) else f"is no {kind.__name__}"
     methods = dict(_asked(kind, isfunction))

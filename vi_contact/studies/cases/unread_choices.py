@@ -156,7 +156,10 @@ def _ratios(part: Part) -> Iterator[Finding]:
 
 
 def _without_contact(part: Part) -> Iterator[Finding]:
-    """Yield laws of contact where there is none, or none that they act on, or another before them."""
+    """Yield laws of contact where there is none.
+
+    It yields them too where there is none that they act on, or another before them.
+    """
     surfaces = part.calls("contact")
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
