@@ -1,4 +1,7 @@
-"""Write a mesh to a file, for example: ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``."""
+"""Write a mesh to a file.
+
+An example is ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``.
+"""
 
 import argparse
 import sys

@@ -5,12 +5,14 @@ They come from radial kernels of either domain, for density 1.
 With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in
 docs/theory/bem.md; nothing is worse than a logarithm on a closed curve):
 
-    V p  = ∫ G p                                                                                  single layer
-    K u  = ∫ dPhi_S/dn_y u - Phi_S M u + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u              double layer
-    <K' p, v> = <p, K v>                                                                         adjoint
-    <D u, v> = ∫∫ - [inertia_P (n_x.v)(n_y.u) + inertia_S (tau_x.v)(tau_y.u)] - 4 mu Phi_S u'.v' + 4 mu² Mv.G Mu
+    V p  = ∫ G p                                                                  single layer
+    K u  = ∫ dPhi_S/dn_y u - Phi_S M u                                            double layer
+           + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u
+    <K' p, v> = <p, K v>                                                          adjoint
+    <D u, v> = ∫∫ - [inertia_P (n_x.v)(n_y.u) + inertia_S (tau_x.v)(tau_y.u)]     hypersingular
+                - 4 mu Phi_S u'.v' + 4 mu² Mv.G Mu
                + 2 mu [(v.Mu) dPhi_S/dn_x + (u.Mv) dPhi_S/dn_y]
-               + 2 mu [(n_x.v) grad_x(Phi_P - Phi_S).Mu + (n_y.u) grad_y(Phi_P - Phi_S).Mv]      hypersingular
+               + 2 mu [(n_x.v) grad_x(Phi_P - Phi_S).Mu + (n_y.u) grad_y(Phi_P - Phi_S).Mv]
 
 in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D.
 """
@@ -81,7 +83,10 @@ class Galerkin:
         return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper))
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
-        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x) phi_b(y)."""
+        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels.
+
+        They are taken against phi_a(x) phi_b(y).
+        """
         total: NDArray = np.empty(0)
         for points in point_sets(self.pairs, fronts, self.orders):
             values = integrands(kernels(points.r), points.d, points.r)

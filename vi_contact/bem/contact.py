@@ -178,7 +178,10 @@ class BoundaryContact:
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:
-        """Refuse one condition along a mean normal at a node at which the contact boundary turns."""
+        """Refuse one condition along a mean normal.
+
+        It is one at a node at which the contact boundary turns.
+        """
         turns, points = self.compliance.turns, self.compliance.points
         if (
             self.conditions is not None

@@ -7,8 +7,9 @@ constants, which is collocation at the ends of the steps, the second with the ra
 displacements, which is the mean over a step. With A, B, C the operators integrated once, twice,
 three times and u_l the increment of the displacement in step l:
 
-    V^j = A_(j+1) - A_j,  K^j = (B_(j+1) - B_j)/dt,  D^j = (C_(j+1) - 2 C_j + C_(j-1))/dt²,  K'^j = (K^j - K^(j-1))ᵀ
-    sum_l V^(k-l) p_l = sum_l (K^(k-l) + M/2) u_l                                                    both forms
+    V^j = A_(j+1) - A_j,  K^j = (B_(j+1) - B_j)/dt,
+    D^j = (C_(j+1) - 2 C_j + C_(j-1))/dt²,  K'^j = (K^j - K^(j-1))ᵀ
+    sum_l V^(k-l) p_l = sum_l (K^(k-l) + M/2) u_l              both forms
     Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l = F_k          symmetric
     Mᵀ p_k                                      = F_k          unsymmetric
 

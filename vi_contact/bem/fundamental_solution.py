@@ -4,13 +4,15 @@ It is that in time, of density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S (Laplace domain),
 
-    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,        r̂ = (x - y)/r.
+    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,
+    r̂ = (x - y)/r.
 
 For another density rho divide G by rho; the functions Phi do not depend on it. In the time domain
 everything is integrated n times in time and closed (square roots, logarithms): F_n = n-fold
 integral of H(t - r/c)/sqrt(t² - r²/c²),
 
-    F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),   R = sqrt(t² - r²/c²).
+    F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),
+    R = sqrt(t² - r²/c²).
 
 Zero ahead of its front (r >= c t). See docs/theory/bem.md; n = 0: Achenbach, Wave Propagation in
 Elastic Solids, 3.10.

@@ -291,7 +291,10 @@ class Weld:
         self.contact = replace(compliance, W=W, u_free=u_free, **kept)
 
     def forces(self, contact_forces: Array) -> Array:
-        """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with them."""
+        """Return (steps, 2m): contact forces (steps, 2m_c).
+
+        With them come the weld forces that go with them.
+        """
         everything = np.zeros((len(contact_forces), len(self._welded)))
         everything[:, self._touching] = contact_forces
         if self._welded.any():

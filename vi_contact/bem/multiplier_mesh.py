@@ -6,7 +6,8 @@ The mixed form of Aimi, Di Credico, Gimperlein (Comput. Methods Appl. Mech. Engr
 117066): lambda is a polynomial on patches of whole elements, discontinuous between them, and
 constant in intervals of whole steps. With its functions psi_p and hats phi_i of the displacement,
 
-    <lambda, v> = sum_p R_p sum_i B_ip v_i,   B_ip = ∫ phi_i psi_p / ∫ psi_p,   R_p = lambda_p ∫ psi_p
+    <lambda, v> = sum_p R_p sum_i B_ip v_i,
+    B_ip = ∫ phi_i psi_p / ∫ psi_p,   R_p = lambda_p ∫ psi_p
 
 with forces R [N/m] of patches and means Bᵀ u over them. The second line is tested by patch and
 interval: the mean of u_n - g, the increment of u_t (the dot of the source stands on the tangential

@@ -3,8 +3,10 @@
 The algorithm is Uzawa's, of Aimi, Di Credico and Gimperlein (2024), with FFT.
 
     solve     v = v_free + W * lam                      all steps at once
-    project   r <- Pr_C(r + rho (v_n - gap, slip)),     Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
-    until     |Pr_C(r + rho_1 (v_n - gap, slip)) - r| <= tolerance |r|,   rho_1 = 1/lambda_max(W[0]), whatever rho is
+    project   r <- Pr_C(r + rho (v_n - gap, slip)),
+              Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
+    until     |Pr_C(r + rho_1 (v_n - gap, slip)) - r| <= tolerance |r|,
+              rho_1 = 1/lambda_max(W[0]), whatever rho is
 
 The normal multiplier meets the gap at the end of each step, the tangential one the slip of the
 step; F is Tresca's threshold or Coulomb's limit of the r_n just found. rho = 1/lambda_max(W[0]) by

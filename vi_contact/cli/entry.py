@@ -12,9 +12,9 @@ from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
 from .ida import add_ida_commands
 
-_DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks every time step.
-Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with -vi_contact_volume_ go to PETSc, for example
--vi_contact_volume_snes_monitor."""
+_DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks
+every time step. Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with
+-vi_contact_volume_ go to PETSc, for example -vi_contact_volume_snes_monitor."""
 _PETSC = "-vi_contact_"
 
 

@@ -6,7 +6,8 @@ With the contact direction n of a point (from the body to its obstacle), its tan
 reactions of the body on the support, the force on the body at a point X is f = -r_n n - r_t t. Over
 the points of a part, about its centre c:
 
-    uplift = 1 - L_contact / L (by weight),    F = sum f,    M = sum (X - c) x f   (anticlockwise positive)
+    uplift = 1 - L_contact / L (by weight),    F = sum f,
+    M = sum (X - c) x f   (anticlockwise positive)
     N = -F·n̄ (compression positive),  T = F·t̄,  e = M / N,    height = sum r_n (X - c)·up / sum r_n
 
 n̄ is the mean direction of the part by weight, t̄ = (-n̄_y, n̄_x), up the last axis. On level
@@ -22,7 +23,8 @@ theta x (X - c) whose normal displacements fit those of the part best, by weight
 say nothing about: a level base does not tell how it turns about the vertical. ``Resultants`` adds
 what a report asks of a part:
 
-    level = h / H,    sliding = (sum w slip / sum w)·t̄,    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
+    level = h / H,    sliding = (sum w slip / sum w)·t̄,
+    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
 
 h is the height of the thrust above the lowest point of the part, H the height of the part;
 pressure_low and pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's

@@ -23,7 +23,10 @@ UNITS = {
 """Name the accepted units of acceleration, and give their size in m/s²."""
 
 LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
-"""Peak acceleration [m/s²] beyond which units are doubted: the strongest ground motions on record reach half of it."""
+"""Peak acceleration [m/s²] beyond which units are doubted.
+
+The strongest ground motions on record reach half of it.
+"""
 
 
 @dataclass(frozen=True, eq=False)

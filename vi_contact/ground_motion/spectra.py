@@ -21,10 +21,16 @@ from ..core.errors import InputError
 from .record import Record
 
 PER_PERIOD, PER_STEP = 64, 4
-"""The response is looked at this often in a period of the oscillator, or in a step of the record, whatever is more."""
+"""The response is looked at this often in a period of the oscillator, or in a step of the record.
+
+What counts is whatever is more.
+"""
 
 SHORTEST, MOST = 1000, 10**10
-"""Steps of the record in the shortest period that is looked at, at most; and samples times periods, at most."""
+"""Steps of the record in the shortest period that is looked at, at most.
+
+The second number is that of samples times periods, at most.
+"""
 
 _SMALL, _TERMS = (
     0.3,

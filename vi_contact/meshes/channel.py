@@ -85,7 +85,10 @@ class ChannelMesh:
 
     @property
     def x(self) -> tuple[float, ...]:
-        """Return the ends of the layer, outer and inner sides of the walls, from left to right [m]."""
+        """Return the ends of the layer, outer and inner sides of the walls.
+
+        They go from left to right [m].
+        """
         left = 0.5 * (self.width - self.outer_width) if self.left is None else self.left
         right = left + self.outer_width
         return 0.0, left, left + self.wall, right - self.wall, right, self.width

@@ -31,7 +31,10 @@ from vi_contact.meshes.rows import (
 
 Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]
-"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements, and the entity (n,) that holds each."""
+"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements.
+
+With them comes the entity (n,) that holds each.
+"""
 
 
 @dataclass(frozen=True, eq=False)

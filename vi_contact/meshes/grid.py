@@ -61,7 +61,10 @@ class Grid:
 
 
 def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
-    """Add structured meshes to the current model as discrete entities with named physical groups."""
+    """Add structured meshes to the current model as discrete entities.
+
+    They get named physical groups.
+    """
     model, first = gmsh.model, 1  # tag of the first node
     for grid in grids:
         points, cells, faces = grid.numbered()

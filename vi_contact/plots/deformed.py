@@ -67,7 +67,10 @@ class StoredFrames:
 
     @cached_property
     def bodies(self) -> Indices:
-        """Return the number (c,) of the body of each cell: cells that share nodes are of one body."""
+        """Return the number (c,) of the body of each cell.
+
+        Cells that share nodes are of one body.
+        """
         count, corners = self.cells.shape
         links = (
             np.repeat(np.arange(count), corners),

@@ -181,6 +181,9 @@ class SoilCurves:
         )
 
     def at(self, strain: Array) -> tuple[Array, Array]:
-        """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its values."""
+        """Return (G/Gmax, damping ratio) at these shear strains.
+
+        Beyond the last strain there are its values.
+        """
         place, known = np.log(np.maximum(strain, self.strain[0])), np.log(self.strain)
         return np.interp(place, known, self.reduction), np.interp(place, known, self.damping)

@@ -3,7 +3,8 @@
 Linear elements between given heights, two displacement components at every node: shear waves move
 x, pressure waves y,
 
-    rho u_x'' = (G u_x,y),y    rho u_y'' = ((lambda + 2 G) u_y,y),y    sigma_xy = G u_x,y    sigma_xx = lambda u_y,y
+    rho u_x'' = (G u_x,y),y    rho u_y'' = ((lambda + 2 G) u_y,y),y
+    sigma_xy = G u_x,y    sigma_xx = lambda u_y,y
 
 and with damping C = alpha M + beta K the stresses get beta times those of the velocity. It is what
 a strip of finite elements does whose sides move together, to the last digit: linear elements of

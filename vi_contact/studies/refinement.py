@@ -75,7 +75,10 @@ def _same(run: RunFolder, name: str) -> bool:
 
 
 def _halved(folder: RunFolder, name: str) -> Iterator[str]:
-    """Yield the settings that halve elements or time steps, of the same duration, without fields."""
+    """Yield the settings that halve elements or time steps.
+
+    The runs have the same duration and no fields.
+    """
     tables, dt = read_copy(folder.folder), folder.facts.get("dt")
     if "fields" in tables:
         yield "fields="

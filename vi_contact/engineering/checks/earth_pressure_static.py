@@ -73,7 +73,10 @@ class EarthPressure(Check):
         raise NotImplementedError
 
     def numbers(self, history: History) -> Numbers:
-        """Compare N, or its height: that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2."""
+        """Compare N, or its height.
+
+        The height is that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2.
+        """
         factor, why = self.coefficient()
         slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
         laden = (

@@ -272,8 +272,8 @@ def _is_series(
         remedy = (
             "pass dt= in seconds, and channel= for one of the columns, or write one value a line"
             if width < 4
-            else "pass dt= in seconds where the rows follow one another, and channel= too where the "
-            "columns are components"
+            else "pass dt= in seconds where the rows follow one another, and channel= too where "
+            "the columns are components"
         )
         raise InputError(
             f"{text.at(lines[0])}: {width} columns instead of 2, and none is a time ({names}); "

@@ -269,7 +269,10 @@ def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int
 
 
 def _component(text: TextFile, block: Block) -> str:
-    """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
+    """Return the direction of the channel, such as "90 Deg" or "UP".
+
+    It comes from the text of its header.
+    """
     named = (
         _FROM.split(match[2], maxsplit=1)[0].split()
         for _, match in _found(text, block.header, _CHANNEL)

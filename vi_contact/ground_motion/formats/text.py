@@ -26,8 +26,10 @@ from ..record import UNITS, Record, canonical_units
 from .gaps import refuse_fill_values
 
 NUMBER = r"[+-]?(?:(?<![\d.])\d++(?:\.\d*+)?|(?<!\d)\.\d++)(?:[EeDd][+-]?\d++)?"
-"""Regular expression of one Fortran or C number: 1, -1., .5, -.123E-02, 1.0D+3. It begins in no middle of digits, so
-that a search takes a time that grows as the line does."""
+"""Regular expression of one Fortran or C number: 1, -1., .5, -.123E-02, 1.0D+3.
+
+It begins in no middle of digits, so that a search takes a time that grows as the line does.
+"""
 
 HEAD = 1000  # characters of a line in which words of a header are looked for
 BYTES = 20 * LARGEST  # of a file: the text of the most numbers that an input may hold
@@ -356,7 +358,10 @@ class TextFile:
         return found
 
     def entry(self, header: Entries, key: str) -> tuple[int, str]:
-        """Return the line and the value of a header's key; InputError where it is missing or empty."""
+        """Return the line and the value of a header's key.
+
+        It raises InputError where the key is missing or empty.
+        """
         if not header.get(key, (0, ""))[1]:
             raise InputError(f"{self.path}: the header does not give {key}; get the complete file")
         return header[key]

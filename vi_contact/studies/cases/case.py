@@ -6,8 +6,8 @@ interface.
 [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
 [material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
 [system]          fem.assemble                         [run]      the other arguments of simulate
-[[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
-[friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
+[[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
+[friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
 [[stage]]  what replaces these tables in stages that follow one another
 """
 

@@ -198,7 +198,10 @@ def _supports(space: Any) -> Iterator[dict[str, Any]]:
 def _contact(
     case: Any, problem: ContactProblem, tags: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the parts of the contact, one for each table: by its name, or by those of its groups."""
+    """Yield the parts of the contact, one for each table.
+
+    Each goes by its name, or by those of its groups.
+    """
     surface, tables = problem.surface, case.nodes.get("contact", ())
     nodes = tables if isinstance(tables, tuple) else (tables,)
     grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]

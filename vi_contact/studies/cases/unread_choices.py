@@ -107,7 +107,10 @@ def refuse_unread(
 
 
 def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
-    """Yield materials that no stage's [system] names, for cells or for what is behind a boundary."""
+    """Yield materials that no stage's [system] names.
+
+    They are for cells or for what is behind a boundary.
+    """
     named = tables.get("material")
     for name in named if isinstance(named, Mapping) else ():
         users = [
@@ -225,7 +228,10 @@ def _of_solvers(part: Part) -> Iterator[Finding]:
 
 
 def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -> Iterator[Finding]:
-    """Yield keys of the condensed solver without effect; ``rubs``: the law of friction, or empty."""
+    """Yield keys of the condensed solver without effect.
+
+    ``rubs`` is the law of friction, or empty.
+    """
     if rubs and "method" in keys:
         yield (
             table,

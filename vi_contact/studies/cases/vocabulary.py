@@ -172,7 +172,10 @@ def weight(
     direction: tuple[float, ...] | None = None,
     cells: Cells | None = None,
 ) -> SemiDiscreteSystem:
-    """Return the system ``with_weight``; cells: a group of whole bodies, which alone have weight."""
+    """Return the system ``with_weight``.
+
+    ``cells`` is a group of whole bodies, which alone have weight.
+    """
     bodies = None if cells is None else fem.bodies_of(system, cells)
     return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
 

@@ -7,7 +7,8 @@ and Cornell, Earthquake Engng Struct. Dyn. 31, 2002). Its runs tell between whic
 it lies: a = 0 where already the lowest passes, b infinite where none does. Capacities are taken as
 lognormal with median theta and dispersion beta, and records as independent:
 
-    P(passed | x) = Phi(ln(x/theta)/beta),   L(theta, beta) = prod_i [Phi(ln(b_i/theta)/beta) - Phi(ln(a_i/theta)/beta)]
+    P(passed | x) = Phi(ln(x/theta)/beta),
+    L(theta, beta) = prod_i [Phi(ln(b_i/theta)/beta) - Phi(ln(a_i/theta)/beta)]
 
 theta and beta make L largest; ln L is concave in 1/beta and ln(theta)/beta (Burridge, J. R. Stat.
 Soc. B 43, 1981), so there is one such place. Intervals come from the second derivatives of ln L
