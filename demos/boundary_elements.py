@@ -97,10 +97,12 @@ class Answer(NamedTuple):
 
     @property
     def energy(self) -> np.ndarray:
+        """Return the energies of the boundary elements."""
         return np.sum([motion.work for _, motion in self.bodies], axis=0)
 
     @property
     def fem_energy(self) -> np.ndarray:
+        """Return the energies of the finite elements."""
         return self.fem["energy_kinetic"] + self.fem["energy_strain"]
 
     @property

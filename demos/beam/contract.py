@@ -132,6 +132,7 @@ class StepForces:
         array("StepForces", "forces", self.forces, (None,), unit="N")
 
     def __call__(self, t: float) -> float:
+        """Return the force [N] of the step that contains t [s]."""
         number("StepForces", "t", t, unit="s")
         step = math.floor(t / self.dt + 1e-6)
         if not 0 <= step < len(self.forces):

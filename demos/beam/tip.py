@@ -31,7 +31,8 @@ class Slip:
 class TipFriction(Protocol):
     """Solve the scalar equation: what every friction at the tip offers."""
 
-    def solve(self, c: float, g: float, limit: float) -> Slip: ...
+    def solve(self, c: float, g: float, limit: float) -> Slip:
+        """Return the slip of a step."""
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ class Ellipsoid:
             sized("Ellipsoid", "a semi-axis of the ellipsoid", float(length), "m")
 
     def __call__(self, nu: Array) -> Array:
+        """Return the point for the plane's normal nu in the body frame."""
         squares = np.asarray(self.axes, dtype=float) ** 2
         return np.asarray(-squares * nu / np.sqrt(nu @ (squares * nu)))
 

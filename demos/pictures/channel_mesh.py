@@ -220,6 +220,7 @@ def plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple
 
 
 def filled(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
+    """Draw cells in a colour."""
     from matplotlib.collections import PolyCollection
 
     axis.add_collection(

@@ -199,6 +199,7 @@ class Openings:
     sides: Mapping[str, Mask]
 
     def columns(self) -> Columns:
+        """Return the columns with units and meanings."""
         return {
             f"opening_{side}": ("m", f"largest gap of the contact side '{side}'")
             for side in self.sides
@@ -207,9 +208,11 @@ class Openings:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
+        """Return the row of the initial state."""
         return self._row(problem.surface, state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.problem.surface, report.new)
 
     def _row(self, surface: ContactSurface, state: State) -> dict[str, Any]:

@@ -28,7 +28,8 @@ class Sides(Protocol):
     """
 
     @property
-    def firm(self) -> bool: ...
+    def firm(self) -> bool:
+        """Tell whether the sides hold static loads."""
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
@@ -101,6 +102,7 @@ class Rollers:
     component: int = 1
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {
             "prescribed": [
                 Prescribed(tags[end], components=(self.component,), **motion) for end in ENDS
@@ -115,6 +117,7 @@ class Fixed:
     firm: ClassVar[bool] = True
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {"prescribed": [Prescribed(tags[end], **motion) for end in ENDS]}
 
 
@@ -128,6 +131,7 @@ class TiedSides:
     firm: ClassVar[bool] = True
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {"tied": [Tied(tags["left_side"], tags["right_side"])]}
 
 
@@ -141,6 +145,7 @@ class DashpotSides:
     firm: ClassVar[bool] = False
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {"dashpots": [Dashpots(tags[end]) for end in ENDS]}
 
 
@@ -156,5 +161,6 @@ class FreeFieldSides:
     base: Excitation | Sequence[Excitation] | BaseMotion | RockBelow = field(repr=False)
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         base = self.base.absorber(tags) if isinstance(self.base, RockBelow) else self.base
         return {"dashpots": [FreeField(tags[end], base=base) for end in ENDS]}

@@ -216,6 +216,7 @@ class Rocking:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:

@@ -46,10 +46,12 @@ class BodyOperator(Protocol):
     """
 
     @property
-    def mesh(self) -> BoundaryMesh: ...
+    def mesh(self) -> BoundaryMesh:
+        """Return the mesh of the boundary."""
 
     @property
-    def dt(self) -> float: ...
+    def dt(self) -> float:
+        """Return the time step [s]."""
 
     def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
         """Return the shape of nodal forces given in so many dimensions."""

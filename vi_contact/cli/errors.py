@@ -51,6 +51,7 @@ class Parser(argparse.ArgumentParser):
     """Parse as argparse does, with sentences that stay short where a word is long."""
 
     def error(self, message: str) -> NoReturn:
+        """Print usage and message, and end the program."""
         super().error(
             shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …")
         )

@@ -94,6 +94,7 @@ class Racking:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:

@@ -337,6 +337,7 @@ class Resultants:
         return lambda points, normals: found
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:

@@ -76,6 +76,7 @@ class FreeField(Dashpots):
 
     @property
     def expects(self) -> str:
+        """Return in words which motion it expects."""
         if self.ground.lets_waves_in:
             return "expects the upgoing motion of the compliant base"
         return "expects the motion of the rigid base itself (within motion)"

@@ -41,6 +41,7 @@ class UpgoingVelocity:
         self._a, self._v = [excitation.acceleration(0.0)], [0.0]
 
     def __call__(self, t: float) -> Array:
+        """Return v_up (d,) [m/s] at time t [s]."""
         t = max(t, 0.0)
         k = int(t / self.dt)
         while len(self._v) < k + 2:

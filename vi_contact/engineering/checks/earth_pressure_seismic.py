@@ -62,6 +62,7 @@ class MononobeOkabe(Coulomb):
     kv: float = 0.0
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
+        """Return K (1 - kv) under gravity turned by psi [rad] and the earthquake, and why none."""
         found, why = super().coefficient(psi + math.atan(self.kh / (1.0 - self.kv)))
         return found * (1.0 - self.kv), why
 
@@ -125,6 +126,7 @@ class Wood(_Layer):
     length: float | None = None
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
+        """Return the largest Q [N/m], its height [m], and why there is none."""
         factor, arm = smooth_wall(
             self.nu, 20.0 if self.length is None else self.length / self.height
         )
@@ -154,6 +156,7 @@ class VeletsosYounan(_Layer):
     damping: float = 0.05
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
+        """Return the largest Q [N/m], its height [m], and why there is none."""
         steps, lowest = len(t) - 1, 0.5 * math.pi * self.c_s / self.height
         dt = float(t[-1] - t[0]) / steps
         count = 2 * steps + math.ceil(

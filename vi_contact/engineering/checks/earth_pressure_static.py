@@ -111,6 +111,7 @@ class AtRest(EarthPressure):
     nu: float
 
     def coefficient(self) -> tuple[float, str]:
+        """Return K, and why there is none."""
         return self.nu / (1.0 - self.nu), ""
 
 
@@ -128,6 +129,7 @@ class Rankine(EarthPressure):
     passive: bool = False
 
     def coefficient(self) -> tuple[float, str]:
+        """Return K, and why there is none."""
         along = (
             -self.slope if self.passive else self.slope
         )  # the soil slides up: the same lines, friction turned round
@@ -155,6 +157,7 @@ class Coulomb(EarthPressure):
     passive: bool = False
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
+        """Return K under gravity turned by psi [rad], and why there is none."""
         most, sign = (0.5 * self.phi, "+") if self.passive else (self.phi, "-")
         k = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
         why = "the ground is steeper than phi" if abs(self.slope) > self.phi else ""

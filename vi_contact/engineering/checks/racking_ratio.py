@@ -54,6 +54,7 @@ class RackingRatio(Check):
     free: str = "free_field"
 
     def numbers(self, history: History) -> Numbers:
+        """Return both numbers, and why they cannot be compared."""
         shear = [history[f"racking_{one}"] for one in (self.box, self.free)]
         box, free = (float(np.abs(one - one[0]).max()) for one in shear)
         ratio = flexibility(

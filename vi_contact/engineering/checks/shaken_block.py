@@ -65,6 +65,7 @@ class NewmarkBlock(Check):
     vertical: str = "a_g_y"
 
     def numbers(self, history: History) -> Numbers:
+        """Return both numbers, and why they cannot be compared."""
         along, up = history[self.acceleration], history[self.vertical] + self.gravity
         sine, cosine = math.sin(self.slope), math.cos(self.slope)
         normal, drive = up * cosine + along * sine, up * sine - along * cosine
@@ -133,6 +134,7 @@ class Housner(Check):
         return angles
 
     def numbers(self, history: History) -> Numbers:
+        """Return both numbers, and why they cannot be compared."""
         t, angle, alpha = history["t"], history[self.theta], math.atan(self.width / self.height)
         ground = np.array([history[self.acceleration], self.gravity + history[self.vertical]])
         start = float(angle[0]) if abs(angle[0]) > ROUNDED * alpha else 0.0

@@ -1,7 +1,7 @@
 """Read PEER .AT2 files: a few header lines with NPTS and DT, then the samples row by row.
 
-Variants met in the wild and all read here: `NPTS=  1559, DT= .02000 SEC` with or without
-filter data after it, `3930 0.00500 NPTS, DT`, NPTS and DT on lines of their own, before or behind a line
+Variants met in the wild and all read here: `NPTS=  1559, DT= .02000 SEC` with or without filter
+data after it, `3930 0.00500 NPTS, DT`, NPTS and DT on lines of their own, before or behind a line
 `*** Begin data ***`, and files without NPTS whose data start after such a line, the time step
 standing only in a sentence. Any number of values per row; the last row may be short and lack its
 line end. What the header says twice must agree.

@@ -81,6 +81,7 @@ class Expression:
         return frozenset(one for one in self.program if isinstance(one, str))
 
     def __call__(self, t: float = 0.0, **places: Any) -> Any:
+        """Return the value at time t [s] and these values of the other variables."""
         return _run(self.program, {"t": t, **places})
 
     def _program(self, node: Any, depth: int) -> Iterator[Any]:
@@ -151,6 +152,7 @@ class Places:
     of: Expression | tuple[Expression, ...]
 
     def __call__(self, points: Array, t: float = 0.0) -> Array:
+        """Return the values (k,) or (k, n) at points (k, d) [m] and time t [s]."""
         check_axes(self, points.shape[1], "the expression")
         places = dict(zip("xyz", points.T, strict=False))
         if isinstance(self.of, tuple):

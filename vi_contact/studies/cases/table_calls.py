@@ -68,6 +68,7 @@ class Group:
     alias: str = ""
 
     def build(self, context: Context) -> Any:
+        """Return the group of the mesh."""
         try:
             found = context["tags"][self.name]
         except InputError as error:
@@ -149,6 +150,7 @@ class Call:
     spot: Spot = field(compare=False)
 
     def build(self, context: Context) -> Any:
+        """Return what the call makes."""
         lacking = [name for name in self.callee.given if name not in context]
         if lacking:
             raise self.spot.inside(

@@ -206,6 +206,8 @@ def heterogeneous(
     rho: float | Expression,
     xi: float | Expression = 0.0,
 ) -> Heterogeneous:
+    """Make a heterogeneous material."""
+
     def of(value: float | Expression) -> Any:
         return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
 
@@ -213,6 +215,7 @@ def heterogeneous(
 
 
 def analytic_gap(function: Expression) -> core.AnalyticGap:
+    """Make a ``core.AnalyticGap``."""
     return core.AnalyticGap(Places(function))
 
 
@@ -251,6 +254,7 @@ def compliant_base(
     normal: float = 1.0,
     tangential: float = 1.0,
 ) -> CompliantBase:
+    """Make a ``fem.CompliantBase``."""
     return CompliantBase(facets, material, normal, tangential, motion=motion)
 
 
