@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Compare every reading of the normal force of Ahn (2012) with both statements that its text makes
-on the results.
+"""Compare every reading of the normal force of Ahn (2012) with its statements.
+
+There are two statements that its text makes on the results.
 
 The text prints the normal force incompletely, so that it can be read in three ways. It states that
 larger contact forces cause more oscillations of the tip, and that friction takes little energy
@@ -34,8 +35,10 @@ OUT = Path("results/beam_statements")
 
 
 def main(quick: bool = False, as_json: bool = False, out: Path = OUT) -> list[Row]:
-    """Run all readings (``quick``: 50 elements, steps of 10 ms); print and draw their table; return
-    its rows."""
+    """Run all readings (``quick``: 50 elements, steps of 10 ms).
+
+    Their table is printed and drawn; its rows are returned.
+    """
     count, dt = (50, 0.01) if quick else (ELEMENTS, DT)
     rows = [row(reading, a2, count=count, dt=dt) for a2 in VISCOSITIES for reading in "ABC"]
     if as_json:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Let an elastic bar bounce on a rigid wall, and compare every time scheme with the exact solution
-in one figure.
+"""Let an elastic bar bounce on a rigid wall.
+
+Every time scheme is compared with the exact solution in one figure.
 
 The bar is clamped at its top and released from a compressed state; its foot strikes the wall at t =
 1, 4, 7 and so on, for one unit of time each, under a constant force. Its energy is constant. Time
@@ -51,8 +52,10 @@ OUT = Path("results/bouncing_bar")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all schemes (``quick``: one bounce, 40 elements); return energies and forces over the
-    exact ones."""
+    """Run all schemes (``quick``: one bounce, 40 elements).
+
+    It returns energies and forces over the exact ones.
+    """
     comm = MPI.COMM_WORLD
     bar = replace(BAR, elements=40) if quick else BAR
     model = build(bar, comm)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Solve the examples of Aimi, Di Credico and Gimperlein (2024) by space-time boundary elements,
-beside finite elements.
+"""Solve the examples of Aimi, Di Credico and Gimperlein (2024).
+
+They are solved by space-time boundary elements, beside finite elements.
 
 The examples are a pressed square, concrete on steel, concrete in concrete, and a tennis ball on a
 moving plane. Boundary elements have unknowns on the boundary only, and they share no matrix with
@@ -84,8 +85,10 @@ OUT = Path("results/boundary_elements")
 
 
 class Answer(NamedTuple):
-    """Hold one law of one example by boundary elements and by finite elements (``fem``: its
-    history)."""
+    """Hold one law of one example by boundary elements and by finite elements.
+
+    ``fem`` has the history of the latter.
+    """
 
     run: bem.ContactRun
     bodies: tuple[tuple[bem.BoundaryProblem, bem.BoundaryMotion], ...]
@@ -94,10 +97,12 @@ class Answer(NamedTuple):
 
     @property
     def energy(self) -> np.ndarray:
+        """Return the energies of the boundary elements."""
         return np.sum([motion.work for _, motion in self.bodies], axis=0)
 
     @property
     def fem_energy(self) -> np.ndarray:
+        """Return the energies of the finite elements."""
         return self.fem["energy_kinetic"] + self.fem["energy_strain"]
 
     @property
@@ -107,8 +112,10 @@ class Answer(NamedTuple):
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all examples and laws; return energies and impulses of both methods, iterations of Uzawa,
-    certificates."""
+    """Run all examples and laws.
+
+    It returns energies and impulses of both methods, iterations of Uzawa, and certificates.
+    """
     comm = MPI.COMM_WORLD
     sizes, cells = (QUICK, QUICK_CELLS) if quick else (ELEMENTS, CELLS)
     answers, numbers = {}, {}
@@ -150,8 +157,10 @@ def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
 
 
 def boundary_elements(name: str, size: int) -> tuple[bem.BoundaryContact, Any, float]:
-    """Return (contact, its motion from the contact forces, dt): c_P dt = h, 4 h for the slow loads,
-    h for the ball."""
+    """Return (contact, its motion from the contact forces, dt).
+
+    For these c_P dt = h, 4 h for the slow loads, h for the ball.
+    """
     box = square.concrete()
     data = {"steel": box, "concrete": box}.get(name, square.Square(pressure=1.0))
     pressure = partial(pressure_of, data)
@@ -225,8 +234,10 @@ def results(answer: Answer) -> dict[str, float]:
 
 
 def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
-    """Run the source's iteration on a window of steps at once (all by default): how often, how far
-    from the march."""
+    """Run the source's iteration on a window of steps at once (all by default).
+
+    It tells how often, and how far from the march.
+    """
     settings = bem.SpaceTimeUzawa(tolerance=1e-9 if window else 1e-8, window=window)
     found = settings.solve(run.contact)
     off = np.abs(found.forces - run.forces).max() / np.abs(run.forces).max()
@@ -234,8 +245,10 @@ def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
 
 
 def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) -> None:
-    """Draw snapshots with friction, tractions of both methods, energies with and without
-    friction."""
+    """Draw snapshots with friction.
+
+    Tractions of both methods, and energies with and without friction, are drawn too.
+    """
     rows = {
         TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
         for name, laws in answers.items()
@@ -309,8 +322,10 @@ def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
 
 
 def tractions(name: str, law: str, answer: Answer, times: Sequence[float]) -> tuple[Panel, Panel]:
-    """Return panels of pressure and of shear (support on body, along +x) over x in the steps that
-    end at some times."""
+    """Return panels of pressure and of shear over x.
+
+    They are those of the support on the body, along +x, in the steps that end at some times.
+    """
     panels = []
     for quantity, both in zip(("pressure", SHEAR), answer.tractions, strict=True):
         curves = []

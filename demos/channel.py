@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Shake a channel buried in soil on bedrock by a harmonic earthquake: Figs. 6 to 9 of the boundary
-method.
+"""Shake a channel buried in soil on bedrock by a harmonic earthquake.
+
+See Figs. 6 to 9 of the boundary method.
 
 The soil may let go of both walls and of the base of the channel, but not enter it. After a gravity
 stage the same motion is run three times: sliding freely, with Coulomb friction, and bilateral, the
@@ -63,8 +64,10 @@ RUNS = {
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Make all runs (``quick``: 40 steps, 4 of them by both routes); return the key numbers in SI
-    units."""
+    """Make all runs (``quick``: 40 steps, 4 of them by both routes).
+
+    It returns the key numbers in SI units.
+    """
     comm = MPI.COMM_WORLD
     model = build(CHANNEL, comm)
     dt, histories, numbers = CHANNEL.time_step(), {}, {}
@@ -122,8 +125,10 @@ def folder(out: Path, name: str) -> Path:
 
 
 def key_numbers(history: History) -> dict[str, float]:
-    """Return openings of the walls' tops and feet, how often both walls' are open, rocking, largest
-    pressure."""
+    """Return openings, rocking and largest pressure.
+
+    The openings are those of the walls' tops and feet; it says how often both walls' are open.
+    """
     left, right = (
         pictures.opening(history, "19", (-1.0, 0.0)),
         pictures.opening(history, "13", (1.0, 0.0)),

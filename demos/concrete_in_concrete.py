@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Press down a box of concrete in the notch of a concrete block: two elastic bodies in frictional
-contact.
+"""Press down a box of concrete in the notch of a concrete block.
+
+They are two elastic bodies in frictional contact.
 
 4 MPa tanh((t/15 ms)²) act on the top of the 1 m box; its lower half is in the notch. It widens as
 it is pressed and leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the
@@ -45,9 +46,11 @@ OUT = Path("results/concrete_in_concrete")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run both, with the default scheme (``quick``: 8 cells, steps of 0.25 ms); return energies
-    [J], work of friction [J], shares of the load that floor and walls carry at the end,
-    certificates and defects."""
+    """Run both, with the default scheme (``quick``: 8 cells, steps of 0.25 ms).
+
+    It returns energies [J], work of friction [J], shares of the load that floor and walls carry at
+    the end, certificates and defects.
+    """
     comm = MPI.COMM_WORLD
     model = build(Embedded(concrete(8 if quick else CELLS)), comm)
     dt = 2.5 * DT if quick else DT
@@ -111,8 +114,10 @@ def draw(histories: Mapping[str, History], out: Path, ground: float) -> None:
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Return a table of energies over time; at the end the work of friction and the shares of the
-    load."""
+    """Return a table of energies over time.
+
+    At the end there are the work of friction and the shares of the load.
+    """
     energies = [f"E({1e3 * t:g} ms)" for t in TIMES]
     columns = (*energies, "friction", "floor", "walls")
     lines = [f"{'energies [J], shares of load':<30}" + "".join(f"{name:>11}" for name in columns)]

@@ -43,9 +43,11 @@ OUT = Path("results/concrete_on_steel")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run both, with the default scheme (``quick``: steps of 0.25 ms); return energies [J], the
-    last ones of energy, corner and force over their static values without friction, certificates
-    and defects."""
+    """Run both, with the default scheme (``quick``: steps of 0.25 ms).
+
+    It returns energies [J], the last ones of energy, corner and force over their static values
+    without friction, certificates and defects.
+    """
     comm = MPI.COMM_WORLD
     model = build(BOX, comm)
     dt = 5.0 * DT if quick else DT
@@ -87,8 +89,11 @@ def folder(out: Path, name: str) -> Path:
 
 
 def static(box: Square, t: float) -> tuple[float, float, float]:
-    """Return (energy f²a²/(2E') [J/m], displacement of the corner ½ nu (1 + nu) f a/E [m], force f
-    a [N/m]) of the box in equilibrium without friction, E' = E/(1 - nu²)."""
+    """Return (energy f²a²/(2E') [J/m], displacement, force) without friction.
+
+    The displacement is that of the corner, ½ nu (1 + nu) f a/E [m], the force is f a [N/m], for the
+    box in equilibrium; E' = E/(1 - nu²).
+    """
     material, side = box.material, box.side
     f = box.pressure * (box.history(t) if box.history else 1.0)
     plane = material.E / (1.0 - material.nu**2)
@@ -129,8 +134,10 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
 
 
 def table(numbers: Mapping[str, float]) -> str:
-    """Return a table of energies over time, and the end over the static solution without
-    friction."""
+    """Return a table of energies over time.
+
+    The end is over the static solution without friction.
+    """
     columns = [f"E({1e3 * t:g} ms)" for t in TIMES]
     ends = ("energy", "corner", "force")
     lines = [

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Replace the exact inequality by a boundary layer: for a stiff block, an elastic bar and the
-shaken wall.
+"""Replace the exact inequality by a boundary layer.
+
+It is done for a stiff block, an elastic bar and the shaken wall.
 
 The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown
 at a rigid wall with 10 m/s, then it falls and bounces under gravity. In thinner and thinner layers
@@ -52,8 +53,10 @@ OUT = Path("results/contact_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run block, bar, wall (``quick``: one restitution, two wide layers, one metric, a period);
-    return the key numbers."""
+    """Run block, bar, wall (``quick``: one restitution, two wide layers, one metric, a period).
+
+    It returns the key numbers.
+    """
     comm = MPI.COMM_WORLD
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
@@ -95,8 +98,10 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[Metric, ...]) -> dict[str
 def thin_limit(
     bar: Bar, widths: tuple[float, ...], metrics: tuple[Metric, ...], out: Path
 ) -> dict[str, float]:
-    """Compute the bar's foot for every width, and beside it the exact inequality on the same
-    mesh."""
+    """Compute the bar's foot for every width.
+
+    Beside it stands the exact inequality on the same mesh.
+    """
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     name, t_end = type(case).__name__, T_END[type(case)]
     speed = (
@@ -154,8 +159,10 @@ def thin_limit(
 def shaken_wall(
     widths: tuple[float, ...], steps: int, periods: float, out: Path
 ) -> dict[str, float]:
-    """Run case b of the wall: how far its contact points are from those of the midpoint rule with
-    gap >= 0."""
+    """Run case b of the wall.
+
+    It tells how far its contact points are from those of the midpoint rule with gap >= 0.
+    """
     model = wall.build(wall.Wall(), MPI.COMM_WORLD, base_inertia="catalogue")
     exact = model.problem("b", impact=None, mass=vc.ConsistentMass())
     concrete, dt = model.wall.material, 1.0 / (model.harmonic().frequency * steps)

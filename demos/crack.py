@@ -60,9 +60,11 @@ OUT = Path("results/crack")
 
 
 class Bar:
-    """Hold a strip without lateral displacement: displacement u along it, damage d; ``held``:
-    whether d = 0 at its ends. ``rounds`` of the staggered iteration, and the ``worst`` certificate,
-    so far."""
+    """Hold a strip without lateral displacement: displacement u along it, damage d.
+
+    ``held`` says whether d = 0 at its ends. ``rounds`` of the staggered iteration, and the
+    ``worst`` certificate, so far.
+    """
 
     def __init__(self, comm: Any, across: int, held: bool) -> None:
         self.comm, self.across, self.rounds, self.worst = comm, across, 0, 0.0
@@ -122,8 +124,10 @@ class Bar:
         return found[0], found[1], found[2]
 
     def crack_alone(self) -> float:
-        """Let all damage heal but that of broken nodes, without load; return the surface energy
-        over Gc H."""
+        """Let all damage heal but that of broken nodes, without load.
+
+        It returns the surface energy over Gc H.
+        """
         self.u.x.array[:] = 0.0
         self.before.x.array[:] = self.d.x.array > BROKEN
         vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
@@ -131,8 +135,10 @@ class Bar:
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
-    """Run both bars (``quick``: half the cells, and the second one breaks at once); return stresses
-    and energies."""
+    """Run both bars (``quick``: half the cells, and the second one breaks at once).
+
+    It returns stresses and energies.
+    """
     comm, numbers = MPI.COMM_WORLD, {}
     strain, stress = critical(WIDTH)
     even = Bar(comm, 2, held=False)

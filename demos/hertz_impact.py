@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Throw a steel ball on a rigid plane, and compare elastic finite elements with Hertz' quasi-static
-theory.
+"""Throw a steel ball on a rigid plane.
+
+Elastic finite elements are compared with Hertz' quasi-static theory.
 
 A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microseconds, with up to
 145 N on a spot of a third of a millimetre, and rebounds with its full speed. The model is a quarter
@@ -38,8 +39,11 @@ COLUMNS = ("approach", "duration", "force", "rebound", "certificate", "ledger de
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all meshes (``quick``: the first, half the steps); return approach, duration, force and
-    rebound over those of the theory, certificate and ledger defect, by mesh."""
+    """Run all meshes (``quick``: the first, half the steps).
+
+    It returns approach, duration, force and rebound over those of the theory, certificate and
+    ledger defect, by mesh.
+    """
     comm = MPI.COMM_WORLD
     curves, numbers = {}, {}
     for cells in MESHES[:1] if quick else MESHES:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Stretch a membrane over a ball, a field with a lower bound, and compare it with the exact
-solution on five meshes.
+"""Stretch a membrane over a ball, a field with a lower bound.
+
+It is compared with the exact solution on five meshes.
 
 The membrane is held at the height of the exact solution along the sides of a square, and lies on
 the ball within the radius 0.69797, which is not known beforehand. The problem consists of a form of
@@ -36,8 +37,10 @@ OUT = Path("results/obstacle")
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
-    """Solve on all meshes (``quick``: the three coarse ones); return errors, the contact radius,
-    the force."""
+    """Solve on all meshes (``quick``: the three coarse ones).
+
+    It returns errors, the contact radius and the force.
+    """
     comm, known, numbers = MPI.COMM_WORLD, Membrane(), {}
     meshes = CELLS[:3] if quick else CELLS
     drawn = None

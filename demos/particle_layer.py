@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Throw a particle on a wall with a boundary layer: Figs. 1, 2 and 3 of the paper on b-geometry
-(ENOC 2017).
+"""Throw a particle on a wall with a boundary layer.
+
+See Figs. 1, 2 and 3 of the paper on b-geometry (ENOC 2017).
 
 There is no impact law. The particle slows down in a thin layer before the wall, by Newton's law in
 a metric that grows without bound there, and comes back. Restitution and duration are results in
@@ -42,8 +43,10 @@ OUT = Path("results/particle_layer")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Make table and figures (``quick``: one k in the table, one a/b below 1); return the key
-    numbers."""
+    """Make table and figures (``quick``: one k in the table, one a/b below 1).
+
+    It returns the key numbers.
+    """
     out.mkdir(parents=True, exist_ok=True)
     numbers = table(STIFFNESSES[2:3] if quick else STIFFNESSES)
     plot_particle(
@@ -72,8 +75,10 @@ def impact(k: float, c: float) -> ParticleImpact:
 
 
 def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
-    """Print restitution, duration and compression of all pairs: closed form, and its distance from
-    integration."""
+    """Print restitution, duration and compression of all pairs.
+
+    They are in closed form, with its distance from integration.
+    """
     numbers, worst = {}, 0.0
     print("     k      c        e      e_p(f̂)   t_c [s]    t_f [s]  x_min [m]")
     for k in stiffnesses:

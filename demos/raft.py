@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Shake a building on a raft on soil in all three directions: it lifts off at its edges and
-corners, and slides.
+"""Shake a building on a raft on soil in all three directions.
+
+It lifts off at its edges and corners, and slides.
 
 The two bodies have tetrahedra that do not match, with Coulomb friction between them. There are
 three stages, as in practice. In the first, gravity acts on a firm base. In the second, the base is
@@ -86,8 +87,10 @@ def main(
     progress: bool = True,
     steps: int | None = None,
 ) -> dict[str, float]:
-    """Run all three stages (``quick``: 3e3 unknowns, 150 steps of 10 ms) and draw; return the key
-    numbers."""
+    """Run all three stages (``quick``: 3e3 unknowns, 150 steps of 10 ms) and draw.
+
+    It returns the key numbers.
+    """
     comm = MPI.COMM_WORLD
     dt, t_end = (1e-2, 1.5) if quick else (DT, T_END)
     steps = round(t_end / dt) if steps is None else steps
@@ -127,8 +130,10 @@ def meshed(finer: float, comm: Any) -> tuple[Any, Any]:
 
 
 def problems(mesh: Any, tags: Any) -> tuple[vc.ContactProblem, vc.ContactProblem]:
-    """Return the gravity stage on a firm base, and the dynamic problem on a base that lets waves in
-    and out."""
+    """Return the gravity stage on a firm base, and the dynamic problem.
+
+    The base of the latter lets waves in and out.
+    """
     cells = [(tags["soil"], SOIL), (tags["building"], CONCRETE)]
     tied = [
         fem.Tied(tags[f"soil_{one}"], tags[f"soil_{two}"])
@@ -151,22 +156,28 @@ def problems(mesh: Any, tags: Any) -> tuple[vc.ContactProblem, vc.ContactProblem
 
 
 def stages(finer: float, comm: Any, solver: Any = None) -> tuple[vc.ContactProblem, vc.State]:
-    """Return (dynamic problem with the reactions of the firm base as forces, its first state, at
-    rest)."""
+    """Return (dynamic problem, its first state).
+
+    The problem has the reactions of the firm base as forces; the state is at rest.
+    """
     static, problem = problems(*meshed(finer, comm))
     return fem.release(static, vc.static_equilibrium(static, solver=solver), problem)
 
 
 def recorders() -> tuple[Any, ...]:
-    """Return what is recorded: energies, contact, forces and rotation of the raft, histories of
-    points."""
+    """Return what is recorded.
+
+    That is energies, contact, forces and rotation of the raft, and histories of points.
+    """
     raft = engineering.Resultants("raft", (0.0, 0.0, 0.0))
     return vc.Energy(), vc.Contact(), raft, vc.Probe(POINTS, velocity=True, acceleration=True)
 
 
 def earthquake() -> list[vc.GroundMotion]:
-    """Return three made-up components of the motion of an outcrop of the rock, each with its
-    seed."""
+    """Return three made-up components of the motion of an outcrop of the rock.
+
+    Each has its seed.
+    """
     ground = ground_motion.KanaiTajimi(s0=0.01)
     envelope = ground_motion.Envelope(rise=0.5, end=3.0, decay=2.0)  # [s], [1/s]
     components = []
@@ -207,8 +218,10 @@ def key_numbers(history: Any, weight: float) -> dict[str, float]:
 
 
 def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
-    """Draw all figures and, where there are not too many cells, the film around the largest
-    uplift."""
+    """Draw all figures and the film around the largest uplift.
+
+    The film is drawn where there are not too many cells.
+    """
     run = vc.read_run(out)
     history, times = run.history, pictures.instants(run.history)
     pictures.plot_motions(history, out / "motions.png", weight=weight, mu=MU)

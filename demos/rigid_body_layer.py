@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Throw a spinning rigid body on a plane with a boundary layer: second example of the paper on
-b-geometry (ENOC 2017).
+"""Throw a spinning rigid body on a plane with a boundary layer.
+
+It is the second example of the paper on b-geometry (ENOC 2017).
 
 The first body has one contact point. Its motion through thinner and thinner layers tends to the
 impact map of rigid body dynamics. The second body is an ellipsoid that tumbles down on the plane.

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Rock a block on its corners: Housner's rigid block (1963) as the stiff limit of a finite element
-body.
+"""Rock a block on its corners.
+
+It is Housner's rigid block (1963) as the stiff limit of a finite element body.
 
 A concrete block, 0.4 m wide and 2 m high, is tilted and let go; then it stands on a ground that
 moves. Its contact is two points, the corners of its base. Housner had to assume the loss of energy
@@ -50,8 +51,10 @@ OUT = Path("results/rocking_block")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run free rocking and ground pulses (``quick``: two impacts, steps of 4 ms); return the key
-    numbers."""
+    """Run free rocking and ground pulses (``quick``: two impacts, steps of 4 ms).
+
+    It returns the key numbers.
+    """
     comm = MPI.COMM_WORLD
     model = rocking.build(BLOCK, comm)
     dt = (
@@ -92,8 +95,10 @@ def run(
 def free_rocking(
     model: rocking.RockingModel, dt: vc.HalvedAtImpact, t_end: float, out: Path, progress: bool
 ) -> dict[str, float]:
-    """Release the block from RELEASE alpha: beside the rigid one, in Housner's kinematics and in
-    small displacements."""
+    """Release the block from RELEASE alpha.
+
+    It stands beside the rigid one, in Housner's kinematics and in small displacements.
+    """
     theta0 = RELEASE * SHAPE.alpha
     solution = run(model.problem, model, model.tilted(theta0), dt, t_end, out / "free", progress)
     history = solution.history
@@ -144,8 +149,10 @@ def free_rocking(
 def pulses(
     model: rocking.RockingModel, dt: vc.HalvedAtImpact, out: Path, progress: bool
 ) -> dict[str, float]:
-    """Return the shake by slow pulses around g b/h and rectangular ones around the shortest that
-    overturns."""
+    """Return the shake by slow pulses and rectangular ones.
+
+    The slow ones are around g b/h, the rectangular ones around the shortest that overturns.
+    """
     unit = SHAPE.onset_acceleration
     shortest = SHAPE.overturning_time(STRENGTH * SHAPE.gravity * SHAPE.alpha)
     lifted, turned, numbers = {}, {}, {"onset": model.onset_acceleration}

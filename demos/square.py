@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Press a square on a rigid support without friction, with Tresca's and with Coulomb's friction, by
-finite elements.
+"""Press a square on a rigid support by finite elements.
+
+There is no friction, Tresca's or Coulomb's.
 
 This is the first example of the space-time boundary elements.
 
@@ -51,8 +52,10 @@ OUT = Path("results/square")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run every friction law with every scheme (``quick``: 10 cells, default scheme); return
-    energies, work of friction, certificates and defects."""
+    """Run every friction law with every scheme (``quick``: 10 cells, default scheme).
+
+    It returns energies, work of friction, certificates and defects.
+    """
     comm = MPI.COMM_WORLD
     model = build(replace(SQUARE, cells=10) if quick else SQUARE, comm)
     dt = model.square.time_step

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Press beams, a frame and plates on rigid stops and on the ground, and throw them at stops, beside
-closed forms.
+"""Press beams, a frame and plates on rigid stops and on the ground.
+
+They are thrown at stops too; all stand beside closed forms.
 
 Contact needs only M, K and loads of a body. Here they are cubic beam elements as scipy matrices,
 and thin plates by a form of DOLFINx. Every static problem is solved on the condensed route and on
@@ -42,8 +43,10 @@ OUT = Path("results/structures")
 
 
 def solved(problem: vc.ContactProblem, both: bool = True) -> tuple[Any, float, float]:
-    """Return the equilibrium, how far the two routes differ (0 for one alone), and the residual of
-    the answer."""
+    """Return the equilibrium, how far the two routes differ, and the residual.
+
+    The difference is 0 for one route alone; the residual is that of the answer.
+    """
     if not both:
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
         return state, 0.0, posed.residual(problem, state)
@@ -95,8 +98,7 @@ def beam_on_the_ground(numbers: dict[str, float], shown: Shown, counts: tuple[in
 def plates_on_stops(
     comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]
 ) -> None:
-    """Press a simply supported square and a clamped disk on a stop at the middle, and over a
-    gap."""
+    """Press a simply supported square and a clamped disk on a stop at the middle, and over a gap."""
     for name, disk in (("square", False), ("disk", True)):
         for share in (0.0, 0.5):
             errors = []

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Push a disk up with a plane, gently, and let it fly: the tennis ball of the space-time boundary
-elements.
+"""Push a disk up with a plane, gently, and let it fly.
+
+It is the tennis ball of the space-time boundary elements.
 
 The plane rises by 0.05 within one second and goes down again; the disk (R = 1/2, c_P = 2, c_S = 1,
 no weight) leaves it on its way down and flies up with a constant velocity and constant energy,
@@ -60,8 +61,10 @@ COLUMNS = (
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all friction laws with the default scheme (``quick``: cells of 0.1); return the columns
-    of the table."""
+    """Run all friction laws with the default scheme (``quick``: cells of 0.1).
+
+    It returns the columns of the table.
+    """
     comm = MPI.COMM_WORLD
     model = build(replace(DISK, size=0.1) if quick else DISK, comm)
     dt = model.disk.time_step

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Rub a viscoelastic Timoshenko beam on a wall with its tip: Ahn (2012), and what that scheme
-leaves out.
+"""Rub a viscoelastic Timoshenko beam on a wall with its tip.
+
+It is that of Ahn (2012), with what that scheme leaves out.
 
 First come the runs of the source with their figures 8.1 to 8.9. Their normal force is given,
 friction is regularised, and Newton's method solves a scalar equation in each step. Then the
@@ -69,8 +70,10 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def published(count: int, dt: float, out: Path) -> dict[str, float]:
-    """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with
-    READING."""
+    """Run the source's beam under every reading of its normal force.
+
+    Figs. 8.1 to 8.9 are drawn with READING.
+    """
     steps, forces = round(T_END / dt), readings(dt)
     numbers, drawn = {}, {}
     print(
@@ -133,8 +136,10 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
 
 def exact(count: int, dt: float, out: Path) -> dict[str, float]:
-    """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and
-    eps -> 0."""
+    """Run constant force and coefficient.
+
+    The inequality is solved by Algorithm 10 and by the contract, and eps -> 0.
+    """
     body, elements, start = (
         beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
         beam.Elements(count),
@@ -173,8 +178,10 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 
 
 def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float]:
-    """Run rod and beam as one contact problem, with impulses on velocities: their forces do not
-    ring."""
+    """Run rod and beam as one contact problem, with impulses on velocities.
+
+    Their forces do not ring.
+    """
     problem = rubbing_problem(
         ROD,
         beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),

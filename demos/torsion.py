@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Twist an elastic-plastic bar: find a stress function between bounds on a disk (known exactly) and
-on a square.
+"""Twist an elastic-plastic bar.
+
+Find a stress function between bounds on a disk (known exactly) and on a square.
 
 The yield condition |∇u| <= k is, for a bar without holes, the obstacle |u| <= k times the distance
 to the boundary. Where u lies on the obstacle the bar is plastic. On the disk the plastic zone and
@@ -41,8 +42,10 @@ OUT = Path("results/torsion")
 
 
 def section(comm: Any, cells: int, disk: bool) -> Any:
-    """Return a mesh of the square (-1, 1)², or of the disk that it becomes when squares around 0
-    are made circles."""
+    """Return a mesh of the square (-1, 1)², or of the disk.
+
+    It becomes the disk when squares around 0 are made circles.
+    """
     kind = dolfinx.mesh.DiagonalType.crossed if disk else dolfinx.mesh.DiagonalType.right
     on = dolfinx.mesh.create_rectangle(comm, [[-1, -1], [1, 1]], [cells, cells], diagonal=kind)
     if disk:
@@ -83,8 +86,10 @@ class Bar:
 
 
 def relaxed(cells: int, w: float, sweeps: int = 4000) -> Any:
-    """Return u at the nodes (cells + 1)² of the square by projected over-relaxation of five-point
-    differences."""
+    """Return u at the nodes (cells + 1)² of the square.
+
+    It uses projected over-relaxation of five-point differences.
+    """
     h, omega = 2.0 / cells, 2.0 / (1.0 + np.sin(np.pi / cells))
     line = np.linspace(-1.0, 1.0, cells + 1)
     x, y = np.meshgrid(line, line, indexing="ij")
@@ -106,8 +111,10 @@ def relaxed(cells: int, w: float, sweeps: int = 4000) -> Any:
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
-    """Twist both bars (``quick``: on a quarter of the cells); return torques, zones and their
-    errors."""
+    """Twist both bars (``quick``: on a quarter of the cells).
+
+    It returns torques, zones and their errors.
+    """
     comm, cells, numbers, fields = MPI.COMM_WORLD, CELLS // 2 if quick else CELLS, {}, {}
     torques: dict[str, list[float]] = {}
     for name, disk in (("disk", True), ("square", False)):
@@ -159,8 +166,10 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 
 
 def against_relaxation(points: Any, values: Any, cells: int, w: float) -> float:
-    """Return the largest difference of u on the square from finite differences: on these triangles
-    they are the same equations."""
+    """Return the largest difference of u on the square from finite differences.
+
+    On these triangles they are the same equations.
+    """
     nodes = np.rint((points[:, :2] + 1.0) * 0.5 * cells).astype(int)
     return float(np.max(np.abs(values - relaxed(cells, w)[nodes[:, 0], nodes[:, 1]])))
 

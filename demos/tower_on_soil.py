@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Shake a tower that stands on soil, lifts off and slides, above a compliant base and between
-free-field sides.
+"""Shake a tower that stands on soil, lifts off and slides.
+
+It is above a compliant base and between free-field sides.
 
 There are three stages, as in practice. In the first, gravity acts on firm supports. In the second,
 the supports are released and their reactions are kept as forces. In the third, an earthquake comes
@@ -48,8 +49,7 @@ OUT = Path("results/tower_on_soil")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key
-    numbers."""
+    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key numbers."""
     comm = MPI.COMM_WORLD
     h, dt, t_end = (2.0, 1e-2, 1.1) if quick else (1.0, DT, T_END)
     lower, upper = (

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Shake a wall beside the ground by a harmonic earthquake: Figs. 1 to 5 of the boundary method for
-dynamic contact.
+"""Shake a wall beside the ground by a harmonic earthquake.
+
+See Figs. 1 to 5 of the boundary method for dynamic contact.
 
 A concrete wall, 9 m high, is clamped at its base; on its right side it may lift off the ground but
 not enter it. Every step is solved twice, condensed to the contact points and on all unknowns, and
@@ -137,9 +138,11 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
-    """Draw Fig. 2, the wall and its points, and Fig. 1: the step of case b that presses most, as a
-    structure with its loads and one with its reactions; return by how much their sum misses the
-    answer of the step, relatively."""
+    """Draw Fig. 2, the wall and its points, and Fig. 1.
+
+    The latter is the step of case b that presses most, drawn as a structure with its loads and one
+    with its reactions; it returns by how much their sum misses the answer of the step, relatively.
+    """
     problem, most, pressed = model.problem("b", excitation=model.harmonic(AMPLITUDE)), -1.0, None
     scheme, dt = vc.ZienkiewiczWoodTaylor(phi=0.5), model.time_step()
     for state, report in vc.march(
@@ -158,8 +161,10 @@ def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
 def compare_schemes(
     model: wall_model.WallModel, case: str, steps: int, refined: int, figure: Path
 ) -> None:
-    """Run the source's scheme and impact rule beside the default scheme, which needs no rule and
-    does not ring."""
+    """Run the source's scheme and impact rule beside the default scheme.
+
+    The latter needs no rule and does not ring.
+    """
     runs = {}
     for name, impact, finer in (
         ("source's rule, its dt", vc.Inelastic(), 1),
@@ -198,8 +203,10 @@ def compare_schemes(
 
 
 def command_line(words: Sequence[str]) -> int:
-    """Run the built-in case and draw its report, both routes to every step; without --case, cases a
-    and b."""
+    """Run the built-in case and draw its report.
+
+    Both routes take every step; without --case, these are cases a and b.
+    """
     options = ArgumentParser(add_help=False, allow_abbrev=False)
     options.add_argument("--case", choices=BUILT_IN)
     options.add_argument("--out", default=str(OUT))

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Warm a wall between rigid walls, warm a bar at once, and tear a body apart, and compare with
-closed forms.
+"""Warm a wall between rigid walls, warm a bar at once, and tear a body apart.
+
+They are compared with closed forms.
 
     sigma = C (eps(u) - eps_0),     eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
 
@@ -45,8 +46,10 @@ OUT = Path("results/warming")
 
 
 def slowly(comm: MPI.Comm) -> list[tuple[float, float, float, float]]:
-    """Return (warming [K], pressure [Pa] by the condensed route, by the whole body, by the closed
-    form)."""
+    """Return (warming [K], pressure [Pa] by three ways).
+
+    They are the condensed route, the whole body, and the closed form.
+    """
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(1.0, HEIGHT), divisions=(4, 12)), comm)
     sides = [
         fem.Prescribed(tags["bottom"], components=(1,)),
@@ -79,9 +82,11 @@ def pressure(dT: float) -> float:
 def at_once(
     comm: MPI.Comm, cells: int
 ) -> tuple[dict[str, tuple[float, float]], tuple[Any, Any, Any]]:
-    """Return (computed, exact) of a bar whose right end has the gap alpha dT L to a wall, and its
-    histories: t over the crossing T = L/c, pushes of the support and of the wall over their exact
-    size."""
+    """Return (computed, exact) of a bar, and its histories.
+
+    Its right end has the gap alpha dT L to a wall. The histories are t over the crossing T = L/c,
+    pushes of the support and of the wall over their exact size.
+    """
     strain, speed = ALPHA * WARMER, float(np.sqrt(BAR.E / BAR.rho))
     crossing, push = LENGTH / speed, BAR.E * ALPHA * WARMER
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(cells,)), comm)
@@ -118,8 +123,10 @@ def at_once(
 
 
 def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
-    """Return (computed, exact) of a bar with a jump in the layer of cells behind its middle: free,
-    and held."""
+    """Return (computed, exact) of a bar with a jump in the layer of cells behind its middle.
+
+    It is free, and held.
+    """
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(8,)), comm)
     h = LENGTH / 8.0
     half = 0.5 * LENGTH
@@ -143,8 +150,10 @@ def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
 
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, tuple[float, float]]:
-    """Print and draw all comparisons (``quick``: a bar of 50 cells); return them as name ->
-    (computed, exact)."""
+    """Print and draw all comparisons (``quick``: a bar of 50 cells).
+
+    They are returned as name -> (computed, exact).
+    """
     comm = MPI.COMM_WORLD
     pressures = slowly(comm)
     numbers = {f"pressure at {dT:g} K [Pa]": (one, exact) for dT, one, _, exact in pressures}

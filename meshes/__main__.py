@@ -1,5 +1,7 @@
-"""Write a mesh to a file, for example: ``python3 meshes wall --height 9 --size 0.5 -o
-wall.msh``."""
+"""Write a mesh to a file.
+
+An example is ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``.
+"""
 
 import argparse
 import sys
@@ -23,8 +25,11 @@ SHAPES = OWN | {name.removesuffix("Mesh").lower(): one for name, one in NAMED.it
 
 
 def parser() -> argparse.ArgumentParser:
-    """Build the parser: a command for every shape, an option for each of its numbers, which its
-    docstring explains."""
+    """Build the parser.
+
+    It has a command for every shape and an option for each of its numbers, which the shape's
+    docstring explains.
+    """
     top = argparse.ArgumentParser(prog="meshes", description=__doc__)
     commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(SHAPES)}}}")
     for shape, mesh in SHAPES.items():

@@ -1,5 +1,6 @@
-"""Mesh a quarter or an eighth of a ball by tetrahedra, finest at its lowest point, which lies on or
-strikes a plane.
+"""Mesh a quarter or an eighth of a ball by tetrahedra.
+
+They are finest at its lowest point, which lies on or strikes a plane.
 
 The ball touches the plane y = 0 at the origin, its centre is (0, R, 0), and the planes x = 0 and z
 = 0 are planes of symmetry: the quarter has x >= 0 and z >= 0, the eighth also y <= R. Physical
@@ -78,16 +79,20 @@ class BallMesh:
         _add_foot(model, sphere, self.foot)
 
     def _size_field(self) -> str:
-        """Return min(coarsest, size + growth max(0, distance - foot)), written with abs: MathEval
-        has neither."""
+        """Return min(coarsest, size + growth max(0, distance - foot)).
+
+        It is written with abs, as MathEval has neither min nor max.
+        """
         beyond = f"(sqrt(x^2+y^2+z^2)-{self.foot!r})"
         wanted = f"({self.size!r}+{0.5 * self.growth!r}*({beyond}+abs({beyond})))"
         return f"0.5*({self._largest!r}+{wanted}-abs({self._largest!r}-{wanted}))"
 
 
 def _add_ball(model: Any, radius: float, eighth: bool) -> int:
-    """Add the part of the ball, its parametric poles on the x axis: away from the foot, where cells
-    are finest."""
+    """Add the part of the ball.
+
+    Its parametric poles are on the x axis, away from the foot, where cells are finest.
+    """
     turn = 0.5 * math.pi
     ball: int = model.occ.addSphere(
         0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn

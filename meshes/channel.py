@@ -1,5 +1,7 @@
-"""Write the mesh of ``vi_contact.meshes.channel`` to a file, as ``python3 meshes channel …``
-does."""
+"""Write the mesh of ``vi_contact.meshes.channel`` to a file.
+
+``python3 meshes channel …`` does so.
+"""
 
 import sys
 from pathlib import Path

@@ -1,5 +1,6 @@
-"""Mesh a disk by triangles of one size, its left half the mirror image of the right one: a ball in
-the plane.
+"""Mesh a disk by triangles of one size.
+
+Its left half is the mirror image of the right one; it is a ball in the plane.
 
 The disk touches the line y = 0 at the origin, its centre is (0, R). Physical groups: cells "disk";
 boundary "foot" (the arc within an angle of the lowest point: the contact side) and "rest".
@@ -83,8 +84,10 @@ class DiskMesh:
 
 
 def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
-    """Add the mirror images of all nodes off the axis to a surface; return image[tag], the tag
-    itself on the axis."""
+    """Add the mirror images of all nodes off the axis to a surface.
+
+    It returns image[tag], the tag itself on the axis.
+    """
     tags, points, _ = model.mesh.getNodes()
     tags, points = np.asarray(tags, dtype=int), np.reshape(points, (-1, 3))
     off = points[:, 0] > 1e-9 * float(np.max(points[:, 0]))
@@ -98,8 +101,10 @@ def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
 def _mirrored(
     model: Any, dimension: int, entity: int, kind: int, image: npt.NDArray[np.int_]
 ) -> int:
-    """Add an entity with the mirror images of the cells of another, turned round so that they stay
-    positive."""
+    """Add an entity with the mirror images of the cells of another.
+
+    These are turned round so that they stay positive.
+    """
     _, nodes = model.mesh.getElementsByType(kind, entity)
     cells = image[np.asarray(nodes, dtype=int).reshape(-1, dimension + 1)][:, ::-1]
     left: int = model.addDiscreteEntity(dimension)

@@ -1,5 +1,6 @@
-"""Mesh a building on a raft that stands on a box of soil, by tetrahedra: two bodies, each meshed
-for itself.
+"""Mesh a building on a raft that stands on a box of soil.
+
+It is meshed by tetrahedra, as two bodies, each meshed for itself.
 
 The building is one body: a raft, a hollow core of walls on it and a slab over every storey. The
 soil's surface is z = 0 with the middle of the raft at the origin. Physical groups: cells

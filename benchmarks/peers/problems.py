@@ -316,15 +316,8 @@ def main(peer: dict[str, Any]) -> None:
     np.savez(out, **{key: value for key, value in answer.items() if value is not None}, **spent)
 
 
-def lines_of(path: Path, *wanted_names: str) -> int:
-    """Count the lines of code of a problem of a peer's file: its function and what it uses of the
-    file, imports too.
-
-    What it takes of the assembly of this module counts too: a program that has no finite elements
-    needs those lines. Blank lines, comments and docstrings are not counted.
-    """
-    source = path.read_text(encoding="utf-8")
-    tree = ast.parse(source)
+def _find_parts(tree: ast.Module) -> dict[str, ast.stmt]:
+    """Return the statement of a file that defines or imports each of its names."""
     parts: dict[str, ast.stmt] = {}
     for node in tree.body:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
@@ -333,34 +326,49 @@ def lines_of(path: Path, *wanted_names: str) -> int:
             parts.update({(one.asname or one.name).split(".")[0]: node for one in node.names})
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            parts.update(
-                {
-                    name.id: node
-                    for one in targets
-                    for name in ast.walk(one)
-                    if isinstance(name, ast.Name)
-                }
-            )
-    wanted, todo, taken = set(), list(wanted_names), set()
+            named = [name for one in targets for name in ast.walk(one)]
+            parts.update({name.id: node for name in named if isinstance(name, ast.Name)})
+    return parts
+
+
+def _collect_used(parts: dict[str, ast.stmt], names: tuple[str, ...]) -> tuple[set[str], set[str]]:
+    """Return the names of the file that these names use, themselves too, and all attributes."""
+    wanted: set[str] = set()
+    todo, taken = list(names), set()
     while todo:
         name = todo.pop()
-        if name in parts and name not in wanted:
-            wanted.add(name)
-            todo += [one.id for one in ast.walk(parts[name]) if isinstance(one, ast.Name)]
-            taken.update(
-                one.attr for one in ast.walk(parts[name]) if isinstance(one, ast.Attribute)
-            )
+        if name not in parts or name in wanted:
+            continue
+        wanted.add(name)
+        nodes = list(ast.walk(parts[name]))
+        todo += [one.id for one in nodes if isinstance(one, ast.Name)]
+        taken.update(one.attr for one in nodes if isinstance(one, ast.Attribute))
+    return wanted, taken
+
+
+def _number_lines(part: ast.stmt) -> set[int]:
+    """Return the numbers of the lines of a statement, without those of docstrings."""
+    lines = set(range(part.lineno, (part.end_lineno or 0) + 1))
+    for node in ast.walk(part):
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and ast.get_docstring(node):
+            said = node.body[0]
+            lines.difference_update(range(said.lineno, (said.end_lineno or 0) + 1))
+    return lines
+
+
+def lines_of(path: Path, *wanted_names: str) -> int:
+    """Count the lines of code of a problem of a peer's file: its function and what it uses of the
+    file, imports too.
+
+    What it takes of the assembly of this module counts too: a program that has no finite elements
+    needs those lines. Blank lines, comments and docstrings are not counted.
+    """
+    source = path.read_text(encoding="utf-8")
+    parts = _find_parts(ast.parse(source))
+    wanted, taken = _collect_used(parts, wanted_names)
     lines: set[int] = set()
     for name in wanted:
-        lines.update(range(parts[name].lineno, (parts[name].end_lineno or 0) + 1))
-        for node in ast.walk(parts[name]):
-            said = getattr(node, "body", None)
-            if (
-                isinstance(node, (ast.FunctionDef, ast.ClassDef))
-                and ast.get_docstring(node)
-                and isinstance(said, list)
-            ):
-                lines.difference_update(range(said[0].lineno, (said[0].end_lineno or 0) + 1))
+        lines |= _number_lines(parts[name])
     text = source.splitlines()
     own = sum(
         bool(text[number - 1].strip()) and not text[number - 1].strip().startswith("#")

@@ -1,5 +1,6 @@
-"""March the beam with friction at its tip under a given normal force, by Algorithm 10 of Ahn
-(2012), block elimination.
+"""March the beam with friction at its tip under a given normal force.
+
+It is Algorithm 10 of Ahn (2012), by block elimination.
 
 Midpoint rule (5.4), (5.5) for y = (theta, u), w = y', with the stiffness S and C = a2 S:
 
@@ -56,8 +57,10 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Hold the beam at a time: rows theta, omega, u, v at all nodes, the clamped one included,
-    shape (4, m + 1)."""
+    """Hold the beam at a time.
+
+    There are rows theta, omega, u, v at all nodes, the clamped one included, of shape (4, m + 1).
+    """
 
     t: float
     values: Array
@@ -97,9 +100,11 @@ class BeamRun:
 
 @dataclass(frozen=True)
 class BeamStepper:
-    """Describe a beam and what acts on it. ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip
-    rate [m/s] >= 0) -> coefficient; ``load``: t -> uniform force along the beam [N/m], or None.
-    InputError for dt <= 0."""
+    """Describe a beam and what acts on it.
+
+    ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
+    ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0.
+    """
 
     beam: TimoshenkoBeam
     elements: Elements
@@ -141,8 +146,9 @@ class BeamStepper:
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
-    """March ``steps`` steps from ``start`` and keep the ledger; ``every``: steps between snapshots,
-    0 for none.
+    """March ``steps`` steps from ``start`` and keep the ledger.
+
+    ``every`` are the steps between snapshots, 0 for none.
 
     Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation
     is not solved.
@@ -176,8 +182,10 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
 def _states(
     stepper: BeamStepper, y: Array, w: Array
 ) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
-    """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after
-    every step."""
+    """Yield (values by COLUMNS, works and losses; y, w) at the start and after every step.
+
+    Works and losses are those of the step alone.
+    """
     dt, viscosity = stepper.dt, stepper.beam.viscosity
     M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
 

@@ -1,5 +1,6 @@
-"""Make contact problems of rod and beam, with the exact inequalities, for ``march`` and
-``simulate``.
+"""Make contact problems of rod and beam.
+
+They have the exact inequalities and are for ``march`` and ``simulate``.
 
 The tip is one contact point: its normal unknown is the displacement along the axis, v_n <= gap, its
 tangential one the deflection u_m. With ``Midpoint()`` the rod's step is (5.1)-(5.3) of Ahn (2012),
@@ -46,8 +47,10 @@ History = Callable[[float], float]
 
 
 def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
-    """Set up the rod before its wall (2.1)-(2.5). ``start``: u and v along the axis; at rest when
-    None."""
+    """Set up the rod before its wall (2.1)-(2.5).
+
+    ``start``: u and v along the axis; at rest when None.
+    """
     _check("rod_problem", elements, (start,), rod=rod)
     x = elements.nodes(rod.length)
     start = start or Start()
@@ -63,8 +66,9 @@ def beam_problem(
     start: Start | None = None,
     load: History | None = None,
 ) -> ContactProblem:
-    """Set up the beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l
-    held by the wall.
+    """Set up the beam pressed on the wall with normal_force(t) >= 0 [N].
+
+    The force is the load of a mass rho A l held by the wall.
 
     ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads:
     ``Midpoint`` at t + dt/2, Algorithm 10 at t. ``load``: uniform, across [N/m].
@@ -93,8 +97,10 @@ def rubbing_problem(
     start: Start | None = None,
     load: History | None = None,
 ) -> ContactProblem:
-    """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for
-    two lengths."""
+    """Set up rod and beam of one length: the beam rubs with the rod's contact force.
+
+    InputError for two lengths.
+    """
     _check(
         "rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction
     )
@@ -113,8 +119,10 @@ def rubbing_problem(
 
 @dataclass(frozen=True)
 class StepForces:
-    """Hold forces [N], one per step of dt [s], as a function of the time in a step; InputError for
-    times of no step."""
+    """Hold forces [N], one per step of dt [s].
+
+    They are called as a function of the time in a step; it raises InputError for times of no step.
+    """
 
     dt: float
     forces: tuple[float, ...]
@@ -124,6 +132,7 @@ class StepForces:
         array("StepForces", "forces", self.forces, (None,), unit="N")
 
     def __call__(self, t: float) -> float:
+        """Return the force [N] of the step that contains t [s]."""
         number("StepForces", "t", t, unit="s")
         step = math.floor(t / self.dt + 1e-6)
         if not 0 <= step < len(self.forces):
@@ -144,8 +153,9 @@ def rod_forces(
     start: Start | None = None,
     scheme: Scheme | None = None,
 ) -> StepForces:
-    """Return |r_N| of every step of the rod [N], for Algorithm 10. ``scheme``: Midpoint(), the
-    source's, when None.
+    """Return |r_N| of every step of the rod [N], for Algorithm 10.
+
+    ``scheme``: Midpoint(), the source's, when None.
 
     The force r_N^k of (5.1) acts in the step from t_k to t_k+1, and (7.1) of the same step rubs
     with it. The rod does not feel the beam: rod first, beam second is no approximation, with
@@ -160,9 +170,11 @@ def rod_forces(
 
 @dataclass(frozen=True)
 class _Part:
-    """Matrices, loads, initial values and mass of the unknowns along the axis, or of those across;
-    C = viscosity K. ``inertia`` [kg]: the force when unknowns and clamped node are accelerated
-    together by one."""
+    """Hold the matrices of the unknowns along the axis, or of those across.
+
+    There are matrices, loads, initial values and mass; C = viscosity K. ``inertia`` [kg]: the force
+    when unknowns and clamped node are accelerated together by one.
+    """
 
     M: Any
     K: Any
@@ -209,8 +221,11 @@ class _Part:
 
 
 def _given(name: str, history: History, unit: str) -> History:
-    """The function; InputError, naming the time, where it returns no finite number, or a negative
-    normal force."""
+    """Return the function.
+
+    It raises InputError, naming the time, where it returns no finite number, or a negative normal
+    force.
+    """
     pressing = name == "normal_force"
     return lambda t: number(
         "beam", f"{name}({t:.6g} s)", history(t), not_negative=pressing, unit=unit

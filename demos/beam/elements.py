@@ -1,5 +1,6 @@
-"""Assemble piecewise linear elements for rod and beam, with the last rotation function of Ahn
-(2012, section 7).
+"""Assemble piecewise linear elements for rod and beam.
+
+The last rotation function is that of Ahn (2012, section 7).
 
 On an element s = (x - x_left)/h runs from 0 to 1. Deflection and rotation are linear; the shear
 energy is
@@ -36,8 +37,9 @@ S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
 
 @dataclass(frozen=True)
 class Elements:
-    """Describe ``count`` equal elements. ``reduced_shear``: shear energy by one point;
-    ``published_end``: see above.
+    """Describe ``count`` equal elements.
+
+    ``reduced_shear``: shear energy by one point; ``published_end``: see above.
 
     The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer
     than two elements, and for a published end with reduced shear, which the source does not have.
@@ -63,17 +65,18 @@ class Elements:
             )
 
     def nodes(self, length: float) -> Array:
-        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,)
-        [m]."""
+        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
         return np.linspace(
             0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
         )[1:]
 
 
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
-    """Assemble (M, S, unit of distributed force [N/m]) of y = (theta_1 … theta_m, u_1 … u_m),
-    sparse: ½ wᵀMw and ½ yᵀSy are energies [J], C = a2 S; from M1, M2, K1, K2, L1 of section 7 with
-    their coefficients."""
+    """Assemble (M, S, unit of distributed force [N/m]) of the beam.
+
+    They are sparse, of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J], C =
+    a2 S; from M1, M2, K1, K2, L1 of section 7 with their coefficients.
+    """
     m, h = elements.count, beam.length / elements.count
     lines, slopes = _lines(S), _line_slopes(S) / h
     turn, bend = lines, slopes
@@ -87,8 +90,10 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     ends = (lines, turn), (slopes, bend)
 
     def matrix(left: Any, right: Any, weights: Array) -> Any:
-        """∫ left_i right_j over all elements: a pair of tables for the inner elements and the last
-        one."""
+        """Return ∫ left_i right_j over all elements.
+
+        There is a pair of tables for the inner elements and the last one.
+        """
         inner, last = (h * (a * weights) @ b.T for a, b in zip(left, right, strict=True))
         return _assembled(inner, last, m)
 
@@ -116,7 +121,7 @@ def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
 
 
 def _lines(s: Array) -> Array:
-    """The two linear functions at s, shape (2, len(s))."""
+    """Return the two linear functions at s, shape (2, len(s))."""
     return np.array([1.0 - s, s])
 
 
@@ -133,8 +138,10 @@ def _uniform(m: int, h: float) -> Array:
 
 
 def _assembled(inner: Array, last: Array, m: int) -> Any:
-    """The (m, m) matrix of m element matrices (2, 2), all ``inner`` but the last; node 0 is
-    clamped."""
+    """Return the (m, m) matrix of m element matrices (2, 2).
+
+    They are all ``inner`` but the last; node 0 is clamped.
+    """
     middle = np.full(m, inner[1, 1] + inner[0, 0])
     middle[-2:] = inner[1, 1] + last[0, 0], last[1, 1]
     below, above = (np.append(np.full(m - 2, inner[at]), last[at]) for at in ((1, 0), (0, 1)))

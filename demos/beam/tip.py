@@ -1,5 +1,6 @@
-"""Solve friction at the tip: one scalar equation per step for the slip s = u_m^{k+1} - u_m^k (Ahn
-2012, section 7).
+"""Solve friction at the tip.
+
+There is one scalar equation per step for the slip s = u_m^{k+1} - u_m^k (Ahn 2012, section 7).
 
 Condensed to the tip, the step says  c s - g + R = 0  with the friction R that the wall takes from the beam [N]:
 c > 0 [N/m] is the stiffness of the step, g [N] the force that would hold the tip. With limit = mu |r_N| >= 0:
@@ -30,13 +31,16 @@ class Slip:
 class TipFriction(Protocol):
     """Solve the scalar equation: what every friction at the tip offers."""
 
-    def solve(self, c: float, g: float, limit: float) -> Slip: ...
+    def solve(self, c: float, g: float, limit: float) -> Slip:
+        """Return the slip of a step."""
 
 
 @dataclass(frozen=True)
 class ExactFriction:
-    """Solve the inequality itself: the tip sticks while |g| <= limit, else R = ± limit. Closed
-    form, no iteration."""
+    """Solve the inequality itself: the tip sticks while |g| <= limit, else R = ± limit.
+
+    Closed form, no iteration.
+    """
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
         """Return s = (g - R)/c with R the point of [-limit, limit] nearest to g."""
@@ -46,7 +50,9 @@ class ExactFriction:
 
 @dataclass(frozen=True)
 class RegularisedFriction:
-    """Solve (7.9) by Newton's method from s = 0, the equation multiplied by the root:
+    """Solve (7.9) by Newton's method from s = 0.
+
+    The equation is multiplied by the root:
 
         F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
 
@@ -73,8 +79,10 @@ class RegularisedFriction:
         )
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """Return the zero of F. StepFailure when max_iterations updates do not reach the
-        tolerance."""
+        """Return the zero of F.
+
+        StepFailure when max_iterations updates do not reach the tolerance.
+        """
         s, low, high = (
             0.0,
             *sorted((0.0, g / c * (1.0 + 1e-9))),

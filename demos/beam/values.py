@@ -1,5 +1,7 @@
-"""Describe Timoshenko beam and Kelvin-Voigt rod: coefficients and the state they start from (Ahn
-2012, section 2)."""
+"""Describe Timoshenko beam and Kelvin-Voigt rod.
+
+They have coefficients and the state they start from (Ahn 2012, section 2).
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,8 +16,9 @@ Profile = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class TimoshenkoBeam:
-    """Describe a beam clamped at x = 0, its tip at x = length free, u up, theta the rotation of
-    sections (2.6), (2.7):
+    """Describe a beam clamped at x = 0.
+
+    Its tip at x = length is free; u goes up, theta is the rotation of sections (2.6), (2.7):
 
         rho I theta'' = E I theta_xx + K A G (u_x - theta) + viscosity (same terms of the rates)
         rho A u''     = K A G (u_xx - theta_x) + viscosity (same terms of the rates) + f(t)
@@ -51,8 +54,9 @@ class TimoshenkoBeam:
 
 @dataclass(frozen=True)
 class Rod:
-    """Describe a rod along x, clamped at x = 0, whose end x = length may touch a wall at the
-    distance gap (2.1)-(2.4):
+    """Describe a rod along x, clamped at x = 0.
+
+    Its end x = length may touch a wall at the distance gap (2.1)-(2.4):
 
         rho A v'' = E A (v_xx + viscosity v'_xx) + body_force(t),    v(length) <= gap
 
@@ -80,8 +84,10 @@ class Rod:
 
 @dataclass(frozen=True)
 class Start:
-    """Give initial values as functions of x: displacement u [m], velocity v [m/s], rotation theta,
-    rate omega [1/s]."""
+    """Give initial values as functions of x.
+
+    They are displacement u [m], velocity v [m/s], rotation theta and rate omega [1/s].
+    """
 
     u: Profile = np.zeros_like
     v: Profile = np.zeros_like
@@ -93,8 +99,10 @@ class Start:
             function("Start", name, getattr(self, name), "give a function of the positions x")
 
     def at(self, name: str, x: Array) -> Array:
-        """Return a field at the nodes; InputError unless it gives finite numbers, one for each node
-        or one for all."""
+        """Return a field at the nodes.
+
+        It raises InputError unless it gives finite numbers, one for each node or one for all.
+        """
         values = getattr(self, name)(x)
         shape = () if shape_of(values) == () else x.shape
         return np.broadcast_to(

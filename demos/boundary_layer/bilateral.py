@@ -1,5 +1,6 @@
-"""Compute motions under equality constraints, to compare with the layer (b-geometry, ENOC 2017,
-equations 29 to 34).
+"""Compute motions under equality constraints.
+
+They are compared with the layer (b-geometry, ENOC 2017, equations 29 to 34).
 
 Every constraint phi^R(q) = 0 with a^R = d phi^R brings one coordinate lambda^R of a manifold of its
 own:
@@ -34,8 +35,10 @@ from vi_contact.core.errors import InputError, StepFailure
 
 @dataclass(frozen=True)
 class BilateralMotion:
-    """Hold times t (m,); q, v (m, n); constraint values phi, coordinates lambda and reactions (m,
-    k)."""
+    """Hold times t (m,); q, v (m, n).
+
+    With them come constraint values phi, coordinates lambda and reactions (m, k).
+    """
 
     t: Array
     q: Array

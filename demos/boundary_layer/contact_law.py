@@ -1,5 +1,6 @@
-"""Give the boundary layer as a contact law of finite elements: the reaction of a node over one time
-step.
+"""Give the boundary layer as a contact law of finite elements.
+
+It gives the reaction of a node over one time step.
 
 Per unit area of the contact boundary, rho = gap > 0, y = ln rho (b-geometry with the blended
 metric, see ``Metric``):
@@ -92,8 +93,10 @@ class ContactLayer:
         return CubicHermiteSpline(y, Y - Y[-1], delta)
 
     def set_back(self, surface: ContactSurface) -> ContactSurface:
-        """Return the surface with its obstacle moved back by b: a body that touched it now touches
-        the layer's edge."""
+        """Return the surface with its obstacle moved back by b.
+
+        A body that touched it now touches the layer's edge.
+        """
         instance(
             "ContactLayer.set_back", "surface", surface, ContactSurface, "give a contact surface"
         )
@@ -108,8 +111,10 @@ class ContactLayer:
         )
 
     def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
-        """Return (p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap
-        ``rho``; arrays (m,)."""
+        """Return (p̄ [Pa], d p̄/d rho_1) of a step.
+
+        The step goes from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays are (m,).
+        """
         layer, gamma = self.layer, self.mass
         squared, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
@@ -127,8 +132,10 @@ class ContactLayer:
         return quotient * bracket, slope * bracket - quotient * squared * damper / rho
 
     def rebound(self, mass: float, speed: float) -> float:
-        """Return e of a rigid body that enters with this speed, by one equation in time. mass: of
-        the body [kg/m²]; a law with metric knows one, its own, and InputError for another."""
+        """Return e of a rigid body that enters with this speed, by one equation in time.
+
+        mass: of the body [kg/m²]; a law with metric knows one, its own, and InputError for another.
+        """
         sized("ContactLayer.rebound", "mass", mass, "kg/m²")
         sized("ContactLayer.rebound", "speed", speed, "m/s")
         if self.mass not in (0.0, mass):
@@ -148,8 +155,9 @@ def contact_layer(
     strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
-    """Find the law that returns a rigid body of ``mass`` [kg/m²] with e times its ``speed`` [m/s],
-    0.001 <= e <= 1.
+    """Find the law that returns a rigid body of ``mass`` [kg/m²] at e times its ``speed`` [m/s].
+
+    There 0.001 <= e <= 1.
 
     strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when
     None. metric: BLENDED, gamma = mass, or FLAT, gamma = 0. InputError for another and for values
@@ -193,5 +201,5 @@ def contact_layer(
 
 
 def _rebound(layer: Layer, mass: float, speed: float, metric: Metric) -> float:
-    """e of a rigid body."""
+    """Return e of a rigid body."""
     return passage(layer, mass, speed, metric, rtol=1e-8).contacts[0].restitution

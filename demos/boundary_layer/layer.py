@@ -1,5 +1,6 @@
-"""Describe the layer before an obstacle: its width, cut-off and force (b-geometry, ENOC 2017,
-equation 25).
+"""Describe the layer before an obstacle.
+
+It has its width, cut-off and force (b-geometry, ENOC 2017, equation 25).
 
     f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V,    x = rho(q) > 0 the distance function
     delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z)),  f(z) = exp(-1/z) for z > 0, else 0
@@ -26,8 +27,9 @@ LARGEST, LARGEST_FORCE = (
 
 @dataclass(frozen=True)
 class Layer:
-    """Describe the law by its parameters; the distance x is in metres here (k, c have other units
-    for other rho).
+    """Describe the law by its parameters.
+
+    The distance x is in metres here (k, c have other units for other rho).
 
     Attributes:
         width: b [m], where the layer begins.

@@ -1,5 +1,6 @@
-"""Compute metric and affinities of a configuration manifold near its boundary (b-geometry, ENOC
-2017, 8 to 21).
+"""Compute metric and affinities of a configuration manifold near its boundary.
+
+See b-geometry, ENOC 2017, 8 to 21.
 
 With the covector A = d rho in the coordinates of the velocities and M = [g_IJ]:
 
@@ -21,8 +22,9 @@ from demos.boundary_layer.layer import Layer
 
 
 class Metric(Enum):
-    """Name the terms of the normal equation act in the layer; n = g_11 times the normal
-    acceleration without layer.
+    """Name the terms of the normal equation act in the layer.
+
+    There n = g_11 times the normal acceleration without layer.
 
     DOMINANT: ĝ_11 (ρ̈ - ρ̇²/ρ) = f̂_1 + n. The terms of order (b/rho)² alone, as (26) says and
         (35), (36) and Figs. 1 to 3 use; the default. The restitution depends on c/(a k) only.
@@ -41,8 +43,11 @@ class Metric(Enum):
     FLAT = "flat"
 
     def reaction(self, layer: Layer, g: float, rho: float, rate: float, free: float) -> float:
-        """Return lambda [N], g ρ̈ = g ``free`` + lambda; g = g_11 [kg]; ``free``: acceleration
-        [m/s²] without layer."""
+        """Return lambda [N].
+
+        It is that of g ρ̈ = g ``free`` + lambda; g = g_11 [kg]; ``free`` is the acceleration [m/s²]
+        without layer.
+        """
         force, ratio = float(layer.force(rho, rate)), (layer.width / rho) ** 2
         if self is Metric.DOMINANT:
             return g * (rate**2 / rho + force / (g * ratio) + free / ratio - free)

@@ -1,5 +1,6 @@
-"""Describe systems with one frictionless contact by ordinary differential equations (b-geometry,
-ENOC 2017, 26 to 28).
+"""Describe systems with one frictionless contact.
+
+They are ordinary differential equations (b-geometry, ENOC 2017, 26 to 28).
 
 In velocities v (of coordinates q, or quasi-velocities) with M = [g_IJ(q)] and A = d rho:
 
@@ -63,8 +64,10 @@ class ConstrainedSystem:
                 function(owner, name, getattr(self, name), "give a function, see its docstring")
 
     def check(self, q: Array, v: Array, t: float = 0.0) -> None:
-        """Raise InputError for functions that return, at this state, other shapes, texts, NaN or
-        infinity."""
+        """Raise InputError for functions that return what is no vector.
+
+        That is, at this state, other shapes, texts, NaN or infinity.
+        """
         owner, n = "ConstrainedSystem", len(v)
         if self.rates is None and len(q) != n:
             raise InputError(
@@ -140,8 +143,10 @@ class ConstrainedSystem:
 
 
 class Evaluations:
-    """Count what an integration in time spends, so that no motion goes on for ever; t: the time it
-    has come to [s]."""
+    """Count what an integration in time spends.
+
+    No motion then goes on for ever; t is the time it has come to [s].
+    """
 
     def __init__(self) -> None:
         self.spent, self.t = 0, 0.0
@@ -158,8 +163,10 @@ class Evaluations:
 
 @contextmanager
 def one_sentence() -> Iterator[None]:
-    """Raise StepFailure for numbers that leave their range and matrices that become singular on the
-    way."""
+    """Raise StepFailure for numbers that leave their range, or matrices that turn singular.
+
+    These become singular on the way.
+    """
     try:
         yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:

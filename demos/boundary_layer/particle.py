@@ -1,5 +1,6 @@
-"""Solve the impact of a particle on a wall in closed form (b-geometry, ENOC 2017, equations 35 to
-38).
+"""Solve the impact of a particle on a wall in closed form.
+
+See b-geometry, ENOC 2017, equations 35 to 38.
 
 With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ
 = -V:
@@ -62,7 +63,7 @@ class ParticleImpact:
 
     @property
     def _time(self) -> float:
-        """m V/(a k), the unit of T [s]."""
+        """Return m V/(a k), the unit of T [s]."""
         return self.mass * self.speed / (self.layer.a * self.layer.k)
 
     @property
@@ -108,14 +109,18 @@ class ParticleImpact:
 
     @property
     def poisson(self) -> float:
-        """Return e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle: equal to
-        Newton's e_v."""
+        """Return e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle.
+
+        It is equal to Newton's e_v.
+        """
         return float(self.velocity(self.duration) / self.speed)
 
     @property
     def poisson_covector(self) -> float:
-        """Return e_p with f = f̂_1 in (38), the force in the covector space of the boundary: a
-        little above e_v."""
+        """Return e_p with f = f̂_1 in (38).
+
+        That is the force in the covector space of the boundary; e_p is a little above e_v.
+        """
         t_c, t_f = self.compression_time, self.duration
         pushed = quad(self.boundary_force, 0.0, t_c, epsabs=0.0, epsrel=1e-12)[0]
         returned = quad(self.boundary_force, t_c, t_f, epsabs=1e-12 * abs(pushed), epsrel=1e-12)[0]
@@ -155,8 +160,9 @@ def layer_for(
     start: float | None = None,
     deepest: float = 0.5,
 ) -> Layer:
-    """Return the layer from which this mass [kg] with this speed [m/s] returns with e times its
-    speed (dominant terms).
+    """Find the layer from which this mass [kg] with this speed [m/s] returns at e times its speed.
+
+    This holds for the dominant terms.
 
     ``deepest``: x_min/a, left of the distance a at the greatest compression. InputError unless 0 <
     e <= 1, deepest < 1.

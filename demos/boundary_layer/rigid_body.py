@@ -1,5 +1,6 @@
-"""Model a rigid body that hits a plane without friction (b-geometry, ENOC 2017, "Spatial
-collision", 39 to 53).
+"""Model a rigid body that hits a plane without friction.
+
+See b-geometry, ENOC 2017, "Spatial collision", 39 to 53.
 
 Coordinates q = (r_c, p): mass centre and unit quaternion p = (p_0, p_1, p_2, p_3), R(p) from body
 to space. Velocities v = (ṙ_c, Omega), Omega in the body frame (39); M = diag(m 1, J) (40) is
@@ -27,9 +28,11 @@ from vi_contact.core.errors import InputError
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """Find the point of an ellipsoid with semi-axes ``axes`` [m] (along the body axes, about the
-    mass centre) next to a plane: l = -D² nu/|D nu|, D = diag(axes), nu the plane's normal in the
-    body frame."""
+    """Find the point of an ellipsoid next to a plane.
+
+    It has semi-axes ``axes`` [m] (along the body axes, about the mass centre): l = -D² nu/|D nu|, D
+    = diag(axes), nu the plane's normal in the body frame.
+    """
 
     axes: tuple[float, float, float]
 
@@ -38,6 +41,7 @@ class Ellipsoid:
             sized("Ellipsoid", "a semi-axis of the ellipsoid", float(length), "m")
 
     def __call__(self, nu: Array) -> Array:
+        """Return the point for the plane's normal nu in the body frame."""
         squares = np.asarray(self.axes, dtype=float) ** 2
         return np.asarray(-squares * nu / np.sqrt(nu @ (squares * nu)))
 

@@ -45,8 +45,9 @@ class LayeredStep(StepProblem):
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryLayer(Midpoint):
-    """Step without friction, on rigid supports at rest, with mass at the contact nodes: the
-    module's equations.
+    """Step without friction, on rigid supports at rest.
+
+    There is mass at the contact nodes; the equations are the module's.
 
     InputError for anything else, and a start outside the admissible set; StepFailure where Newton's
     method fails.
@@ -83,8 +84,10 @@ class BoundaryLayer(Midpoint):
         )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state as it is; InputError where the layer would have to begin behind the
-        obstacle."""
+        """Return the state as it is.
+
+        It raises InputError where the layer would have to begin behind the obstacle.
+        """
         surface = problem.surface
         gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
         if len(gap) and not gap.min() > 0.0:
@@ -144,8 +147,10 @@ class BoundaryLayer(Midpoint):
     def _pressure(
         self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float
     ) -> Array:
-        """p̄ (m,): gap = free + G p̄(gap) by Newton's method, in steps that leave a tenth of every
-        gap at least."""
+        """Return p̄ (m,) of gap = free + G p̄(gap).
+
+        Newton's method solves it, in steps that leave a tenth of every gap at least.
+        """
         law = self.law
         rho = old * np.maximum(1.0 + dt * rate, 0.2)
         p, slope = law.mean_pressure(rho, old, rate, dt)
@@ -176,8 +181,10 @@ class BoundaryLayer(Midpoint):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the midpoint's state; its reactions are the layer's, its active points those
-        inside the layer."""
+        """Return the midpoint's state.
+
+        Its reactions are the layer's, its active points those inside the layer.
+        """
         new = super().finish(problem, state, step, result, dt)
         reaction = step.layer if isinstance(step, LayeredStep) else None
         if reaction is None:

@@ -1,5 +1,7 @@
-"""Integrate in time from flight to layer and back, with an event at every crossing of the layer's
-edge rho = b."""
+"""Integrate in time from flight to layer and back.
+
+There is an event at every crossing of the layer's edge rho = b.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,8 +24,10 @@ from vi_contact.core.errors import InputError, StepFailure
 
 @dataclass(frozen=True)
 class LayerContact:
-    """Describe a passage through the layer: times [s], normal rates [m/s], the least distance [m]
-    and its time [s]."""
+    """Describe a passage through the layer.
+
+    It has times [s], normal rates [m/s], the least distance [m] and its time [s].
+    """
 
     start: float
     end: float
@@ -45,8 +49,10 @@ class LayerContact:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Hold times (m,), coordinates (m, n_q), velocities (m, n), distances, reactions (m,) [N];
-    completed contacts."""
+    """Hold times (m,), coordinates (m, n_q), velocities (m, n).
+
+    With them come distances, reactions (m,) [N] and completed contacts.
+    """
 
     t: Array
     q: Array
@@ -116,8 +122,10 @@ def layer_motion(
 def passage(
     layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1
 ) -> Trajectory:
-    """Return how ``mass`` [kg] on a line crosses the layer, entered with ``speed`` [m/s];
-    InputError if it stays."""
+    """Return how ``mass`` [kg] on a line crosses the layer.
+
+    It is entered with ``speed`` [m/s]; it raises InputError if it stays.
+    """
     particle = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
     found = layer_motion(
         particle,
@@ -240,8 +248,11 @@ class _Passages:
     def _acceleration(
         self, t: float, q: Array, v: Array, layer: Layer, inside: bool
     ) -> tuple[Array, float]:
-        """(v̇, lambda); NaN where a trial stage has left the admissible set, which makes the
-        integrator step back."""
+        """Return (v̇, lambda).
+
+        They are NaN where a trial stage has left the admissible set, which makes the integrator
+        step back.
+        """
         free, along, g, normal = self._system.accelerations(t, q, v)
         if not inside:
             return free, 0.0

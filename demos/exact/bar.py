@@ -32,8 +32,10 @@ _PERIOD_THREE = 0.5 * np.array(
 
 @dataclass(frozen=True)
 class UprightBar:
-    """Hold what upright bars have in common: length, height above the wall [m], E [Pa], rho
-    [kg/m³]."""
+    """Hold what upright bars have in common.
+
+    That is length, height above the wall [m], E [Pa], rho [kg/m³].
+    """
 
     length: float = 10.0
     E: float = 900.0
@@ -53,8 +55,9 @@ class UprightBar:
 
 @dataclass(frozen=True)
 class ThrownBar(UprightBar):
-    """Describe a bar thrown at the wall with `speed` v0, no gravity; defaults: Doyen, Ern, Piperno
-    (2011), first test.
+    """Describe a bar thrown at the wall with `speed` v0, no gravity.
+
+    The defaults are those of Doyen, Ern, Piperno (2011), first test.
 
         u = -height - v0 min(x/c, T - |s - T|),   s = t - height/v0,   p = rho c v0 for 0 < s < 2T,
 
@@ -111,8 +114,10 @@ class ThrownBar(UprightBar):
         return self.pressure * ((t > self.contact_start) & (t < self.contact_end))
 
     def contacts(self, until: float) -> Array:
-        """Return start and end of the contacts before `until` [s], one row each, clipped there; (1,
-        2) or (0, 2)."""
+        """Return start and end of the contacts before `until` [s].
+
+        They have one row each and are clipped there; the shape is (1, 2) or (0, 2).
+        """
         times = np.array([[self.contact_start, self.contact_end]])
         return np.minimum(times[times[:, 0] < until], until)
 
@@ -125,8 +130,9 @@ class ThrownBar(UprightBar):
 
 @dataclass(frozen=True)
 class PeriodicBar:
-    """Describe a bar of length = E = rho = 1, top clamped, foot released at the wall from u = (1 -
-    x)/2; no gravity.
+    """Describe a bar of length = E = rho = 1, top clamped.
+
+    Its foot is released at the wall from u = (1 - x)/2; there is no gravity.
 
     Period 3: released, in contact (p = 1/2), expanding, one unit of time each. With s = t mod 1, u
     is linear in x and s in the four zones between s = x and s = 1 - x (Dabaghi, Petrov, Pousin,
@@ -158,8 +164,10 @@ class PeriodicBar:
         return 0.5 * (phase == 1.0)
 
     def contacts(self, until: float) -> Array:
-        """Return start and end of the contacts before `until` [s], one row each, clipped there;
-        shape (m, 2)."""
+        """Return start and end of the contacts before `until` [s].
+
+        They have one row each and are clipped there; the shape is (m, 2).
+        """
         starts = np.arange(1.0, until, 3.0)
         return np.minimum(np.stack([starts, starts + 1.0], axis=1), until)
 

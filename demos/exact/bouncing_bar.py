@@ -33,8 +33,9 @@ COINCIDENT = 1e-12
 
 @dataclass(frozen=True)
 class BouncingBar(UprightBar):
-    """Describe a bar released at rest `height` above the wall; defaults: Doyen, Ern, Piperno
-    (2011), second test.
+    """Describe a bar released at rest `height` above the wall.
+
+    The defaults are those of Doyen, Ern, Piperno (2011), second test.
 
     The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f,
     and the first contact, of length 2T, has p = rho c g (t_f + r), r the time since touch-down; the
@@ -55,8 +56,10 @@ class BouncingBar(UprightBar):
 
     @property
     def period(self) -> float:
-        """Return 4T + 4t_f [s]. Raises InputError unless t_f/T is an integer >= 3: no other period
-        is known."""
+        """Return 4T + 4t_f [s].
+
+        Raises InputError unless t_f/T is an integer >= 3: no other period is known.
+        """
         ratio = self.fall_time / self.crossing
         if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 3:
             raise InputError(
@@ -68,8 +71,10 @@ class BouncingBar(UprightBar):
 
     @property
     def energy(self) -> float:
-        """Return rho length g height [J/m²] at any time, zero for the undeformed bar at rest on the
-        wall."""
+        """Return rho length g height [J/m²] at any time.
+
+        It is zero for the undeformed bar at rest on the wall.
+        """
         return self.rho * self.length * self.gravity * self.height
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
@@ -97,8 +102,10 @@ class BouncingBar(UprightBar):
         return self.height + self.displacement(0.0, t)
 
     def contacts(self, until: float) -> Array:
-        """Return start and end of the contacts before `until` [s], one row each, clipped there;
-        shape (m, 2)."""
+        """Return start and end of the contacts before `until` [s].
+
+        They have one row each and are clipped there; the shape is (m, 2).
+        """
         start, _, closed = self._history(until)
         change = np.flatnonzero(np.diff(closed, append=0.0))
         times = np.append(start, math.inf)[change + 1].reshape(-1, 2)
@@ -124,15 +131,19 @@ class BouncingBar(UprightBar):
         return t, at(np.asarray(t - delay)), at(np.asarray(t - 2.0 * self.crossing + delay))
 
     def _history(self, until: float) -> tuple[Array, Array, Array]:
-        """Return pieces of F: starts (m,) [s]; value, slope, curvature there (m, 3); 1.0 in contact
-        (m,)."""
+        """Return pieces of F.
+
+        They have starts (m,) [s]; value, slope and curvature there (m, 3); and 1.0 in contact (m,).
+        """
         return _pieces(self, 1 + math.ceil(until / (2.0 * self.crossing)))
 
 
 @lru_cache(maxsize=8)
 def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
-    """Return the pieces of F from -2T to at least `round_trips` · 2T, as BouncingBar._history
-    returns them."""
+    """Return the pieces of F from -2T to at least `round_trips` · 2T.
+
+    They are as BouncingBar._history returns them.
+    """
     trip, g = 2.0 * bar.crossing, bar.gravity
     near = COINCIDENT * (bar.height + g * trip**2)
     slow = COINCIDENT * g * (bar.fall_time + trip)
@@ -167,8 +178,10 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
 
 
 def first_root(y: float, a: float, a1: float) -> float:
-    """Return the first s > 0 at which y + a s + a1 s²/2, positive before, is zero; infinite if
-    there is none."""
+    """Return the first s > 0 at which y + a s + a1 s²/2is zero.
+
+    It is positive before; s is infinite if there is none.
+    """
     disc = a * a - 2.0 * a1 * y
     if disc < 0.0 or (a1 >= 0.0 and a >= 0.0):
         return math.inf

@@ -1,5 +1,6 @@
-"""Solve Hertz contact of spheres and the quasi-static impact of one, without friction (Johnson
-1985, ch. 4 and 11).
+"""Solve Hertz contact of spheres and the quasi-static impact of one.
+
+There is no friction (Johnson 1985, ch. 4 and 11).
 
 Bodies of moduli E_i, nu_i and radii R_i touch without friction, with E* and R from
 
@@ -53,7 +54,9 @@ def contact_radius(*radii: float) -> float:
 
 @dataclass(frozen=True)
 class HertzPoint:
-    """Describe spheres pressed with `force` F:
+    """Describe spheres pressed with `force` F.
+
+    The contact has
 
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
         approach = a²/R,   F = (4/3) E* sqrt(R) approach^(3/2)
@@ -99,8 +102,9 @@ class HertzPoint:
 
 @dataclass(frozen=True)
 class HertzImpact:
-    """Describe a mass m that strikes with v on a Hertz spring, m d'' = -(4/3) E* sqrt(R) d^(3/2)
-    (quasi-static):
+    """Describe a mass m that strikes with v on a Hertz spring.
+
+    It is quasi-static, with m d'' = -(4/3) E* sqrt(R) d^(3/2):
 
         d_max = (15 m v²/(16 E* sqrt(R)))^(2/5),   duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 

@@ -72,8 +72,10 @@ class HousnerBlock:
 
     @property
     def onset_acceleration(self) -> float:
-        """Return g tan(alpha) = g b/h [m/s²]: a horizontal base acceleration above it starts
-        rocking."""
+        """Return g tan(alpha) = g b/h [m/s²].
+
+        A horizontal base acceleration above it starts rocking.
+        """
         return self.gravity * self.width / self.height
 
     def period(self, theta0: float) -> float:
@@ -88,8 +90,10 @@ class HousnerBlock:
         return self.alpha * self._amplitudes(theta0, impacts)
 
     def impact_times(self, theta0: float, impacts: int) -> Array:
-        """Return times of the first impacts (impacts,), slender [s]: a quarter period, half ones of
-        phi_1, ..."""
+        """Return times of the first impacts (impacts,), slender [s].
+
+        They are a quarter period, then half ones of phi_1, and so on.
+        """
         halves = 0.5 * _period(self._amplitudes(theta0, impacts)[:-1]) / self.p
         return np.cumsum(halves) - 0.5 * halves[:1]
 
@@ -113,8 +117,9 @@ class HousnerBlock:
         return self.alpha * np.where(n < len(peaks), np.where(n % 2, -lean, lean), 0.0)
 
     def overturning_time(self, acceleration: float) -> float:
-        """Return the shortest rectangular pulse of the base acceleration [m/s²] that overturns,
-        slender [s].
+        """Return the shortest rectangular pulse that overturns [s].
+
+        It is a pulse of the base acceleration [m/s²]; the block is slender.
 
         ln(A/(A - 1))/p, A = acceleration/(g alpha). Raises InputError unless A > 1: below that
         nothing moves.

@@ -19,14 +19,18 @@ from vi_contact.core.algebra import Array
 
 
 def stop_force(w0: float, gap: float, flexibility: float) -> float:
-    """Return the force of a stop [N]: w0 [m] under the load alone, gap [m], flexibility [m/N]; 0
-    where w0 < gap."""
+    """Return the force of a stop [N].
+
+    There are w0 [m] under the load alone, gap [m] and flexibility [m/N]; it is 0 where w0 < gap.
+    """
     return max(w0 - gap, 0.0) / flexibility
 
 
 def arm_flexibility(height: float, arm: float, *, EA: float, EI: float) -> Array:
-    """Return F (2, 2) [m/N] of the end of an arm [m] on a clamped column of this height [m]: u = F
-    p, along and up."""
+    """Return F (2, 2) [m/N] of the end of an arm [m] on a clamped column.
+
+    The column has this height [m]; u = F p, along and up.
+    """
     xx, xy = height**3 / (3.0 * EI) + arm / EA, -(height**2) * arm / (2.0 * EI)
     yy = (arm**3 / 3.0 + arm**2 * height) / EI + height / EA
     return np.array([[xx, xy], [xy, yy]])
@@ -34,8 +38,9 @@ def arm_flexibility(height: float, arm: float, *, EA: float, EI: float) -> Array
 
 @dataclass(frozen=True)
 class LiftedBeam:
-    """Describe a heavy beam on the rigid ground whose end is pulled up: EI [N m²], weight q [N/m],
-    force P [N].
+    """Describe a heavy beam on the rigid ground whose end is pulled up.
+
+    There are EI [N m²], weight q [N/m], force P [N].
 
     Over the length a = 2 P/q from the end it is off the ground, as w = w' = w'' = 0 where it begins
     to touch.
@@ -62,8 +67,11 @@ class LiftedBeam:
 
 
 def square_plate() -> tuple[float, float]:
-    """Return the deflection of the middle of a simply supported square plate under a uniform load,
-    in units of q a⁴/D, and under a unit force there, in units of a²/D; a is the side."""
+    """Return the deflection of the middle of a simply supported square plate under a uniform load.
+
+    It is in units of q a⁴/D; with it comes that under a unit force there, in units of a²/D; a is
+    the side.
+    """
     m = np.arange(1, 60, 2)
     b = 0.5 * np.pi * m
     load = (
@@ -84,8 +92,9 @@ def clamped_disk() -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class DiskOnGround:
-    """Hold a clamped disk (radius a = 1, D = 1, q = 1) that the load presses on flat ground at a
-    distance g below.
+    """Hold a clamped disk (radius a = 1, D = 1, q = 1) on flat ground.
+
+    The load presses it on ground at a distance g below.
 
     It lies on the ground for r <= b; elsewhere w = r⁴/64 + c1 + c2 r² + c3 ln r + c4 r² ln r, with
     w = w' = 0 at r = 1 and w = g, w' = w'' = 0 at r = b. The ground carries q inside and a line

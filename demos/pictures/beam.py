@@ -1,5 +1,7 @@
-"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012), contact at the tip, and the limit of the
-regularisation."""
+"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012).
+
+Contact at the tip and the limit of the regularisation are drawn too.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,10 @@ _QUANTITIES = (
 
 
 def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
-    """Draw energies of several runs over time, above; losses by friction, below (Fig. 8.1). Dashed:
-    no losses."""
+    """Draw energies of several runs over time, above; losses by friction, below (Fig. 8.1).
+
+    Dashed: no losses.
+    """
     figure, (top, bottom) = panels(2, (9.0, 7.0), height_ratios=(3, 2))
     for label, run in runs.items():
         (line,) = top.plot(run.history["t"], run.energy, lw=1.1, label=label)
@@ -61,9 +65,11 @@ def plot_shapes(
     count: int = 7,
     near: float = 0.2,
 ) -> Path:
-    """Draw rotation, angular speed, displacement and velocity along the beam at ``count`` times of
-    a span [s] (Figs. 8.4 to 8.9): the last part ``near`` of the beam above, the whole below. The
-    run needs snapshots in the span."""
+    """Draw rotation, angular speed, displacement and velocity along the beam.
+
+    They are drawn at ``count`` times of a span [s] (Figs. 8.4 to 8.9): the last part ``near`` of
+    the beam above, the whole below. The run needs snapshots in the span.
+    """
     from matplotlib import colormaps
 
     figure, axes = canvas(2, 4, (13.0, 6.5))
@@ -93,8 +99,9 @@ def plot_shapes(
 
 
 def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:
-    """Draw gap, contact force with the friction it allows, and motion of the tip across, of
-    ``rubbing_problem``.
+    """Draw gap, contact force with its friction, and motion of the tip across.
+
+    The friction is what the force allows. They are those of ``rubbing_problem``.
 
     history: with the columns of ``Contact`` and of a ``Probe`` labelled "tip". gap: of the rod at
     rest [m].
@@ -122,7 +129,7 @@ def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, t
 
 
 def _shade(axis: Any, t: Array, where: Array, label: str) -> None:
-    """Marks the times at which something holds."""
+    """Mark the times at which something holds."""
     low, high = axis.get_ylim()
     axis.fill_between(
         t, low, high, where=where, color="tab:orange", alpha=0.25, lw=0.0, label=label
@@ -136,8 +143,10 @@ def plot_regularisation(
     tips: Mapping[str, tuple[Array, Array]],
     path: str | Path,
 ) -> Path:
-    """Draw the largest difference of the tip from the exact law over eps, left; tips (t, u) of some
-    runs, right."""
+    """Draw the largest difference of the tip from the exact law over eps.
+
+    It stands left; tips (t, u) of some runs stand right.
+    """
     figure, ((left, right),) = canvas(1, 2, (11.0, 4.5))
     for label, values in errors.items():
         left.loglog(eps, values, "o-", ms=4, lw=1.1, label=label)

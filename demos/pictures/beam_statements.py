@@ -14,8 +14,10 @@ COLOURS = {"A": "tab:blue", "B": "tab:orange", "C": "tab:green"}
 
 
 def plot_statements(rows: Sequence[Row], path: str | Path) -> Path:
-    """Draw how often the tip swings over the normal force, and the friction loss over the viscous
-    loss."""
+    """Draw how often the tip swings over the normal force.
+
+    The friction loss is drawn over the viscous loss.
+    """
     figure, axes = canvas(1, 2, (11.0, 4.2))
     swings, losses = axes[0]
     viscosities = sorted({row.a2 for row in rows})

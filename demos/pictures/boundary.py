@@ -17,9 +17,12 @@ ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 
 @dataclass(frozen=True)
 class Shot:
-    """Hold bodies at one time, as they are drawn: ``outlines`` closed curves (n, 2), ``inside``
-    points (m, 2), contact tractions ``arrows`` (c, 2) [Pa] on points ``feet`` (c, 2), a rigid
-    support below the height ``support`` [m]."""
+    """Hold bodies at one time, as they are drawn.
+
+    There are ``outlines``, closed curves (n, 2), ``inside`` points (m, 2), contact tractions
+    ``arrows`` (c, 2) [Pa] on points ``feet`` (c, 2), a rigid support below the height ``support``
+    [m].
+    """
 
     title: str
     outlines: tuple[Array, ...]
@@ -57,8 +60,10 @@ class Panel:
 def plot_boundary_snapshots(
     rows: Mapping[str, Sequence[Shot]], path: str | Path, *, title: str
 ) -> Path:
-    """Draw a row per example, a column per time: deformed outlines, points inside, contact
-    tractions (row's scale)."""
+    """Draw a row per example, a column per time.
+
+    There are deformed outlines, points inside, and contact tractions (in the row's scale).
+    """
     columns = max(len(shots) for shots in rows.values())
     figure, axes = canvas(
         len(rows), columns, (2.6 * columns + 0.6, 2.5 * len(rows) + 0.6), lattice=False

@@ -1,5 +1,7 @@
-"""Draw what the demos of bounds on a field show: a membrane over a ball, a bar in torsion, a bar
-that cracks."""
+"""Draw what the demos of bounds on a field show.
+
+They show a membrane over a ball, a bar in torsion and a bar that cracks.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from vi_contact.plots.histories import canvas, plain_numbers, save
 
 def gathered(function: Any) -> tuple[Any, Any] | None:
     """Return (points (n, 3), values (n,)) of a scalar Function on rank 0, None on the others.
-    Collective."""
+
+    Collective.
+    """
     space = function.function_space
     n = space.dofmap.index_map.size_local
     parts = space.mesh.comm.gather(
@@ -31,8 +35,10 @@ def plot_membrane(
     errors: Mapping[str, Sequence[float]],
     path: str | Path,
 ) -> Path:
-    """Draw the membrane along y = 0, the nodes that lie on the ball, and errors against the cell
-    size."""
+    """Draw the membrane along y = 0, the nodes that lie on the ball.
+
+    Errors are drawn against the cell size.
+    """
     figure, axes = canvas(1, 3, (13.0, 4.0))
     section, plan, order = axes[0]
     known = Membrane()
@@ -112,9 +118,11 @@ def plot_crack(
     profile: tuple[Any, Any],
     path: str | Path,
 ) -> Path:
-    """Draw stress against strain of the bar that stays homogeneous (strain, stress, exact strain,
-    exact stress), the energies of the one that breaks against how far it is pulled, and its damage
-    along the axis beside the exact one."""
+    """Draw stress against strain of the bar that stays homogeneous.
+
+    It is (strain, stress, exact strain, exact stress). Besides, the energies of the one that breaks
+    against how far it is pulled are drawn, and its damage along the axis beside the exact one.
+    """
     figure, axes = canvas(1, 3, (13.0, 4.0))
     stress, energy, damage = axes[0]
     stress.plot(law[2], law[3], color="0.6", lw=3.0, label="closed form")

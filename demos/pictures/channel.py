@@ -1,5 +1,7 @@
-"""Draw what the demo of the buried channel shows beside its run: layout, moments, runs beside a
-reference."""
+"""Draw what the demo of the buried channel shows beside its run.
+
+That is the layout, moments, and runs beside a reference.
+"""
 
 from __future__ import annotations
 
@@ -112,9 +114,11 @@ def plot_moments(
     title: str,
     magnified: float,
 ) -> Path:
-    """Draw a row per run (name -> folder), a column per time [s]: the bodies around the channel,
-    their displacements less the channel's mean drawn ``magnified`` times; contact points coloured
-    by their pressure, open ones white."""
+    """Draw a row per run (name -> folder), a column per time [s].
+
+    There are the bodies around the channel, their displacements less the channel's mean drawn
+    ``magnified`` times; contact points coloured by their pressure, open ones white.
+    """
     runs = {name: read_bodies(folder) for name, folder in folders.items()}
     colours = Colours.of(
         np.concatenate([run.tractions.at(t)[0] for run in runs.values() for t in times])
@@ -145,8 +149,10 @@ def plot_beside(
     title: str,
     points: Sequence[str] = ("1", "19"),
 ) -> Path:
-    """Draw Fig. 9: u_x and u_y of the channel's points in several runs, the one named ``reference``
-    grey and thick."""
+    """Draw Fig. 9: u_x and u_y of the channel's points in several runs.
+
+    The one named ``reference`` is grey and thick.
+    """
     columns = [
         (f"u_{axis}_{label}", f"$u_{axis}$, point {label}") for label in points for axis in "xy"
     ]

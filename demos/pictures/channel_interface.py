@@ -1,5 +1,7 @@
-"""Draw the buried channel from recorded histories: as Figs. 7 to 9 of the boundary method, and
-along its outline."""
+"""Draw the buried channel from recorded histories.
+
+It is drawn as Figs. 7 to 9 of the boundary method, and along its outline.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,9 +33,11 @@ LEGEND: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Outline:
-    """Describe where the contact conditions are on the channel: ``arc`` (m,) [m] along its outline,
-    down the left wall, along the base, up the right wall; ``sides``: name -> mask (m,). Corners
-    have a condition on both sides."""
+    """Describe where the contact conditions are on the channel.
+
+    They are ``arc`` (m,) [m] along its outline, down the left wall, along the base, up the right
+    wall; ``sides``: name -> mask (m,). Corners have a condition on both sides.
+    """
 
     arc: Array
     sides: Mapping[str, Mask]
@@ -51,14 +55,18 @@ class Outline:
         return cls(arc, {"left wall": left, "base": ~(left | right), "right wall": right})
 
     def along(self) -> list[tuple[str, Array]]:
-        """Return (name, its conditions in the order of the arc) of the sides, which follow each
-        other along the arc."""
+        """Return (name, its conditions in the order of the arc) of the sides.
+
+        The sides follow each other along the arc.
+        """
         order = np.argsort(self.arc)
         return [(name, order[mask[order]]) for name, mask in self.sides.items()]
 
     def places(self) -> Array:
-        """Return the arc lengths (m,) [m], a corner's two conditions a micrometre apart in the
-        order of sides."""
+        """Return the arc lengths (m,) [m].
+
+        A corner's two conditions are a micrometre apart in the order of sides.
+        """
         return self.arc + 1e-6 * np.argmax(list(self.sides.values()), axis=0)
 
     def corners(self) -> list[float]:
@@ -67,16 +75,19 @@ class Outline:
 
 
 def unit_of(size: float) -> tuple[float, str]:
-    """Return (metres per unit, name): millimetres from 0.1 mm on, as engineers draw soil and
-    concrete."""
+    """Return (metres per unit, name).
+
+    They are millimetres from 0.1 mm on, as engineers draw soil and concrete.
+    """
     if size >= 1.0:
         return 1.0, "m"
     return (1e-3, "mm") if size >= 1e-4 or size == 0.0 else (1e-6, "µm")
 
 
 def opening(history: History, label: str, normal: Sequence[float]) -> Array:
-    """Return (u_soil - u_channel)·n (rows,) [m] at a point that the probes <label> and <label>_soil
-    record.
+    """Return (u_soil - u_channel)·n (rows,) [m] at a point.
+
+    The probes <label> and <label>_soil record it.
 
     ``normal``: outward normal of the channel; never negative in unilateral contact.
     """
@@ -95,8 +106,11 @@ def opening(history: History, label: str, normal: Sequence[float]) -> Array:
 
 
 def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
-    """Draw Fig. 7: acceleration of the bedrock, and openings between channel and soil, left blue
-    and right red."""
+    """Draw Fig. 7, bedrock and openings.
+
+    It has the acceleration of the bedrock, and openings between channel and soil. Left is blue and
+    right is red.
+    """
     found = {
         name: {label: opening(history, label, normal) for label, normal in points.items()}
         for name, points in SHOWN.items()
@@ -133,8 +147,10 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
 def plot_rocking(
     history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")
 ) -> Path:
-    """Draw Fig. 8: u_y of the bottom corners with their static settlement; what of it is rocking
-    and what is common."""
+    """Draw Fig. 8: u_y of the bottom corners with their static settlement.
+
+    It shows what of it is rocking and what is common.
+    """
     left, right = (np.asarray(history[f"u_y_{label}"]) for label in corners)
     t = history["t"]
     metres, unit = unit_of(float(max(np.abs(left).max(), np.abs(right).max())))
@@ -170,8 +186,10 @@ def plot_rocking(
 def plot_interface(
     runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str
 ) -> Path:
-    """Draw a map over time and arc length, a panel per run: pressure where closed (root scale),
-    opening where open."""
+    """Draw a map over time and arc length, a panel per run.
+
+    There is pressure where it is closed (in a root scale), and opening where it is open.
+    """
     import matplotlib
     from matplotlib.colors import Normalize, PowerNorm
 
@@ -228,8 +246,10 @@ def plot_interface(
 
 
 def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
-    """(t, pressure, gap) of the conditions ``parts``; of a long run the peaks of neighbouring
-    steps."""
+    """Return (t, pressure, gap) of the conditions ``parts``.
+
+    Of a long run it takes the peaks of neighbouring steps.
+    """
     rows = len(run["t"])
     pressure, gap = (np.reshape(run[name], (rows, -1))[:, parts] for name in ("pressure", "gap"))
     gap = np.where(np.reshape(run["active"], (rows, -1))[:, parts] > 0.0, 0.0, gap)
@@ -240,8 +260,11 @@ def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
 def plot_envelope(
     runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str
 ) -> Path:
-    """Draw along the arc largest pressure and static pressure (dotted), largest opening, and share
-    of time open."""
+    """Draw along the arc what was largest.
+
+    There are largest pressure and static pressure (dotted), largest opening, and share of time
+    open.
+    """
     keys = ("pressure", "gap", "active")
     rows = {
         name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys]

@@ -1,5 +1,7 @@
-"""Draw the buried channel's mesh: Fig. 6 of the boundary method, the deformed bodies with their
-contact, a film."""
+"""Draw the buried channel's mesh.
+
+There are Fig. 6 of the boundary method, the deformed bodies with their contact, and a film.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,13 @@ AROUND = 0.8  # heights of the channel that are shown beside and below it
 
 @dataclass(frozen=True)
 class Bodies:
-    """Hold the frames of a run and what belongs to the channel: mask of ``cells`` (c,), its node of
-    every contact condition ``nodes`` (m,), and where from there a condition is drawn ``inwards``
-    (m, 2) [m]: at corners those of both sides apart, each towards the middle of its side. ``low``,
-    ``high`` (2,): corners of the channel's outline [m]."""
+    """Hold the frames of a run and what belongs to the channel.
+
+    There are the mask of ``cells`` (c,), its node of every contact condition ``nodes`` (m,), and
+    where from there a condition is drawn ``inwards`` (m, 2) [m]: at corners those of both sides
+    apart, each towards the middle of its side. ``low``, ``high`` (2,): corners of the channel's
+    outline [m].
+    """
 
     frames: StoredFrames
     tractions: Tractions
@@ -46,8 +51,10 @@ class Bodies:
 
 
 def read_bodies(folder: str | Path) -> Bodies:
-    """Read the folder of a run of the channel with fields and the recorder Contact(). InputError
-    for another folder."""
+    """Read the folder of a run of the channel with fields and the recorder Contact().
+
+    InputError for another folder.
+    """
     frames, tractions = read_frames(folder), read_tractions(folder)
     low, high = tractions.points.min(axis=0), tractions.points.max(axis=0)
     centres = frames.points[frames.cells].mean(axis=1)
@@ -70,8 +77,10 @@ def read_bodies(folder: str | Path) -> Bodies:
 
 @dataclass(frozen=True)
 class Colours:
-    """Hold the colours of contact pressures: pressure times ``factor`` is in ``unit``; ``norm`` is
-    a root scale."""
+    """Hold the colours of contact pressures.
+
+    Pressure times ``factor`` is in ``unit``; ``norm`` is a root scale.
+    """
 
     factor: float
     unit: str
@@ -105,8 +114,10 @@ class Colours:
 def draw_bodies(
     axis: Any, bodies: Bodies, t: float, *, magnified: float, colours: Colours, follow: bool = False
 ) -> float:
-    """Draw the frame next to t; return its time [s]. ``follow``: displacements less the mean of the
-    channel's."""
+    """Draw the frame next to t; return its time [s].
+
+    ``follow``: displacements less the mean of the channel's.
+    """
     frames, tractions = bodies.frames, bodies.tractions
     shown, u, _ = frames.at(t)
     own = np.unique(frames.cells[bodies.cells])
@@ -139,9 +150,11 @@ def animate(
     magnified: float,
     fps: int = 10,
 ) -> Path:
-    """Write a GIF of the frames at ``times`` [s]: bodies, displaced relative to the bedrock, and
-    contact; below the bedrock's acceleration and ``openings`` (name -> values (rows,) [m] of
-    ``history``) with the moment marked.
+    """Write a GIF of the frames at ``times`` [s].
+
+    There are bodies, displaced relative to the bedrock, and contact; below there are the bedrock's
+    acceleration and ``openings`` (name -> values (rows,) [m] of ``history``) with the moment
+    marked.
 
     InputError for another kind of file.
     """
@@ -183,7 +196,10 @@ def animate(
 def _traces(
     axis: Any, history: History, openings: Mapping[str, Array], span: tuple[float, float]
 ) -> Any:
-    """Openings and, dashed, the acceleration during the animation; the line that marks a moment."""
+    """Draw openings and, dashed, the acceleration during the animation.
+
+    It returns the line that marks a moment.
+    """
     for colour, (name, values) in zip(
         ("tab:blue", "tab:red", "black"), openings.items(), strict=False
     ):
@@ -204,6 +220,7 @@ def plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple
 
 
 def filled(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
+    """Draw cells in a colour."""
     from matplotlib.collections import PolyCollection
 
     axis.add_collection(

@@ -25,8 +25,9 @@ def plot_snapshots(
     support: Callable[[float], float],
     magnified: float = 1.0,
 ) -> Path:
-    """Draw a row per run (name -> folder), a column per time [s]: the deformed mesh and the contact
-    tractions on it.
+    """Draw a row per run (name -> folder), a column per time [s].
+
+    There are the deformed mesh and the contact tractions on it.
 
     Cells are coloured by von Mises stress, tractions drawn as arrows with one scale for all.
     ``support``: height y [m] of the rigid support at a time; displacements (not ``support``) are
@@ -64,7 +65,7 @@ def plot_snapshots(
 
 
 def _moment(t: float) -> str:
-    """t with its unit."""
+    """Return t with its unit."""
     return f"t = {1e3 * t:.4g} ms" if 0.0 < t < 0.1 else f"t = {t:.4g} s"
 
 
@@ -76,7 +77,7 @@ def _limits(moved: Sequence[Array], size: float) -> tuple[Array, Array]:
 
 
 def _draw_body(axis: Any, cells: Array, stress: Array) -> Any:
-    """The cells where they are now, coloured."""
+    """Draw the cells where they are now, coloured."""
     from matplotlib.collections import PolyCollection
 
     drawn = PolyCollection(list(cells), cmap="YlOrRd", edgecolor="0.35", linewidth=0.3)
@@ -124,8 +125,9 @@ def _draw_support(axis: Any, height: float, size: float) -> None:
 def plot_tractions(
     folders: Mapping[str, str | Path], times: Sequence[float], path: str | Path, *, title: str
 ) -> Path:
-    """Draw contact pressure p_n and shear traction p_t over x: a column per run, a curve per time
-    [s].
+    """Draw contact pressure p_n and shear traction p_t over x.
+
+    There is a column per run, and a curve per time [s].
 
     The shear is that of the support on the body and positive along +x, as in the pictures of
     boundary elements.

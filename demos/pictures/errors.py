@@ -1,5 +1,7 @@
-"""Draw squared energy errors of both forms of the boundary element operator against the length of
-the elements."""
+"""Draw squared energy errors of both forms of the boundary element operator.
+
+They are drawn against the length of the elements.
+"""
 
 from __future__ import annotations
 

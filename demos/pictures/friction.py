@@ -1,5 +1,7 @@
-"""Draw friction from recorded histories: force against slip, and where and when points stick or
-slip."""
+"""Draw friction from recorded histories.
+
+There is force against slip, and where and when points stick or slip.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,9 @@ def plot_hysteresis(
     tangent: int = 0,
     title: str = "Friction force and slip",
 ) -> Path:
-    """Draw the tangential force of the body on its support along an axis, against the mean slip of
-    all contact points.
+    """Draw the tangential force of the body on its support along an axis.
+
+    It is drawn against the mean slip of all contact points.
 
     ``axis``: x, y or z, where the force varies most when None; ``tangent``: which component of the
     slip. The slip's sign is that of the axis for work that is done on the support, so that the loop
@@ -66,8 +69,9 @@ def plot_states(
     axis_label: str = "position [m]",
     title: str = "Open, sticking and slipping points",
 ) -> Path:
-    """Map the states of the contact points over position and time. ``position``: (m,) of the
-    points.
+    """Map the states of the contact points over position and time.
+
+    ``position``: (m,) of the points.
 
     InputError without records of friction.
     """

@@ -1,5 +1,7 @@
-"""Draw recorded histories a picture each: motion, displacements, energies, certificates, the
-pressure on a line."""
+"""Draw recorded histories a picture each.
+
+They are motion, displacements, energies, certificates and the pressure on a line.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +37,10 @@ def draw_histories(
     unilateral: Sequence[str] | None = None,
     reference: History | None = None,
 ) -> list[Path]:
-    """Draw the pictures of recorded histories, each where there is something to draw;
-    ``reference``: in grey."""
+    """Draw the pictures of recorded histories, each where there is something to draw.
+
+    ``reference`` is in grey.
+    """
     drawn = []
     if shaken(history):
         drawn.append(plot_excitation(history, out / "excitation.png"))
@@ -84,8 +88,9 @@ def plot_points(
     unilateral: Sequence[str] | None = (),
     reference: History | None = None,
 ) -> Path:
-    """Draw the displacement against time, a panel for each point, as Figs. 4 and 5 of the boundary
-    method.
+    """Draw the displacement against time.
+
+    There is a panel for each point, as in Figs. 4 and 5 of the boundary method.
 
     unilateral: labels of contact points on a support at rest, drawn with their bound at zero; None
     for points of bodies that touch each other. reference: another run, drawn in grey.
@@ -154,8 +159,9 @@ def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1
 def plot_contact(
     history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]"
 ) -> Path:
-    """Draw a map of contact pressure over position and time, and the uplift ratio. ``position``:
-    (m,) of the points.
+    """Draw a map of contact pressure over position and time, and the uplift ratio.
+
+    ``position``: (m,) of the points.
 
     Open points are white; held points that pull are blue.
     """

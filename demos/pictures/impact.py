@@ -15,8 +15,11 @@ from vi_contact.plots.histories import canvas, save
 
 @dataclass(frozen=True)
 class ImpactCurves:
-    """Hold times [s] from the first touch on, force [N] and approach [m] of the whole ball; contact
-    pressures [Pa] and their distances from the axis [m] at the largest force."""
+    """Hold times [s] from the first touch on.
+
+    With them come force [N] and approach [m] of the whole ball; contact pressures [Pa] and their
+    distances from the axis [m] at the largest force.
+    """
 
     t: Array
     force: Array
@@ -31,8 +34,9 @@ def plot_impact(
     course: Callable[[Array], tuple[Array, Array]],
     path: str | Path,
 ) -> Path:
-    """Draw force and approach over time, pressure over the distance from the axis; the theory in
-    grey behind them.
+    """Draw force and approach over time, pressure over the distance from the axis.
+
+    The theory is in grey behind them.
 
     course: t -> (approach, force) of the theory, also before and after the contact.
     """

@@ -1,5 +1,7 @@
-"""Draw what the demos of the boundary layer show: impacts, parameters, cut-offs, bounces of a body,
-thin layers."""
+"""Draw what the demos of the boundary layer show.
+
+They show impacts, parameters, cut-offs, bounces of a body, and thin layers.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,10 @@ COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 def plot_particle(
     impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path
 ) -> Path:
-    """Draw Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group ->
-    (label, impact)."""
+    """Draw Fig. 1: distance and velocity against t/t_f.
+
+    There is a row of panels for each group; group -> (label, impact).
+    """
     figure, axes = canvas(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
     for (place, speed), (title, group) in zip(axes, impacts.items(), strict=True):
         for (label, impact), colour in zip(group, COLOURS, strict=False):
@@ -37,8 +41,10 @@ def plot_particle(
 
 
 def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str | Path) -> Path:
-    """Draw Fig. 2: duration and restitution against k for several c, in units where a = b = V = m =
-    1."""
+    """Draw Fig. 2: duration and restitution against k for several c.
+
+    The units are those where a = b = V = m = 1.
+    """
     figure, axes = canvas(1, 2, (10.0, 3.8))
     duration, rebound = axes[0]
     for c, colour in zip(dampers, COLOURS, strict=False):
@@ -66,8 +72,10 @@ def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str
 def plot_cut_off(
     motions: Mapping[str, Trajectory], exact: ParticleImpact, path: str | Path
 ) -> Path:
-    """Draw Fig. 3: distance and velocity against time for several a/b, the closed form behind them;
-    label -> motion."""
+    """Draw Fig. 3: distance and velocity against time for several a/b.
+
+    The closed form is behind them; label -> motion.
+    """
     figure, axes = canvas(1, 2, (10.0, 3.8))
     place, speed = axes[0]
     t = np.linspace(0.0, exact.duration, 400)
@@ -85,8 +93,9 @@ def plot_cut_off(
 def plot_bounces_of_body(
     motion: Trajectory, energy: Array, path: str | Path, *, title: str, still: Array | None = None
 ) -> Path:
-    """Draw a rigid body before a plane z = 0: height of its mass centre and of its lowest point,
-    energy, spin.
+    """Draw a rigid body before a plane z = 0.
+
+    There are the height of its mass centre and of its lowest point, energy and spin.
 
     energy: (m,) [J]; still: (m,) what the energy would be with the impact map's losses.
     """
@@ -122,8 +131,10 @@ def plot_thin_limit(
     quantity: str,
     slope: str = "order 1",
 ) -> Path:
-    """Draw an error over the width of the layer; label -> (widths [m], errors). A line of order 1
-    beside them."""
+    """Draw an error over the width of the layer; label -> (widths [m], errors).
+
+    A line of order 1 beside them.
+    """
     figure, axes = canvas(1, 1, (6.5, 4.2))
     axis = axes[0, 0]
     for (label, (width, error)), colour in zip(errors.items(), COLOURS, strict=False):
@@ -140,8 +151,10 @@ def plot_layered_bar(
     exact: tuple[Array, Array, Array],
     path: str | Path,
 ) -> Path:
-    """Draw the height of a bar's foot [m] and contact pressure [Pa] against time; label -> (t,
-    height, pressure)."""
+    """Draw the height of a bar's foot [m] and contact pressure [Pa] against time.
+
+    The argument is label -> (t, height, pressure).
+    """
     figure, axes = canvas(1, 2, (11.0, 4.0))
     height, force = axes[0]
     height.plot(exact[0], exact[1], color="0.75", lw=4.0, label="exact inequality, closed form")

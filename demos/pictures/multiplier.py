@@ -21,8 +21,10 @@ KINDS: dict[str, tuple[Callable[[Row], bool], str]] = {
 
 
 def plot_multiplier(rows: Sequence[Row], path: str | Path) -> Path:
-    """Draw histories of the contact force, constants of the pairing, oscillations and errors over
-    the ratio."""
+    """Draw histories of the contact force.
+
+    Constants of the pairing, oscillations and errors are drawn over the ratio.
+    """
     figure, axes = canvas(2, 2, (10.0, 7.2))
     finest = max(row["k"] for row in rows)
     plain = [row for row in rows if row["law"] == "none" and row["sigma"] == 0.0]

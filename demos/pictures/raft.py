@@ -1,5 +1,7 @@
-"""Draw what the demo of the building on a raft shows beside its contact faces: histories, moments
-over rotations."""
+"""Draw what the demo of the building on a raft shows beside its contact faces.
+
+There are histories, and moments over rotations.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,10 @@ CORNERS = {
 
 
 def instants(history: History) -> list[float]:
-    """Return the last time [s] before the largest uplift at which a twentieth of it was open, half
-    of it, and that of the largest."""
+    """Return the last time [s] before the largest uplift of three openings.
+
+    They are those at which a twentieth of it was open, half of it, and that of the largest.
+    """
     uplift = history["uplift_raft"]
     widest = int(np.argmax(uplift))
     below = [np.flatnonzero(uplift[: widest + 1] <= part * uplift[widest]) for part in (0.05, 0.5)]
@@ -30,8 +34,10 @@ def instants(history: History) -> list[float]:
 
 
 def plot_motions(history: History, path: str | Path, *, weight: float, mu: float) -> Path:
-    """Draw ground and roof, the force of the soil on the raft over the ``weight`` [N], what is
-    open, and the slip."""
+    """Draw ground and roof, the force of the soil on the raft, what is open, and the slip.
+
+    The force is over the ``weight`` [N].
+    """
     t = history["t"]
     figure, axes = panels(5, (8.5, 11.0))
     for axis, panel in zip("xy", axes, strict=False):
@@ -70,8 +76,10 @@ def plot_motions(history: History, path: str | Path, *, weight: float, mu: float
 
 
 def rotations(history: History, sides: Sequence[float]) -> dict[str, Array]:
-    """Return the rotations [rad] of the raft about x and y from the heights of its corners;
-    ``sides`` of it [m]."""
+    """Return the rotations [rad] of the raft about x and y from the heights of its corners.
+
+    ``sides`` are those of the raft [m].
+    """
     corner = {name: history[f"u_z_{name}"] for name in CORNERS}
     about_x = (
         corner["right_front"] + corner["left_front"] - corner["right_back"] - corner["left_back"]
@@ -85,8 +93,9 @@ def rotations(history: History, sides: Sequence[float]) -> dict[str, Array]:
 def plot_moments(
     history: History, path: str | Path, *, weight: float, sides: Sequence[float]
 ) -> Path:
-    """Draw the moment of the raft on the soil over its rotation and over its rotation against the
-    soil, about x and y.
+    """Draw the moment of the raft on the soil over its rotation.
+
+    It is drawn over its rotation against the soil too, about x and y.
 
     Lines: the moments weight·B/6 and weight·B/2 of the side B [m] across; at the first a stiff raft
     on springs begins to lift off, beyond the second it would overturn at rest.

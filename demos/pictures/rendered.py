@@ -14,9 +14,10 @@ from vi_contact.run.files.reading import RunFolder
 def render_deformed(
     run: RunFolder, path: str | Path, *, t: float, magnified: float | None = None
 ) -> Path:
-    """Render the bodies of a run with fields in space, translucent, in the frame next to ``t`` [s],
-    coloured by von Mises stress, and opaque the contact faces between them by their pressure, both
-    displaced as by ``plot_deformed``.
+    """Render the bodies of a run with fields in space.
+
+    They are translucent, in the frame next to ``t`` [s], and coloured by von Mises stress; opaque
+    are the contact faces between them by their pressure, both displaced as by ``plot_deformed``.
 
     InputError without pyvista (pip install pyvista), and for a run in the plane or without fields.
     """

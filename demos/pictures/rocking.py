@@ -79,8 +79,9 @@ def plot_pulses(
     angle: float,
     unit: float,
 ) -> Path:
-    """Draw slow pulses around the onset of rocking above, rectangular ones around overturning
-    below; label -> history.
+    """Draw slow pulses around the onset of rocking above.
+
+    Rectangular ones around overturning are below; label -> history.
 
     Each pair: base acceleration over ``unit``, g b/h [m/s²]; what the block does. angle: of
     overturning [rad].

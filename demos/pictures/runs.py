@@ -15,8 +15,10 @@ def plot_runs(
     *,
     title: str,
 ) -> Path:
-    """Draw the same quantities of several runs, a panel per quantity. quantities: (column, label,
-    SI unit)."""
+    """Draw the same quantities of several runs, a panel per quantity.
+
+    quantities: (column, label, SI unit).
+    """
     figure, axes = panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))
     for axis, (column, label, unit) in zip(axes, quantities, strict=True):
         size = max(float(np.max(np.abs(run[column]), initial=0.0)) for run in runs.values())

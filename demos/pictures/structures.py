@@ -1,5 +1,7 @@
-"""Draw what the demo of structures shows: beams, a frame and plates in contact, their errors, two
-of them thrown."""
+"""Draw what the demo of structures shows.
+
+There are beams, a frame and plates in contact, their errors, and two of them thrown.
+"""
 
 from __future__ import annotations
 

@@ -13,10 +13,12 @@ from vi_contact.run.files.reading import read_run
 
 @dataclass(frozen=True)
 class Tractions:
-    """Hold contact tractions on the body: ``points``, ``normals`` (m, d) [m], the normals towards
-    the support; ``tangents`` (m, d, d - 1); times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa]
-    and shear tractions ``shear`` (k, m, d - 1) [Pa] of the support on the body along the
-    tangents."""
+    """Hold contact tractions on the body.
+
+    There are ``points``, ``normals`` (m, d) [m], the normals towards the support; ``tangents`` (m,
+    d, d - 1); times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear``
+    (k, m, d - 1) [Pa] of the support on the body along the tangents.
+    """
 
     points: Array
     normals: Array

@@ -1,6 +1,7 @@
-"""Draw the wall of the boundary method: its data and numbered points (Fig. 2), a step as two
-structures (Fig. 1), and the deformed wall at two instants, which is the first picture of the
-documentation.
+"""Draw the wall of the boundary method.
+
+There are its data and numbered points (Fig. 2), a step as two structures (Fig. 1), and the deformed
+wall at two instants, which is the first picture of the documentation.
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ DEPTH = 0.09  # of the height: how much of the ground is drawn
 
 
 def plot_data(wall: Wall, cases: Mapping[str, Sequence[int]], path: str | Path) -> Path:
-    """Draw the wall with its forty boundary points, the ground, and the points of each case that
-    may touch it."""
+    """Draw the wall with its forty boundary points, the ground.
+
+    The points of each case that may touch it are drawn too.
+    """
     figure, axes = canvas(1, len(cases), (4.9 * len(cases), 6.6), lattice=False, sharey=True)
     across, up = wall.width / 8.0, wall.height / 12.0
     for axis, (case, touching) in zip(axes[0], cases.items(), strict=True):
@@ -86,7 +89,7 @@ def plot_data(wall: Wall, cases: Mapping[str, Sequence[int]], path: str | Path) 
 
 
 def _point(axis: Any, wall: Wall, number: int, touching: bool) -> None:
-    """A boundary point, with its number outside of the wall."""
+    """Draw a boundary point, with its number outside of the wall."""
     x, y = wall.point(number)
     base = number >= 32  # the corner 32 stands on the base too
     axis.plot(
@@ -116,7 +119,7 @@ def _point(axis: Any, wall: Wall, number: int, touching: bool) -> None:
 
 
 def _ground(axis: Any, wall: Wall) -> None:
-    """The ground below and beside the wall, hatched."""
+    """Draw the ground below and beside the wall, hatched."""
     deep = DEPTH * wall.height
     axis.fill(
         [-deep, wall.width + 1.5 * deep, wall.width + 1.5 * deep, wall.width, wall.width, -deep],
@@ -143,8 +146,11 @@ def _dimension(axis: Any, start: tuple[float, float], end: tuple[float, float], 
 
 
 def plot_decomposition(found: Decomposition, wall: Wall, path: str | Path) -> Path:
-    """Draw a step: the unilateral structure, that of the loads without reactions, and that of the
-    reactions alone."""
+    """Draw a step.
+
+    There are the unilateral structure, that of the loads without reactions, and that of the
+    reactions alone.
+    """
     parts = (
         ("unilateral structure\n$u = \\tilde u_1 + \\tilde u_2$", found.u, True),
         ("loads without reactions, (34)\n$\\tilde u_1 = G(\\bar l)$", found.loaded, False),
@@ -205,8 +211,9 @@ def plot_decomposition(found: Decomposition, wall: Wall, path: str | Path) -> Pa
 
 
 def plot_frames(folder: str | Path, wall: Wall, times: Sequence[float], path: str | Path) -> float:
-    """Draw the wall of a run at times [s] that have a frame: displacements, stresses and pressures
-    of the ground.
+    """Draw the wall of a run at times [s] that have a frame.
+
+    There are displacements, stresses and pressures of the ground.
 
     Return how many times larger than they are the displacements are drawn, the same in all panels.
     """

@@ -1,5 +1,7 @@
-"""Draw a wall that is warmed until it presses on a ceiling, and the waves in a bar that is warmed
-at once."""
+"""Draw a wall that is warmed until it presses on a ceiling.
+
+Draw too the waves in a bar that is warmed at once.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,9 @@ def plot_warming(
     bar: tuple[Array, Array, Array],
     path: str | Path,
 ) -> Path:
-    """Draw pressures (warming [K], Pa) of the wall beside the closed form, and over time the pushes
-    of a bar.
+    """Draw pressures (warming [K], Pa) of the wall.
+
+    They stand beside the closed form; over time there are the pushes of a bar.
 
     bar: time over the crossing of a wave, push of the support and push of the wall over E A alpha
     dT.

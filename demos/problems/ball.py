@@ -1,5 +1,6 @@
-"""Model a ball that is thrown on a rigid plane, as a quarter of tetrahedra with two planes of
-symmetry.
+"""Model a ball that is thrown on a rigid plane.
+
+It is a quarter of tetrahedra with two planes of symmetry.
 
 It flies down along -y without gravity and strikes the plane with its lowest point. Forces, masses
 and energies of the model are a quarter of the ball's: times ``QUARTERS`` they compare with those of
@@ -35,8 +36,9 @@ CELL_GROWTH = 1.2
 
 @dataclass(frozen=True)
 class Ball:
-    """Describe a ball of ``radius`` [m] at ``height`` [m] above the plane, with ``speed`` [m/s]
-    towards it.
+    """Describe a ball of ``radius`` [m] at ``height`` [m] above the plane.
+
+    It has ``speed`` [m/s] towards the plane.
 
     The mesh has ``cells`` cells in the largest contact radius and about as many in the radius of
     the ball; from one size to the other they grow by 1.2/cells of the distance: twice the number
@@ -80,8 +82,9 @@ class Ball:
 
 @dataclass(frozen=True)
 class BallModel:
-    """Hold the assembled quarter. ``mass`` [kg]: of the whole ball as the mesh has it, a little
-    less than a sphere's.
+    """Hold the assembled quarter.
+
+    ``mass`` [kg]: of the whole ball as the mesh has it, a little less than a sphere's.
 
     ``exact``: the quasi-static impact of that mass.
     """
@@ -93,8 +96,7 @@ class BallModel:
 
     @property
     def exact(self) -> HertzImpact:
-        """Return the impact of the mesh's mass, so that what differs is the error of the
-        mechanics."""
+        """Return the impact of the mesh's mass, so that what differs is the error of the mechanics."""
         return self.ball.impact(self.mass)
 
     def time_step(self, steps: int = 200) -> float:
@@ -133,8 +135,9 @@ def build(ball: Ball, comm: Any) -> BallModel:
 
 
 def hertz_motion(exact: HertzImpact, t: ArrayLike) -> tuple[Array, Array]:
-    """Return (approach d [m], force F [N]) at times t [s] after the first touch, zero before it and
-    after the contact:
+    """Return (approach d [m], force F [N]) at times t [s].
+
+    The times count from the first touch; both are zero before it and after the contact:
 
         m d'' = -F(d),  energy: d' = v sqrt(1 - x),  x = (d/d_max)^(5/2)   =>   t/duration = ½ I_x(2/5, 1/2) until d_max
 

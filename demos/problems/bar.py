@@ -1,5 +1,6 @@
-"""Model a bar that strikes a rigid wall with its foot, as a finite element body in 1, 2 or 3
-dimensions.
+"""Model a bar that strikes a rigid wall with its foot.
+
+It is a finite element body in 1, 2 or 3 dimensions.
 
 In 2D and 3D it is a strip or a column with nu = 0 and free sides, in which the 1D solutions are
 exact. Forces and energies divided by ``section`` compare with those of ``demos.exact``.
@@ -34,8 +35,9 @@ UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis
 
 @dataclass(frozen=True)
 class Bar:
-    """Describe a bar. ``case``: exact solution with its data; ``elements`` along the bar,
-    ``across`` it (cubes).
+    """Describe a bar.
+
+    ``case``: exact solution with its data; ``elements`` along the bar, ``across`` it (cubes).
 
     ``degree`` 2 for P2 or Q2.
     """

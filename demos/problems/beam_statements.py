@@ -58,8 +58,10 @@ class Row:
 
     @property
     def statement_1(self) -> bool:
-        """Say whether a tenfold force never gives fewer swings, and the largest more than the
-        smallest."""
+        """Say whether a tenfold force never gives fewer swings.
+
+        The largest has to give more than the smallest.
+        """
         return list(self.swings) == sorted(self.swings) and self.swings[-1] > self.swings[0]
 
     @property
@@ -99,8 +101,10 @@ HEAD = (
 
 
 def turning_points(u: Array, least: float = 0.0) -> int:
-    """Return how often u (n,) turns: where it moved by more than ``least`` before and does so
-    after."""
+    """Return how often u (n,) turns.
+
+    It does so where it moved by more than ``least`` before and does so after.
+    """
     count, way, low, high = 0, 0, float(u[0]), float(u[0])
     for value in map(float, u[1:]):
         low, high = min(low, value), max(high, value)
@@ -113,8 +117,10 @@ def turning_points(u: Array, least: float = 0.0) -> int:
 def rubbed(
     a2: float, force: Force, factor: float = 1.0, *, count: int = 1000, dt: float = DT
 ) -> BeamRun:
-    """Run the source's beam for 2 s under ``factor`` times a normal force; ``count`` elements,
-    steps of dt [s]."""
+    """Run the source's beam for 2 s under ``factor`` times a normal force.
+
+    There are ``count`` elements and steps of dt [s].
+    """
     stepper = BeamStepper(
         TimoshenkoBeam(viscosity=a2),
         published_elements(count),
@@ -134,8 +140,10 @@ def row(
     dt: float = DT,
     factors: Sequence[float] = FACTORS,
 ) -> Row:
-    """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s], of a run for each factor;
-    1 is one of them."""
+    """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s].
+
+    It comes from a run for each factor; 1 is one of them.
+    """
     runs = {
         factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history
         for factor in factors

@@ -1,5 +1,7 @@
-"""Take the boundary of a plane finite element mesh as a mesh of boundary elements, the same on all
-ranks."""
+"""Take the boundary of a plane finite element mesh as boundary elements.
+
+The mesh of these is the same on all ranks.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +15,9 @@ from vi_contact.fem.mesh import Facets, node_numbers
 
 
 def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]]:
-    """Return (boundary mesh, (n,) input number of each of its nodes) of groups that make up closed
-    curves.
+    """Return (boundary mesh, (n,) input number of each of its nodes) of groups.
+
+    These make up closed curves.
 
     Label of an element = position of its group among the arguments. Raises InputError when the mesh
     is not plane, the groups overlap or the curves are open. Collective.

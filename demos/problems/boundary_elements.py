@@ -1,5 +1,6 @@
-"""Set up four examples of Aimi, Di Credico and Gimperlein (2024) with boundary elements, by numpy
-and scipy only.
+"""Set up four examples of Aimi, Di Credico and Gimperlein (2024).
+
+They use boundary elements, by numpy and scipy only.
 
 The data are those that square, disk and embedded have for finite elements.
 """
@@ -38,8 +39,10 @@ def steklov(
 def pressed(
     operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any
 ) -> BoundaryProblem:
-    """Set up a body under pressure(t) [Pa] on elements ``top``; contact: mask of elements; more:
-    fixed, prescribed."""
+    """Set up a body under pressure(t) [Pa] on elements ``top``.
+
+    ``contact`` is a mask of elements; ``more`` has fixed and prescribed.
+    """
     instance("pressed", "operator", operator, PoincareSteklov, "give steklov(...)")
     function("pressed", "pressure", pressure, "give a function of the time in Pa")
     blocks, mesh = operator.blocks, operator.mesh
@@ -69,8 +72,10 @@ def square_problem(
     pressure: Load = lambda t: 1.0,
     side: float = 1.0,
 ) -> BoundaryProblem:
-    """Set up [-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into
-    contact."""
+    """Set up [-a/2, a/2]² of ``elements`` per side.
+
+    It is pressed on its top; its bottom may come into contact.
+    """
     a, h = _halves("square_problem", side, elements)
     mesh = polygon([(-a, -a), (a, -a), (a, a), (-a, a)], h)
     operator = steklov(mesh, material, dt=dt, steps=steps)
@@ -80,8 +85,10 @@ def square_problem(
 def disk_problem(
     elements: int, material: LinearElastic, *, dt: float, steps: int, radius: float
 ) -> BoundaryProblem:
-    """Set up a disk around (0, radius) of ``elements`` chords; its foot, 60° to each side, may come
-    into contact."""
+    """Set up a disk around (0, radius) of ``elements`` chords.
+
+    Its foot, 60° to each side, may come into contact.
+    """
     number("disk_problem", "radius", radius, positive=True, unit="m")
     mesh = circle(radius, elements, centre=(0.0, radius))
     foot = mesh.elements_where(lambda points: points[:, 1] <= radius * (1.0 - 0.5) * (1.0 + 1e-9))
@@ -101,8 +108,10 @@ def disk_contact(
 
 
 def _halves(owner: str, side: float, elements: int, *, multiple: int = 1) -> tuple[float, float]:
-    """Half a side [m] and the length of an element; InputError unless its elements are such a
-    multiple."""
+    """Return half a side [m] and the length of an element.
+
+    It raises InputError unless its elements are such a multiple.
+    """
     length, count = (
         number(owner, "side", side, positive=True, unit="m"),
         whole(owner, "elements", elements, least=1),
@@ -116,14 +125,18 @@ def _halves(owner: str, side: float, elements: int, *, multiple: int = 1) -> tup
 
 @dataclass(frozen=True, eq=False)
 class EmbeddedBox:
-    """Hold a box [-a/2, a/2]² in the notch of a block [-3a/2, 3a/2] x [-2a, 0], which is clamped at
-    its bottom."""
+    """Hold a box [-a/2, a/2]² in the notch of a block [-3a/2, 3a/2] x [-2a, 0].
+
+    The block is clamped at its bottom.
+    """
 
     bodies: TwoBodies
 
     def contact(self, friction: FrictionLaw | None = None) -> BoundaryContact:
-        """Set up contact with floor and walls of the notch; a corner of the box has two conditions
-        and does not rub."""
+        """Set up contact with floor and walls of the notch.
+
+        A corner of the box has two conditions and does not rub.
+        """
         condensed, mesh = self.bodies.condensed(), self.bodies.one.operator.mesh
         in_notch = np.asarray(self.bodies.one.contact)
         sides = [in_notch & (mesh.labels == side) for side in (BOTTOM, LEFT, RIGHT)]

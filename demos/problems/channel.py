@@ -1,5 +1,6 @@
-"""Model the second example of the boundary method: a channel buried in soil on bedrock, shaken
-(Figs. 6 to 9).
+"""Model the second example of the boundary method.
+
+It is a channel buried in soil on bedrock, shaken (Figs. 6 to 9).
 
 The figures' data are not in the text: what is assumed is marked CHOSEN. Between channel and soil:
 contact on left wall, base and right wall; the two bottom corners touch with both their sides.
@@ -62,8 +63,9 @@ class Channel:
     damping: Damping = field(default_factory=NoDamping)
 
     def point(self, number: int) -> tuple[float, float]:
-        """Return the boundary points 1..19 of the channel, CHOSEN so that 1 and 7 are its bottom
-        corners.
+        """Return the boundary points 1..19 of the channel.
+
+        They are CHOSEN so that 1 and 7 are its bottom corners.
 
         Evenly spaced: 1-7 base from left to right, 8-13 right wall and 14-19 left wall, upwards to
         the surface.
@@ -89,15 +91,20 @@ class Channel:
         return 1.0 / 80.0
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Return bottom corners and middle (1, 7, 4), middle of the walls (10, 16), their tops (13,
-        19): always nodes but for the middles of irregular meshes."""
+        """Return bottom corners and middle (1, 7, 4).
+
+        With them come the middle of the walls (10, 16) and their tops (13, 19). These are always
+        nodes but for the middles of irregular meshes.
+        """
         return {str(number): self.point(number) for number in (1, 4, 7, 10, 13, 16, 19)}
 
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """Hold the assembled channel and soil; ``surface``: base, left, right wall in contact, with its
-    normals."""
+    """Hold the assembled channel and soil.
+
+    ``surface`` has base, left and right wall in contact, with its normals.
+    """
 
     channel: Channel
     mesh: Any
@@ -114,8 +121,9 @@ class ChannelModel:
         impact: ImpactLaw | None = Inelastic(ImpulseUpdate()),
         mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up channel and soil under the harmonic motion, sliding freely; inelastic impulses,
-        consistent mass.
+        """Set up channel and soil under the harmonic motion.
+
+        They slide freely; impulses are inelastic, the mass is consistent.
 
         Args:
             friction: Coulomb(mu) for instance.
@@ -135,8 +143,11 @@ class ChannelModel:
         )
 
     def recorders(self) -> tuple[Recorder, ...]:
-        """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil,
-        ...), openings."""
+        """Return recorders.
+
+        They are energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), and
+        openings.
+        """
         probes = self.channel.probes()
         soil = SoilProbe({f"{label}_soil": point for label, point in probes.items()})
         return Energy(), Contact(), Probe(probes), soil, Openings(self.sides)
@@ -151,15 +162,18 @@ class ChannelModel:
 
 @dataclass
 class SoilProbe(Probe):
-    """Record, as `Probe` does, at the nodes of the soil that touch these points of the channel in
-    the undeformed mesh.
+    """Record, as `Probe` does, at the nodes of the soil.
+
+    These nodes touch these points of the channel in the undeformed mesh.
 
     InputError for a point that is not at the interface.
     """
 
     def _found(self, problem: ContactProblem, points: Array) -> Indices:
-        """Numbers of the nodes of side 2 that face those of side 1 (the nearest where divisions
-        differ)."""
+        """Return the numbers of the nodes of side 2 that face those of side 1.
+
+        They are the nearest where divisions differ.
+        """
         nodes, surface = super()._found(problem, points).tolist(), problem.surface
         faced: dict[int, int] = {}
         for part in surface.parts if isinstance(surface, FemSurface) else ():
@@ -180,12 +194,15 @@ class SoilProbe(Probe):
 
 @dataclass(frozen=True)
 class Openings:
-    """Record the largest gap of each side of the contact: columns opening_<side> [m]. ``sides``:
-    name -> (total,)."""
+    """Record the largest gap of each side of the contact: columns opening_<side> [m].
+
+    ``sides``: name -> (total,).
+    """
 
     sides: Mapping[str, Mask]
 
     def columns(self) -> Columns:
+        """Return the columns with units and meanings."""
         return {
             f"opening_{side}": ("m", f"largest gap of the contact side '{side}'")
             for side in self.sides
@@ -194,9 +211,11 @@ class Openings:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
+        """Return the row of the initial state."""
         return self._row(problem.surface, state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.problem.surface, report.new)
 
     def _row(self, surface: ContactSurface, state: State) -> dict[str, Any]:
@@ -259,8 +278,10 @@ def staged(
     weighing: Sequence[str],
     base: BaseMotion | RockBelow | None,
 ) -> tuple[ChannelModel, ChannelModel | None]:
-    """Return the model, and on its mesh the one for its gravity stage where its own supports hold
-    no static load."""
+    """Return the model, and on its mesh the one for its gravity stage.
+
+    There is one where its own supports hold no static load.
+    """
     ends = sides or Rollers()
     if ends.firm and (base is None or not base.lets_waves_in):
         return build(channel, comm, sides=ends, weighing=weighing, base=base), None

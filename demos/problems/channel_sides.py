@@ -22,11 +22,14 @@ ENDS = ("left_side", "right_side")
 
 
 class Sides(Protocol):
-    """Give the conditions at the layer's ends. ``firm``: they hold static loads; else see
-    ``staged`` for gravity."""
+    """Give the conditions at the layer's ends.
+
+    ``firm``: they hold static loads; else see ``staged`` for gravity.
+    """
 
     @property
-    def firm(self) -> bool: ...
+    def firm(self) -> bool:
+        """Tell whether the sides hold static loads."""
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
@@ -38,8 +41,11 @@ class Sides(Protocol):
 
 @dataclass(frozen=True)
 class RockBelow:
-    """Describe rock under the layer that lets waves through: ``motion``, t [s] -> upgoing velocity
-    (2,) [m/s] (``upgoing``), and its ``rock``, the soil above when None."""
+    """Describe rock under the layer that lets waves through.
+
+    There is its ``motion``, t [s] -> upgoing velocity (2,) [m/s] (``upgoing``), and its ``rock``,
+    the soil above when None.
+    """
 
     motion: Callable[[float], Array] = field(repr=False)
     rock: LinearElastic | None = None
@@ -86,14 +92,17 @@ def bedrock(
 
 @dataclass(frozen=True)
 class Rollers:
-    """Hold the ends along one component, free along the other. Under horizontal shaking of a
-    horizontal layer ends with component 1 held follow the free field exactly, under vertical
-    shaking those with component 0 held."""
+    """Hold the ends along one component, free along the other.
+
+    Under horizontal shaking of a horizontal layer ends with component 1 held follow the free field
+    exactly, under vertical shaking those with component 0 held.
+    """
 
     firm: ClassVar[bool] = True
     component: int = 1
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {
             "prescribed": [
                 Prescribed(tags[end], components=(self.component,), **motion) for end in ENDS
@@ -108,39 +117,50 @@ class Fixed:
     firm: ClassVar[bool] = True
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {"prescribed": [Prescribed(tags[end], **motion) for end in ENDS]}
 
 
 @dataclass(frozen=True)
 class TiedSides:
-    """Tie the ends to each other: exact free field of horizontal layers; waves leave at one end and
-    come back."""
+    """Tie the ends to each other.
+
+    The free field of horizontal layers is exact; waves leave at one end and come back.
+    """
 
     firm: ClassVar[bool] = True
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {"tied": [Tied(tags["left_side"], tags["right_side"])]}
 
 
 @dataclass(frozen=True)
 class DashpotSides:
-    """Put Lysmer and Kuhlemeyer's dashpots only: waves leave, but the ends follow no free field
-    (Kontoe 2007)."""
+    """Put Lysmer and Kuhlemeyer's dashpots only.
+
+    Waves leave, but the ends follow no free field (Kontoe 2007).
+    """
 
     firm: ClassVar[bool] = False
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         return {"dashpots": [Dashpots(tags[end]) for end in ENDS]}
 
 
 @dataclass(frozen=True)
 class FreeFieldSides:
-    """Put dashpots on the difference to the free field, and its stresses: exact for level ground,
-    waves from the channel leave. ``base`` is that of the run, as ``soil.FreeField`` wants it."""
+    """Put dashpots on the difference to the free field, and its stresses.
+
+    They are exact for level ground; waves from the channel leave. ``base`` is that of the run, as
+    ``soil.FreeField`` wants it.
+    """
 
     firm: ClassVar[bool] = False
     base: Excitation | Sequence[Excitation] | BaseMotion | RockBelow = field(repr=False)
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the conditions at the ends."""
         base = self.base.absorber(tags) if isinstance(self.base, RockBelow) else self.base
         return {"dashpots": [FreeField(tags[end], base=base) for end in ENDS]}

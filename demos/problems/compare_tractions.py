@@ -1,5 +1,6 @@
-"""Compare contact tractions of boundary elements with those of finite elements: by nodal forces,
-not point by point.
+"""Compare contact tractions of boundary elements and of finite elements.
+
+They are compared by nodal forces, not point by point.
 
 A traction of boundary elements is the force on a node over its length, a mean over a step. So the
 forces on the nodes of the finite elements, means over the same steps, are collected on the nodes of
@@ -20,8 +21,9 @@ from vi_contact.core.surfaces import ContactSurface
 
 @dataclass(frozen=True)
 class Tractions:
-    """Hold tractions of both methods (steps, m) [Pa] on the m nodes of the boundary elements, in
-    the order of ``x``.
+    """Hold tractions of both methods (steps, m) [Pa].
+
+    They are those on the m nodes of the boundary elements, in the order of ``x``.
 
     x, lengths: (m,) [m]; times: (steps,) ends of the steps [s].
     """
@@ -40,9 +42,11 @@ class Tractions:
         between: tuple[float, float] = (0.0, np.inf),
         nodes: Mask | None = None,
     ) -> float:
-        """Return the relative L2 difference over time and contact boundary of means over windows
-        [s] (a step by default) and hats of a ``width`` [m] (an element), in an interval of time, at
-        chosen nodes of both."""
+        """Return the relative L2 difference over time and contact boundary.
+
+        It is that of means over windows [s] (a step by default) and hats of a ``width`` [m] (an
+        element), in an interval of time, at chosen nodes of both.
+        """
         dt = float(self.times[1] - self.times[0])
         count = max(1, round(window / dt))
         place = (
@@ -67,9 +71,11 @@ class Tractions:
 def compared(
     run: ContactRun, surface: ContactSurface, history: Mapping[str, Array]
 ) -> tuple[Tractions, Tractions]:
-    """Return pressures, and shears of the support on the body along +x, of a run of boundary
-    elements and of a history of finite elements on the contact points of ``surface`` (all of them,
-    on one rank)."""
+    """Return pressures and shears of two runs.
+
+    The shears are of the support on the body along +x, of a run of boundary elements and of a
+    history of finite elements on the contact points of ``surface`` (all of them, on one rank).
+    """
     order, points = np.argsort(run.contact.compliance.points[:, 0]), surface.points
     x, lengths = run.contact.compliance.points[order, 0], run.contact.surface.weights[order]
     collect = shares(points[:, 0], x) * surface.weights[:, None]
@@ -94,8 +100,10 @@ def compared(
 
 
 def shares(x: Array, nodes: Array) -> Array:
-    """Return (points, nodes) the share of every node in what is at x: linear between the two
-    neighbours."""
+    """Return (points, nodes) the share of every node in what is at x.
+
+    It is linear between the two neighbours.
+    """
     return np.stack([np.interp(x, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
 
 

@@ -13,8 +13,9 @@ from vi_contact.core.errors import InputError
 
 @dataclass(frozen=True)
 class ContactLedger:
-    """Hold the works up to each time (steps,) [J/m] from boundary data: energy = load + contact +
-    support to round-off.
+    """Hold the works up to each time (steps,) [J/m] from boundary data.
+
+    With them, energy = load + contact + support to round-off.
 
     energy: of the body; load: of the tractions; contact: of the contact forces, friction included;
     support: of what holds prescribed unknowns; friction: what friction took (in ``contact``
@@ -40,8 +41,9 @@ class ContactLedger:
 def ledger(
     run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None
 ) -> ContactLedger:
-    """Return the works of a run from its boundary motion, BoundaryProblem.solve(run.forces); loads:
-    (steps, 2, n).
+    """Return the works of a run from its boundary motion.
+
+    That is BoundaryProblem.solve(run.forces); ``loads`` are (steps, 2, n).
 
     supported: (2, n), the ``fixed`` of the problem.
     """

@@ -1,5 +1,6 @@
-"""Split the answer of a step with contact into two structures without contact (boundary method,
-eqs. 34 to 36).
+"""Split the answer of a step with contact into two structures without contact.
+
+See the boundary method, eqs. 34 to 36.
 
     A u = b - B_nᵀ r_n,     u_1 = A⁻¹ b,     u_2 = -A⁻¹ B_nᵀ r_n,     u = u_1 + u_2
 
@@ -22,8 +23,9 @@ from vi_contact.core.step import Report
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Hold what a step adds up to, at the nodes of the mesh in rows from the foot upwards, each
-    from left to right.
+    """Hold what a step adds up to.
+
+    It is that at the nodes of the mesh in rows from the foot upwards, each from left to right.
 
     points, u, loaded, pressed: (n, 2) [m] places, displacement of the step, u_1 and u_2; contact,
     forces: (m, 2) places [m] of the conditions and forces on the body [N]; t [s]; defect: largest
@@ -42,7 +44,9 @@ class Decomposition:
 
 def split(problem: ContactProblem, report: Report) -> Decomposition | None:
     """Split a step without friction whose unknowns are displacements; None but on rank 0.
-    Collective."""
+
+    Collective.
+    """
     step, result, surface = report.step, report.result, problem.surface
     space: Any = problem.system.space
     n = len(step.b)

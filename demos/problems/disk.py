@@ -1,5 +1,6 @@
-"""Model the tennis ball of Aimi, Di Credico and Gimperlein (2024): a disk on a plane that pushes it
-up and retracts.
+"""Model the tennis ball of Aimi, Di Credico and Gimperlein (2024).
+
+It is a disk on a plane that pushes it up and retracts.
 
 No weight and no other load: once released, the disk flies up with a constant velocity and swings.
 The plane is rigid, stays horizontal and moves by s(t); the gap of a point of the disk is its height
@@ -26,8 +27,9 @@ from vi_contact.laws.materials import LinearElastic, PlaneStrain
 
 @dataclass(frozen=True)
 class Push:
-    """Push by s(t) = ``height`` sin²(pi t / (2 ``rise``)) until it is zero again at t = 2 ``rise``,
-    then by zero.
+    """Push by s(t) = ``height`` sin²(pi t / (2 ``rise``)).
+
+    It is zero again at t = 2 ``rise``; from then on the push is zero.
 
     With height 0.05 and rise 1 it is 0.05 (1 - cos pi t)/2 for t <= 1; it goes down as it came up.
     [m, s]
@@ -40,7 +42,7 @@ class Push:
         attributes(self, positive=("height", "rise"))
 
     def __call__(self, t: float) -> float:
-        """[m]"""
+        """Return the push [m] at time t [s]."""
         return (
             self.height * math.sin(0.5 * math.pi * t / self.rise) ** 2
             if 0.0 < t < 2.0 * self.rise
@@ -50,8 +52,10 @@ class Push:
 
 @dataclass(frozen=True)
 class Disk:
-    """Describe a disk of ``radius`` [m], with cells of ``size`` [m], plane strain, pushed by
-    ``push``."""
+    """Describe a disk of ``radius`` [m].
+
+    It has cells of ``size`` [m], is in plane strain, and is pushed by ``push``.
+    """
 
     radius: float = 0.5
     size: float = 0.04
@@ -67,15 +71,19 @@ class Disk:
 
     @property
     def time_step(self) -> float:
-        """Return the time [s] in which a pressure wave crosses a cell: half the cell size in the
-        paper's units."""
+        """Return the time [s] in which a pressure wave crosses a cell.
+
+        It is half the cell size in the paper's units.
+        """
         return self.size / self.material.c_p
 
 
 @dataclass(frozen=True)
 class DiskModel:
-    """Hold the assembled disk; ``foot``: its contact side; ``mass``: of the disk as the mesh has it
-    [kg/m]."""
+    """Hold the assembled disk.
+
+    ``foot`` is its contact side; ``mass`` is that of the disk as the mesh has it [kg/m].
+    """
 
     disk: Disk
     system: SemiDiscreteSystem
@@ -106,8 +114,11 @@ def build(disk: Disk, comm: Any) -> DiskModel:
 
 
 class Momentum:
-    """Record the momentum rᵀMv of a body in the plane along x and y and about the point ``centre``,
-    in which contact and friction are the only forces; M is the mass matrix of the run."""
+    """Record the momentum rᵀMv of a body in the plane.
+
+    It is that along x and y and about the point ``centre``; contact and friction are the only
+    forces; M is the mass matrix of the run.
+    """
 
     def __init__(self, centre: tuple[float, float]) -> None:
         self._centre = centre
@@ -131,6 +142,7 @@ class Momentum:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:

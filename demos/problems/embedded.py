@@ -1,5 +1,6 @@
-"""Model concrete in concrete, a box in the notch of a block: the two bodies of Aimi, Di Credico and
-Gimperlein (2024).
+"""Model concrete in concrete, a box in the notch of a block.
+
+They are the two bodies of Aimi, Di Credico and Gimperlein (2024).
 
 The box [-a/2, a/2]² is pressed down on its top. Its lower half stands in a notch of the block
 [-3a/2, 3a/2] x [-2a, 0], which is clamped at its bottom: contact on floor and walls of the notch,
@@ -45,9 +46,11 @@ WALLS = ("left_wall", "right_wall")
 
 @dataclass(frozen=True)
 class Embedded:
-    """Describe box and block. ``box``: the pressed one, with an even number of cells per side;
-    ``block``: the material around it, that of the box by default. InputError for an odd number of
-    cells and for rollers."""
+    """Describe box and block.
+
+    ``box``: the pressed one, with an even number of cells per side; ``block``: the material around
+    it, that of the box by default. InputError for an odd number of cells and for rollers.
+    """
 
     box: Square = field(default_factory=lambda: concrete(cells=10))
     block: LinearElastic | None = None
@@ -77,8 +80,11 @@ class Embedded:
             )
 
     def blocks(self) -> Blocks:
-        """Return the sub-meshes: "foot" and "head" of the box, "left", "right", "under" (the
-        notch), "left_wall" and "right_wall" of the block."""
+        """Return the sub-meshes.
+
+        They are "foot" and "head" of the box, "left", "right", "under" (the notch), "left_wall" and
+        "right_wall" of the block.
+        """
         a, n = 0.5 * self.box.side, self.box.cells // 2
         places = {  # lowest corner, width, height in units of half a side
             "foot": (-1, -1, 2, 1),
@@ -104,8 +110,10 @@ class Embedded:
 
 @dataclass(frozen=True)
 class EmbeddedModel:
-    """Hold the assembled box and block; ``surface``: the contact of floor, left and right wall, in
-    this order."""
+    """Hold the assembled box and block.
+
+    ``surface`` is the contact of floor, left and right wall, in this order.
+    """
 
     embedded: Embedded
     system: SemiDiscreteSystem
@@ -126,8 +134,10 @@ class EmbeddedModel:
 
 
 def build(embedded: Embedded, comm: Any, *, mesh: Callable[[], Any] | None = None) -> EmbeddedModel:
-    """Build mesh, system and contact surface; collective. ``mesh``: makes another mesh with the
-    same groups."""
+    """Build mesh, system and contact surface; collective.
+
+    ``mesh``: makes another mesh with the same groups.
+    """
     box = embedded.box
     built, tags = build_mesh((mesh or embedded.mesh)(), comm)
     around = embedded.block or box.material

@@ -1,5 +1,6 @@
-"""Measure the error of both forms of the Poincaré-Steklov operator against the finest symmetric
-solution.
+"""Measure the error of both forms of the Poincaré-Steklov operator.
+
+It is that against the finest symmetric solution.
 
 The source (Aimi, Di Credico, Gimperlein, Comput. Methods Appl. Mech. Engrg. 427 (2024) 117066) says
 of concrete on steel: "The squared energy error for both couplings decays with similar slope."
@@ -49,8 +50,9 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Example:
-    """Describe a pressed square with c_P dt = ``ratio`` h and ``count`` time steps per element of a
-    side.
+    """Describe a pressed square.
+
+    It has c_P dt = ``ratio`` h and ``count`` time steps per element of a side.
 
     pressure: (t) [Pa]; supports: of the base, by name: components that are held, or the friction of
     a contact.
@@ -104,8 +106,10 @@ EXAMPLES = {
 
 @dataclass
 class Solutions:
-    """Collect displacements (steps, 2n) [m], energies (steps,) [J/m] and worst certificates by
-    support, form and k."""
+    """Collect displacements (steps, 2n) [m], energies (steps,) [J/m] and worst certificates.
+
+    They are sorted by support, form and k.
+    """
 
     displacement: dict[tuple[str, str, int], Array] = field(default_factory=dict)
     energy: dict[tuple[str, str, int], Array] = field(default_factory=dict)
@@ -139,9 +143,11 @@ def held(problem: BoundaryProblem, components: tuple[int, ...]) -> BoundaryProbl
 
 
 def prolonged(u: Array, k: int, fine: int) -> Array:
-    """Return displacements (steps, 2, 4k) of k elements per side in the space of ``fine``, a
-    multiple of k, with as many times the steps: linear between nodes and between times, zero at t =
-    0."""
+    """Return displacements (steps, 2, 4k) in the space of ``fine``.
+
+    They are those of k elements per side, of which ``fine`` is a multiple, with as many times the
+    steps. They are linear between nodes and between times, zero at t = 0.
+    """
     m, steps = fine // k, len(u)
     place, time = np.arange(4 * fine) / m, np.arange(1, m * steps + 1) / m
     node, share = place.astype(int), place % 1.0
@@ -160,8 +166,10 @@ class Norm(Protocol):
 
 
 class EnergyNorm:
-    """Give products <S v, w>, summed over all times up to each and then over these, of motions of
-    the finest space."""
+    """Give products <S v, w>of motions of the finest space.
+
+    They are summed over all times up to each and then over these.
+    """
 
     def __init__(self, operator: PoincareSteklov, motions: Sequence[Array]) -> None:
         u = np.stack([motion.reshape(len(motion), -1) for motion in motions], axis=2)
@@ -177,8 +185,9 @@ class EnergyNorm:
 
 
 def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
-    """Return a row for each support (all by default), form and level of an example; the last level
-    is the reference.
+    """Return a row for each support (all by default), form and level of an example.
+
+    The last level is the reference.
 
     ``levels``: numbers of elements per side, at least three, all divisors of the last, which is
     twice and four times two of them. With more than MARCHED elements the last level is solved in
@@ -238,8 +247,10 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
 
 
 class Differences:
-    """Give squared energy norms of differences of solutions, over that of the finest symmetric
-    one."""
+    """Give squared energy norms of differences of solutions.
+
+    They are over that of the finest symmetric one.
+    """
 
     def __init__(self, norm: Norm, keys: list[tuple[str, int]]) -> None:
         self._norm, self._keys = norm, keys
@@ -258,8 +269,10 @@ class Differences:
         return self._norm.square(self._weights(one, two)) / self._unit
 
     def reference_error(self, fine: int) -> tuple[float, float]:
-        """Return e² of the finest symmetric solution, and the cosine between its last two
-        successive differences."""
+        """Return e² of the finest symmetric solution.
+
+        With it comes the cosine between its last two successive differences.
+        """
         last, middle, first = (("symmetric", fine // m) for m in (1, 2, 4))
         d2, b2 = self.between(first, middle), self.between(middle, last)
         cosine = 0.5 * (self.between(first, last) - d2 - b2) / math.sqrt(d2 * b2)

@@ -1,5 +1,6 @@
-"""Add the second-order effect of a static load: geometric stiffness of its stresses (P-Delta,
-gravity's moment).
+"""Add the second-order effect of a static load.
+
+It is the geometric stiffness of its stresses (P-Delta, gravity's moment).
 
 In first-order statics a block that has tilted about its corner by theta still has its weight at the
 lever arm b. The arm b - h theta of the tilted block, hence uplift that ends in overturning, needs
@@ -30,8 +31,9 @@ from vi_contact.fem.space import FemSpace, known_matrices, space_of
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:
-    """Linearise the problem's system about a static state: K + K_G instead of K, f + K_G u0 instead
-    of f.
+    """Linearise the problem's system about a static state.
+
+    There is K + K_G instead of K, f + K_G u0 instead of f.
 
     The state stays an equilibrium with the same reactions, and motions about it feel the geometric
     stiffness of its stresses: (K + K_G) u = f + K_G u0 - B_nᵀ r_n - B_tᵀ r_t. Use it as
@@ -42,6 +44,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     Args:
         problem: its system made by ``fem.assemble``.
         state: of ``static_equilibrium``; u in the problem's basis, as all states.
+
     Raises:
         InputError: a system that fem.assemble did not make.
     """
@@ -63,8 +66,9 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
 
 
 def initial_stress_matrix(space: FemSpace, nodal: Array, t: float = 0.0) -> Any:
-    """Assemble K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes,
-    d) [m] at a time.
+    """Assemble K_G [N/m] of the stresses of nodal displacements at a time.
+
+    It is of PETSc, for all unknowns; displacements are (owned nodes, d) [m].
 
     Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on
     all cells.
@@ -81,7 +85,10 @@ def initial_stress_matrix(space: FemSpace, nodal: Array, t: float = 0.0) -> Any:
 
 
 def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) -> Load:
-    """The load and the pull of prescribed displacements on the new part: -Pᵀ K_G (U(t) - U(t0))."""
+    """Return the load and the pull of prescribed displacements on the new part.
+
+    It is -Pᵀ K_G (U(t) - U(t0)).
+    """
     start = space.prescribed_values(t0)
 
     def pull(t: float) -> Array:

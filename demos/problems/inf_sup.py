@@ -1,5 +1,6 @@
-"""Measure inf-sup constants of the multiplier's own mesh: how well displacements see it, in space
-and in time.
+"""Measure inf-sup constants of the multiplier's own mesh.
+
+They tell how well displacements see it, in space and in time.
 
     beta = min over lambda of  max over v of  <lambda, v> / (|lambda| |v|),   lambda on (H, DT), v on (h, dt)
 
@@ -21,8 +22,10 @@ FINER = 8  # elements of the finer mesh in one
 
 
 def space_constant(mesh: BoundaryMesh, elements: Mask, patch: int, degree: int = 0) -> float:
-    """Return beta in space for patches of so many contact elements (n,) and a multiplier of degree
-    0 or 1."""
+    """Return beta in space for patches of so many contact elements (n,).
+
+    The multiplier has degree 0 or 1.
+    """
     fine = refined(mesh)
     coarse = _loads(mesh, elements, patch, degree)
     much = _loads(fine, np.repeat(elements, FINER), FINER * patch, degree)
@@ -33,9 +36,11 @@ def space_constant(mesh: BoundaryMesh, elements: Mask, patch: int, degree: int =
 
 
 def time_constant(steps: int, interval: int, testing: str) -> float:
-    """Return beta in time of constants in intervals of so many steps: with continuous
-    displacements, zero at first, linear in each step, when their means are tested, with their
-    rates, constant in each step, when ends are."""
+    """Return beta in time of constants in intervals of so many steps.
+
+    It is that with continuous displacements, zero at first, linear in each step, when their means
+    are tested, with their rates, constant in each step, when ends are.
+    """
     if testing == "end":
         return 1.0  # the rates have all constants of intervals among them
     hats = (2.0 * np.eye(steps) + 0.5 * (np.eye(steps, k=1) + np.eye(steps, k=-1))) / 3.0

@@ -1,5 +1,7 @@
-"""Compute the displacement inside the body from the histories on its boundary: u(x) = V p - K u, in
-time."""
+"""Compute the displacement inside the body from those on its boundary.
+
+From these histories u(x) = V p - K u, in time.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -34,8 +36,9 @@ def interior_displacement(
     *,
     steps: Sequence[int] | None = None,
 ) -> Array:
-    """Return (len(steps), m, 2) displacement [m] at the times motion.times[steps] (None: all) of
-    inner points (m, 2).
+    """Return (len(steps), m, 2) displacement [m] of inner points (m, 2).
+
+    It is that at the times motion.times[steps] (None: all).
 
     Without quadrature in time, with the elements split at the wave fronts. InputError for points
     that are not inside.
@@ -73,8 +76,10 @@ def interior_displacement(
 def _matrices(
     mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float
 ) -> tuple[Array, Array]:
-    """Return (2m, 4n) of V integrated once, (2m, 2n) of K integrated twice, both up to t; density
-    1."""
+    """Return (2m, 4n) of V integrated once, (2m, 2n) of K integrated twice.
+
+    Both go up to t; the density is 1.
+    """
     m, n = len(x), len(mesh)
     moments = np.concatenate(list(_moments(mesh, x, t, c_p, c_s)), axis=1)
     point, element = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
@@ -86,8 +91,10 @@ def _matrices(
 
 
 def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> Iterator[Array]:
-    """Return (k, points * n, 2) integrals over each element of the stacked kernels against its
-    shape functions."""
+    """Return (k, points * n, 2) integrals over each element.
+
+    They are those of the stacked kernels against its shape functions.
+    """
     n, along = len(mesh), mesh.points[mesh.after] - mesh.points
     group = max(1, 4000 // n)
     kernels = TimeKernels(t, c_p, c_s)
@@ -115,8 +122,10 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
 
 
 def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
-    """Raise InputError unless all points are inside: winding number 1 (0 for an exterior body), off
-    the boundary."""
+    """Raise InputError unless all points are inside.
+
+    They have winding number 1 (0 for an exterior body), and are off the boundary.
+    """
     start, end = mesh.points - x[:, None], mesh.points[mesh.after] - x[:, None]
     distance = distances(x[:, None], mesh.points, mesh.points[mesh.after]) / mesh.lengths
     turn = np.arctan2(

@@ -1,5 +1,7 @@
-"""Join loose segments, in any order and direction, to the closed loops of a mesh of boundary
-elements."""
+"""Join loose segments to the closed loops of a mesh of boundary elements.
+
+They may be in any order and direction.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +20,9 @@ def from_segments(
     labels: ArrayLike | None = None,
     exterior: bool = False,
 ) -> BoundaryMesh:
-    """Join loose segments to a mesh, for example the facets of a finite element boundary, in any
-    order and direction.
+    """Join loose segments to a mesh.
+
+    They are for example the facets of a finite element boundary, in any order and direction.
 
     points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g.
     facet tags. Loops are joined and turned so that the body is on the left. Raises InputError when
@@ -42,8 +45,10 @@ def from_segments(
 def ordered_loops(
     points: Array, segments: Indices, *, exterior: bool
 ) -> tuple[Indices, tuple[int, ...]]:
-    """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops),
-    body on the left."""
+    """Return ((n, 2) start point and number of each segment; sizes of the loops).
+
+    They come loop after loop, with the body on the left.
+    """
     ends = np.bincount(segments.ravel(), minlength=len(points))
     if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
         bad = int(np.argmax((ends != 2) & (ends > 0)))

@@ -1,5 +1,7 @@
-"""Pose the membrane over a ball for ``vi_contact.vi.solve``: form, bounds and conditions of
-DOLFINx."""
+"""Pose the membrane over a ball for ``vi_contact.vi.solve``.
+
+There are form, bounds and conditions of DOLFINx.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,10 @@ from vi_contact.fem import compat
 
 @dataclass(frozen=True)
 class Posed:
-    """Hold what ``vi.solve((a, L), u, lower=lower, bcs=[bc])`` takes, and the ``exact`` solution at
-    the nodes."""
+    """Hold what ``vi.solve((a, L), u, lower=lower, bcs=[bc])`` takes.
+
+    With it comes the ``exact`` solution at the nodes.
+    """
 
     a: Any
     L: Any

@@ -1,5 +1,6 @@
-"""Make systems of thin (Kirchhoff) plates from a form of DOLFINx: C0 interior penalty on triangles
-of second order.
+"""Make systems of thin (Kirchhoff) plates from a form of DOLFINx.
+
+It is a C0 interior penalty on triangles of second order.
 
     rho t w'' + D ∇⁴w = q,   M(w) = D ((1 - nu) ∇∇w + nu (Δw) I),   w the deflection upwards [m]
 
@@ -32,8 +33,10 @@ from vi_contact.fem import compat
 
 @dataclass(frozen=True)
 class Plate:
-    """Describe a plate: bending stiffness D [N m], Poisson's ratio [-], mass per area rho t
-    [kg/m²]."""
+    """Describe a plate.
+
+    It has bending stiffness D [N m], Poisson's ratio [-] and mass per area rho t [kg/m²].
+    """
 
     D: float = 1.0e4
     nu: float = 0.3
@@ -41,8 +44,10 @@ class Plate:
 
 
 def square_mesh(comm: Any, side: float, cells: int) -> Any:
-    """Return so many squares along the side of a square around 0 [m], each cut into four
-    triangles."""
+    """Return so many squares along the side of a square around 0 [m].
+
+    Each is cut into four triangles.
+    """
     half, crossed = 0.5 * side, dolfinx.mesh.DiagonalType.crossed
     ghosts = dolfinx.mesh.GhostMode.shared_facet  # edges between ranks are integrated too
     return dolfinx.mesh.create_rectangle(
@@ -104,7 +109,7 @@ def plate_system(
 
 
 def _stiffness(on: Any, plate: Plate, w: Any, v: Any, clamped: bool) -> Any:
-    """The form of K."""
+    """Return the form of K."""
     n, D, nu = ufl.FacetNormal(on), plate.D, plate.nu
     slender = ufl.FacetArea(on) / ufl.CellVolume(on)
 

@@ -33,8 +33,10 @@ def published_start() -> Start:
 
 
 def published_elements(count: int = 1000) -> Elements:
-    """Return m = 1000 elements: linear functions, exact integration, the cubic last rotation
-    function."""
+    """Return m = 1000 elements.
+
+    They have linear functions, exact integration and the cubic last rotation function.
+    """
     return Elements(count, reduced_shear=False, published_end=True)
 
 
@@ -44,8 +46,10 @@ def published_friction(eps: float = 0.002) -> RegularisedFriction:
 
 
 def readings(dt: float = DT) -> dict[str, Force]:
-    """Return the readings of |r_N|(t) [N] by their letters, and "none", a free tip; dt > 0 [s]:
-    step of reading C."""
+    """Return the readings of |r_N|(t) [N] by their letters.
+
+    There is also "none", a free tip; dt > 0 [s] is the step of reading C.
+    """
     number("readings", "dt", dt, positive=True, unit="s")
     return {
         "none": lambda t: 0.0,

@@ -1,5 +1,6 @@
-"""Model a stiff block that stands on the ground with its two lower corners: the rigid limit of
-contact.
+"""Model a stiff block that stands on the ground with its two lower corners.
+
+It is the rigid limit of contact.
 
 The base may lift but not slide: in small displacements the base of a block that turns about one of
 its corners does not move sideways, so its horizontal displacement is held. The weight's lever arm b
@@ -43,8 +44,9 @@ RIGID = 200.0  # least sqrt(E/rho)/height over p
 
 @dataclass(frozen=True)
 class RockingBlock:
-    """Describe width and height of ``shape`` [m], a material stiff enough to be rigid, and the
-    mesh.
+    """Describe width and height of ``shape`` [m].
+
+    With them come a material stiff enough to be rigid, and the mesh.
 
     ``damping``: the default is 5 % of critical in the block's lowest bending vibration and nothing
     in rigid rotations; without it the vibrations of an impact last and stir the next one.
@@ -88,8 +90,10 @@ class RockingBlock:
         return self.material.rho * self.shape.width * self.shape.height
 
     def motion(self, theta0: float, t: Array) -> Array:
-        """Return theta(t) [rad] of the rigid limit released at rest: Housner's phi, p_eff for p and
-        b/h for alpha."""
+        """Return theta(t) [rad] of the rigid limit released at rest.
+
+        It is Housner's phi, p_eff for p and b/h for alpha.
+        """
         return self._scaled(self.shape.free_rocking(self._twin(theta0), t * self.p / self.shape.p))
 
     def impact_times(self, theta0: float, impacts: int) -> Array:
@@ -110,8 +114,10 @@ class RockingBlock:
 
 @dataclass(frozen=True)
 class RockingModel:
-    """Hold the model. ``problem``: the block with geometric stiffness; ``rest``: the block still
-    under its weight."""
+    """Hold the model.
+
+    ``problem``: the block with geometric stiffness; ``rest``: the block still under its weight.
+    """
 
     block: RockingBlock
     problem: ContactProblem
@@ -122,13 +128,17 @@ class RockingModel:
         return replace(self.problem, excitation=excitation)
 
     def time_steps(self, *, dt: float | None = None, halvings: int = 4) -> HalvedAtImpact:
-        """Return steps of 1/(400 p), halved where a corner lands: the loss of an impact needs its
-        time resolved."""
+        """Return steps of 1/(400 p).
+
+        They are halved where a corner lands, as the loss of an impact needs its time resolved.
+        """
         return HalvedAtImpact(1.0 / (400.0 * self.block.shape.p) if dt is None else dt, halvings)
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
-        """Return the block at rest, turned by theta [rad] about its lower left corner, turning at
-        ``rate`` [rad/s]."""
+        """Return the block at rest, turned by theta [rad] about its lower left corner.
+
+        It turns at ``rate`` [rad/s].
+        """
         u, v, none = (
             self.rest.u + theta * self._turn,
             rate * self._turn,
@@ -138,8 +148,10 @@ class RockingModel:
 
     @property
     def onset_acceleration(self) -> float:
-        """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly: m g
-        b / turn·M r."""
+        """Return the horizontal acceleration [m/s²] that lifts the block.
+
+        It does so when it grows slowly, and is m g b / turn·M r.
+        """
         system = self.problem.equations
         overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))
         return (
@@ -151,15 +163,19 @@ class RockingModel:
         )
 
     def angle(self, state: State) -> float:
-        """Return the rotation [rad] by the heights of the corners, positive when the right one is
-        up."""
+        """Return the rotation [rad] by the heights of the corners.
+
+        It is positive when the right one is up.
+        """
         surface = self.problem.surface
         down = surface.everywhere(surface.normal_values(state.u - self.rest.u))
         return float(down[0] - down[1]) / self.block.shape.width
 
     def spin(self, state: State) -> float:
-        """Return the angular velocity [rad/s] by vertical velocities: s·M v / s·M s with s = (x -
-        b) e_y."""
+        """Return the angular velocity [rad/s] by vertical velocities.
+
+        It is s·M v / s·M s with s = (x - b) e_y.
+        """
         return float(self.problem.system.algebra.dot(self._spin, state.v))
 
     @cached_property
@@ -200,6 +216,7 @@ class Rocking:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
@@ -240,8 +257,9 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
 
 
 def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Return (times when theta passes zero [s], largest abs(theta) between them and before [rad])
-    of a free block.
+    """Return (times when theta passes zero [s], largest abs(theta) between) of a free block.
+
+    The angle [rad] is that between them and before.
 
     The other side counts once a thousandth of the largest rotation is reached there: landing
     corners may chatter.

@@ -1,5 +1,6 @@
-"""Model a square that is pressed on a rigid support: compression tests of Aimi, Di Credico and
-Gimperlein (2024).
+"""Model a square that is pressed on a rigid support.
+
+These are compression tests of Aimi, Di Credico and Gimperlein (2024).
 
 A uniform pressure acts on the top of [-a/2, a/2]², the bottom is in possible contact, the sides are
 free, plane strain; at rest for t <= 0. In the source's units: c_P = 1, c_S = 1/2, rho = 1, side 1,
@@ -25,8 +26,9 @@ from vi_contact.meshes.block import BlockMesh
 
 @dataclass(frozen=True)
 class Square:
-    """Describe a square of ``cells`` bilinear cells a ``side`` [m]; ``pressure`` [Pa] on the top
-    times ``history``(t).
+    """Describe a square of ``cells`` bilinear cells a ``side`` [m].
+
+    ``pressure`` [Pa] acts on the top times ``history``(t).
 
     ``confined``: the sides move vertically only, so that plane waves run up and down. InputError
     for no cells.
@@ -57,8 +59,10 @@ class Square:
 
 
 def concrete(cells: int = 20) -> Square:
-    """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa
-    tanh((t/15 ms)²)."""
+    """Describe a box of concrete on steel, 1 m wide.
+
+    It has c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²).
+    """
     return Square(
         cells=cells,
         material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0),

@@ -1,5 +1,7 @@
-"""Keep boundary element blocks in a file (HDF5): they depend on geometry, wave speeds and time step
-only."""
+"""Keep boundary element blocks in a file (HDF5).
+
+They depend on geometry, wave speeds and time step only.
+"""
 
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,6 @@
-"""Pose beams, frames and plates in unilateral contact, each beside what is known of it in closed
-form.
+"""Pose beams, frames and plates in unilateral contact.
+
+Each stands beside what is known of it in closed form.
 
 Frames are scipy matrices (``frame_elements``), plates a form of DOLFINx (``plates``); SI units.
 """
@@ -34,8 +35,10 @@ CANTILEVER = 1.8751040687119611  # root of cos z cosh z = -1
 
 
 def frame_on_a_stop(gap: float, normal: tuple[float, float]) -> ContactProblem:
-    """Return a clamped column with an arm, loaded at its end, which a stop in this direction [m]
-    holds."""
+    """Return a clamped column with an arm, held by a stop.
+
+    It is loaded at its end, which a stop in this direction [m] holds.
+    """
     nodes = np.concatenate(
         [line([0.0, 0.0], [0.0, HEIGHT], 6), line([0.0, HEIGHT], [ARM, HEIGHT], 3)[1:]]
     )
@@ -47,9 +50,11 @@ def frame_on_a_stop(gap: float, normal: tuple[float, float]) -> ContactProblem:
 
 
 def heavy_beam(count: int) -> ContactProblem:
-    """Return a beam of so many elements on the ground, whose left end is pulled up; its weight acts
-    at the nodes. Its right end is clamped at the height of the ground, on which it lies there
-    anyway."""
+    """Return a beam of so many elements on the ground.
+
+    Its left end is pulled up; its weight acts at the nodes. Its right end is clamped at the height
+    of the ground, on which it lies there anyway.
+    """
     h = HEAVY_LENGTH / count
     parts = frame(
         line([0.0, 0.0], [HEAVY_LENGTH, 0.0], count), [(i, i + 1) for i in range(count)], **SECTION
@@ -63,8 +68,11 @@ def heavy_beam(count: int) -> ContactProblem:
 
 
 def thrown_beam(count: int, gap: float, speed: float) -> tuple[ContactProblem, float]:
-    """Return a cantilever that swings in its first mode, its tip at this speed [m/s] towards a
-    stop, and the time [s] at which it touches: tip = speed/omega sin omega t until then."""
+    """Return a cantilever that swings in its first mode.
+
+    Its tip goes at this speed [m/s] towards a stop. With it comes the time [s] at which it touches;
+    tip = speed/omega sin omega t until then.
+    """
     x, z = np.linspace(0.0, TIP_LENGTH, count + 1), CANTILEVER / TIP_LENGTH
     ratio = (np.cosh(CANTILEVER) + np.cos(CANTILEVER)) / (np.sinh(CANTILEVER) + np.sin(CANTILEVER))
     mode = np.cosh(z * x) - np.cos(z * x) - ratio * (np.sinh(z * x) - np.sin(z * x))
@@ -83,9 +91,11 @@ def thrown_beam(count: int, gap: float, speed: float) -> tuple[ContactProblem, f
 def plate_on_a_stop(
     comm: Any, disk: bool, cells: int, share: float
 ) -> tuple[ContactProblem, float]:
-    """Return a plate under PRESSURE above a stop at its middle, a clamped disk or a simply
-    supported square, and the exact force of the stop [N]; share: of the free deflection, at which
-    the stop is."""
+    """Return a plate under PRESSURE above a stop at its middle, and its exact force [N].
+
+    The plate is a clamped disk or a simply supported square; the force is that of the stop;
+    ``share`` is that of the free deflection, at which the stop is.
+    """
     size = 0.5 * SIDE if disk else SIDE
     load, force = clamped_disk() if disk else square_plate()
     on = disk_mesh(comm, size, cells) if disk else square_mesh(comm, size, cells)
@@ -96,9 +106,11 @@ def plate_on_a_stop(
 
 
 def disk_above_ground(comm: Any, cells: int, share: float) -> tuple[ContactProblem, DiskOnGround]:
-    """Return a clamped disk under PRESSURE above flat ground, with conditions at the vertices of
-    its triangles, and its closed form in units of the radius; share: of the free deflection, at
-    which the ground is."""
+    """Return a clamped disk under PRESSURE above flat ground.
+
+    There are conditions at the vertices of its triangles. With it comes its closed form in units of
+    the radius; ``share`` is that of the free deflection, at which the ground is.
+    """
     radius, known = 0.5 * SIDE, disk_on_ground(share / 64.0)
     on = disk_mesh(comm, radius, cells)
     system = plate_system(on, PLATE, clamped=True, pressure=PRESSURE)
@@ -114,8 +126,11 @@ def disk_above_ground(comm: Any, cells: int, share: float) -> tuple[ContactProbl
 
 
 def thrown_plate(comm: Any, cells: int, gap: float, speed: float) -> tuple[ContactProblem, float]:
-    """Return a simply supported square that swings in its first mode, its middle at this speed
-    [m/s] towards a stop, and the time [s] at which it touches."""
+    """Return a simply supported square that swings in its first mode.
+
+    Its middle goes at this speed [m/s] towards a stop. With it comes the time [s] at which it
+    touches.
+    """
 
     def mode(x: Array) -> Array:
         return np.asarray(-speed * np.cos(np.pi * x[:, 0] / SIDE) * np.cos(np.pi * x[:, 1] / SIDE))
@@ -129,9 +144,12 @@ def thrown_plate(comm: Any, cells: int, gap: float, speed: float) -> tuple[Conta
 
 
 def residual(problem: ContactProblem, state: State) -> float:
-    """Return how far a state is from equilibrium in contact, by sums of its own: the largest of the
-    force that is out of balance and of pull, over the largest force, and of penetration, over the
-    largest displacement; the largest of reaction times gap over both. Collective."""
+    """Return how far a state is from equilibrium in contact.
+
+    It uses sums of its own: the largest of the force that is out of balance and of pull, over the
+    largest force, and of penetration, over the largest displacement; the largest of reaction times
+    gap over both. Collective.
+    """
     system, surface, comm = problem.static_load, problem.surface, problem.system.algebra.comm
     load = system.load.at_rest(state.t)
     off = system.K @ state.u - load + surface.reaction_load(state.r_n, system.K.rows)

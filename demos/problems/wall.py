@@ -1,5 +1,6 @@
-"""Model the first example of the boundary method: a wall clamped at its base, beside the ground
-(Figs. 2 to 5).
+"""Model the first example of the boundary method.
+
+It is a wall clamped at its base, beside the ground (Figs. 2 to 5).
 
 What the source leaves open is marked CHOSEN and explained in the documentation
 (docs/start/first_wall.md).
@@ -77,8 +78,9 @@ class Wall:
         )
 
     def point(self, number: int) -> tuple[float, float]:
-        """Return the source's boundary points 1..40, anticlockwise from the right side above the
-        base.
+        """Return the source's boundary points 1..40.
+
+        They go anticlockwise from the right side above the base.
 
         1-12 right side upwards (12 = top right corner), 13-20 top, 21-32 left side downwards, 33-40
         base.
@@ -127,8 +129,9 @@ class WallModel:
         impact: ImpactLaw | None = Inelastic(),
         mass: MassLaw | None = None,
     ) -> ContactProblem:
-        """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic
-        impact on its mass.
+        """Set up the wall in a case.
+
+        By default there are the harmonic of Fig. 3 and the source's inelastic impact on its mass.
 
         Schemes with massless contact nodes take impact=None and their own mass; an impact law runs
         on consistent mass.
@@ -142,8 +145,10 @@ class WallModel:
         )
 
     def harmonic(self, amplitude: float = 1.0) -> Harmonic:
-        """Return a_g = a0 sin(2 pi f t), f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor
-        period; a0 = 1 m/s²."""
+        """Return a_g = a0 sin(2 pi f t), f = f1/2.
+
+        CHOSEN: Fig. 3 prints neither amplitude nor period; a0 = 1 m/s².
+        """
         return Harmonic(amplitude, 0.5 * lowest_frequency(self.system), direction=(1.0, 0.0))
 
     def time_step(self) -> float:
@@ -151,8 +156,10 @@ class WallModel:
         return 1.0 / (20.0 * lowest_frequency(self.system))
 
     def probes(self) -> dict[str, tuple[float, float]]:
-        """Return the points that the figures show: contact points, points between them, top and far
-        side."""
+        """Return the points that the figures show.
+
+        They are contact points, points between them, top and far side.
+        """
         return {str(number): self.wall.point(number) for number in (4, 6, 7, 10, 12, 26)}
 
 

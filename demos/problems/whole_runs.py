@@ -21,8 +21,9 @@ from vi_contact.run.time_steps import TimeSteps
 
 @dataclass(frozen=True)
 class Reference:
-    """Hold another answer to the same problem, from the same initial time on; in the plane per
-    metre of thickness.
+    """Hold another answer to the same problem.
+
+    It goes from the same initial time on; in the plane it is per metre of thickness.
 
     times: (k,) [s], increasing; impulse: (k, d) of the contact forces of the support on the body up
     to each time [N s]; mean_towards: (k,) displacement towards the support at each time, mean over
@@ -96,8 +97,10 @@ class RunComparison:
         self.towards.append(float(moved / size))
 
     def compare(self, reference: Reference, bound: float) -> RunDifference:
-        """Return the differences. InputError for a reference in other dimensions, without common
-        times, or with NaN."""
+        """Return the differences.
+
+        InputError for a reference in other dimensions, without common times, or with NaN.
+        """
         mine, theirs = np.array(self.impulse), np.asarray(reference.impulse, float)
         t = np.asarray(reference.times, float)
         common = (t >= self.times[0]) & (t <= self.times[-1] * (1.0 + 1e-12))
@@ -134,8 +137,9 @@ def compare_runs(
     state: State | None = None,
     bound: float = 0.02,
 ) -> list[RunDifference]:
-    """March the problem and return how far each reference is off, for example ``Reference.of`` a
-    ``bem.ContactRun``.
+    """March the problem and return how far each reference is off.
+
+    Such is ``Reference.of`` a ``bem.ContactRun``.
 
     Impulses and mean displacements should agree within ``bound``, relative; the rest as in
     ``march``.

@@ -53,6 +53,47 @@ class Traffic:
         """Whether something was sent, and nothing of more than a dozen numbers."""
         return 1 <= max(self.sizes) <= DOZEN
 
+    def count_sizes(self, operation: Any) -> Any:
+        """Return the operation of a communicator, which notes what it sends."""
+
+        def count(comm: Any, value: Any) -> Any:
+            self.outside += not self.solving
+            self.sizes.append(
+                value.size if isinstance(value, np.ndarray) else len(pickle.dumps(value)) // 8
+            )
+            return operation(comm, value)
+
+        return count
+
+    def count_products(self, operation: Any) -> Any:
+        """Return the product of a matrix and a vector, which is counted."""
+
+        def multiply(matrix: Any, x: Any) -> Any:
+            self.products += 1
+            return operation(matrix, x)
+
+        return multiply
+
+    def mark_solving(self, operation: Any) -> Any:
+        """Return the solver, which tells when it begins and ends."""
+
+        def solve(prepared: Any, step: Any) -> Any:
+            self.solving = True
+            result = operation(prepared, step)
+            self.solving = False
+            return result
+
+        return solve
+
+
+def refuse(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> None:
+    """Let a call of this method fail."""
+
+    def refused(*_: Any) -> None:
+        raise AssertionError(f"{owner.__name__}.{name} was called")
+
+    monkeypatch.setattr(owner, name, refused)
+
 
 @pytest.fixture
 def traffic(monkeypatch: pytest.MonkeyPatch) -> Traffic:
@@ -60,45 +101,14 @@ def traffic(monkeypatch: pytest.MonkeyPatch) -> Traffic:
     refused, on one rank too."""
     found = Traffic()
 
-    def refuse(owner: Any, name: str) -> None:
-        def refused(*_: Any) -> None:
-            raise AssertionError(f"{owner.__name__}.{name} was called")
-
-        monkeypatch.setattr(owner, name, refused)
-
-    def counted(operation: Any) -> Any:
-        def count(comm: Any, value: Any) -> Any:
-            found.outside += not found.solving
-            found.sizes.append(
-                value.size if isinstance(value, np.ndarray) else len(pickle.dumps(value)) // 8
-            )
-            return operation(comm, value)
-
-        return count
-
-    def multiplied(operation: Any) -> Any:
-        def multiply(matrix: Any, x: Any) -> Any:
-            found.products += 1
-            return operation(matrix, x)
-
-        return multiply
-
-    def solved(operation: Any) -> Any:
-        def solve(prepared: Any, step: Any) -> Any:
-            found.solving = True
-            result = operation(prepared, step)
-            found.solving = False
-            return result
-
-        return solve
-
     def begin() -> None:
         for name in ("sum", "max", "bcast", "gather"):
-            monkeypatch.setattr(MpiComm, name, counted(getattr(MpiComm, name)))
-        monkeypatch.setattr(PetscMatrix, "__matmul__", multiplied(PetscMatrix.__matmul__))
-        monkeypatch.setattr(PreparedIterative, "solve", solved(PreparedIterative.solve))
-        refuse(PetscAlgebra, "factor")
-        refuse(ContactSurface, "everywhere")
+            monkeypatch.setattr(MpiComm, name, found.count_sizes(getattr(MpiComm, name)))
+        product = found.count_products(PetscMatrix.__matmul__)
+        monkeypatch.setattr(PetscMatrix, "__matmul__", product)
+        monkeypatch.setattr(PreparedIterative, "solve", found.mark_solving(PreparedIterative.solve))
+        refuse(monkeypatch, PetscAlgebra, "factor")
+        refuse(monkeypatch, ContactSurface, "everywhere")
         monkeypatch.setattr(sizes, "OWN_UNKNOWNS", 0)
 
     found.begin = begin

@@ -1,5 +1,6 @@
-"""Describe a plane body's boundary by closed loops of straight elements, with its two spaces and
-mass matrices.
+"""Describe a plane body's boundary by closed loops of straight elements.
+
+It comes with its two spaces and mass matrices.
 
 The body lies to the left of its boundary: outer loops run counter-clockwise, holes clockwise, and
 the normal points out of the body. `exterior=True` means the unbounded outside of the loops:
@@ -7,7 +8,8 @@ everything reversed. Element i starts at node i.
 
 Displacements: continuous P1, values (2, n) (component, node). Tractions: discontinuous P1, values
 (2, n, 2) (component, element, end), so that a corner carries two tractions. Flattened in that order
-they are the unknowns of the matrices."""
+they are the unknowns of the matrices.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -33,7 +35,8 @@ class BoundaryMesh:
     loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the
     boundary. exterior: the body is the unbounded outside. Raises InputError for fewer than three
     nodes in a loop, elements of no length, a boundary that crosses or touches itself or runs the
-    wrong way round."""
+    wrong way round.
+    """
 
     points: Array
     loop_sizes: tuple[int, ...] = ()
@@ -70,8 +73,10 @@ class BoundaryMesh:
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """Return (n,) the node (and element) that follows each; element i goes from node i to node
-        after[i]."""
+        """Return (n,) the node (and element) that follows each.
+
+        Element i goes from node i to node after[i].
+        """
         after = np.arange(1, len(self.points) + 1)
         ends = np.cumsum(self.loop_sizes)
         after[ends - 1] = ends - self.loop_sizes
@@ -114,8 +119,10 @@ class BoundaryMesh:
 
     @cached_property
     def mass(self) -> Array:
-        """Return (4n, 2n) <u, psi>: continuous displacements tested with discontinuous tractions
-        [m]."""
+        """Return (4n, 2n) <u, psi>.
+
+        Continuous displacements are tested with discontinuous tractions [m].
+        """
         n = len(self)
         mass = np.zeros((2, n, 2, 2, n))
         for a in range(2):
@@ -150,8 +157,10 @@ class BoundaryMesh:
         return half + np.bincount(self.after, half, len(self))
 
     def node_normals(self, elements: ArrayLike) -> Array:
-        """Return (n, 2) unit normals at nodes, the mean of the masked elements by their lengths;
-        else zero."""
+        """Return (n, 2) unit normals at nodes.
+
+        They are the means of the masked elements by their lengths; elsewhere they are zero.
+        """
         weighted = self.normals * (self.lengths * self._mask(elements))[:, None]
         sums = weighted + np.stack(
             [np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1
@@ -160,8 +169,10 @@ class BoundaryMesh:
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
 
     def node_turns(self, elements: ArrayLike) -> Array:
-        """Return (n,) angle [rad] by which the boundary turns at each node between two masked
-        elements; else zero."""
+        """Return (n,) angle [rad] by which the boundary turns at each node.
+
+        It is taken between two masked elements; elsewhere it is zero.
+        """
         chosen, before = self._mask(elements), np.empty(len(self), dtype=np.int64)
         before[self.after] = np.arange(len(self))
         one, other = self.normals[before], self.normals
@@ -175,11 +186,13 @@ class BoundaryMesh:
 def polygon(
     corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False
 ) -> BoundaryMesh:
-    """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i +
-    1.
+    """Mesh a polygon.
+
+    The label of an element is the number of its side; side i goes from corner i to corner i + 1.
 
     corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element
-    length [m], or the number of elements of every side."""
+    length [m], or the number of elements of every side.
+    """
     start = array("polygon", "corners", corners, (None, 2), unit="m")
     if len(start) < 3:
         raise InputError(f"polygon: corners has {len(start)} points; give three or more")
@@ -204,8 +217,10 @@ def polygon(
 def circle(
     radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False
 ) -> BoundaryMesh:
-    """Return a disk of `count` chords, starting at its lowest point; exterior: the space around a
-    round hole."""
+    """Return a disk of `count` chords, starting at its lowest point.
+
+    ``exterior`` makes the space around a round hole of it.
+    """
     middle = array("circle", "centre", centre, (2,), unit="m")
     number("circle", "radius", radius, positive=True, unit="m")
     counted(

@@ -1,17 +1,21 @@
-"""Build the Galerkin matrices of the four boundary operators from radial kernels of either domain,
-density 1.
+"""Build the Galerkin matrices of the four boundary operators.
+
+They come from radial kernels of either domain, for density 1.
 
 With M u = d/dtau (-u_2, u_1), mu = c_S², x - y = d and normals n_x, n_y (regularised as in
 docs/theory/bem.md; nothing is worse than a logarithm on a closed curve):
 
-    V p  = ∫ G p                                                                                  single layer
-    K u  = ∫ dPhi_S/dn_y u - Phi_S M u + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u              double layer
-    <K' p, v> = <p, K v>                                                                         adjoint
-    <D u, v> = ∫∫ - [inertia_P (n_x.v)(n_y.u) + inertia_S (tau_x.v)(tau_y.u)] - 4 mu Phi_S u'.v' + 4 mu² Mv.G Mu
+    V p  = ∫ G p                                                                  single layer
+    K u  = ∫ dPhi_S/dn_y u - Phi_S M u                                            double layer
+           + grad_y(Phi_P - Phi_S) (n_y.u) + 2 mu G M u
+    <K' p, v> = <p, K v>                                                          adjoint
+    <D u, v> = ∫∫ - [inertia_P (n_x.v)(n_y.u) + inertia_S (tau_x.v)(tau_y.u)]     hypersingular
+                - 4 mu Phi_S u'.v' + 4 mu² Mv.G Mu
                + 2 mu [(v.Mu) dPhi_S/dn_x + (u.Mv) dPhi_S/dn_y]
-               + 2 mu [(n_x.v) grad_x(Phi_P - Phi_S).Mu + (n_y.u) grad_y(Phi_P - Phi_S).Mv]      hypersingular
+               + 2 mu [(n_x.v) grad_x(Phi_P - Phi_S).Mu + (n_y.u) grad_y(Phi_P - Phi_S).Mv]
 
-in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D."""
+in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -79,8 +83,10 @@ class Galerkin:
         return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper))
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
-        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels against phi_a(x)
-        phi_b(y)."""
+        """Return (k, pairs, 2, 2) integrals [m²] of the stacked kernels.
+
+        They are taken against phi_a(x) phi_b(y).
+        """
         total: NDArray = np.empty(0)
         for points in point_sets(self.pairs, fronts, self.orders):
             values = integrands(kernels(points.r), points.d, points.r)
@@ -121,8 +127,11 @@ class Galerkin:
         )
 
     def _hyper_local(self, m: NDArray) -> NDArray:
-        """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair,
-        shape of v, of u."""
+        """Return (2, 2, p, 2, 2).
+
+        The axes are: component of v on the first element, of u on the second, pair, shape of v, of
+        u.
+        """
         mesh, e, f = self.mesh, self.pairs.first, self.pairs.second
         n_x, n_y = mesh.normals[e].T[:, :, None, None], mesh.normals[f].T[:, :, None, None]
         t_x, t_y = mesh.tangents[e].T[:, :, None, None], mesh.tangents[f].T[:, :, None, None]
@@ -150,10 +159,13 @@ class Galerkin:
 
 
 def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int64]) -> NDArray:
-    """Return (2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on
-    the elements y (p,).
+    """Return (2, 2, p, a, 2).
 
-    m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S²."""
+    The axes are: component of K u, component of u, pair, shape function of x, of y on the elements
+    y (p,).
+
+    m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S².
+    """
     normal, slopes = mesh.normals[y].T[:, :, None, None], SLOPE / mesh.lengths[y][:, None, None]
     phi, g = m[4].sum(2)[..., None], tensor(m[5:8].sum(3))[..., None]
     by_normal = (m[0:2] * normal).sum(0)
@@ -168,8 +180,10 @@ def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int
 
 
 def joined_at_nodes(mesh: BoundaryMesh, local: NDArray, axis: int) -> NDArray:
-    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes; the end axis
-    goes."""
+    """Add up shape functions (element at `axis`, end at axis + 1) at the nodes.
+
+    The end axis goes.
+    """
     start, end = np.take(local, 0, axis + 1), np.take(local, 1, axis + 1)
     before = np.empty_like(mesh.after)
     before[mesh.after] = np.arange(len(before))
@@ -182,8 +196,10 @@ def tensor(m: NDArray) -> NDArray:
 
 
 def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
-    """Return (k, m) integrands of the operators at d = x - y, in the order their methods read
-    them."""
+    """Return (k, m) integrands of the operators at d = x - y.
+
+    They come in the order their methods read them.
+    """
     xx, xy, yy = d[0] ** 2 / r**2, d[0] * d[1] / r**2, d[1] ** 2 / r**2
     g1, g2 = kernels.single
     rows = [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]

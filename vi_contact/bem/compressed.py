@@ -1,5 +1,6 @@
-"""Keep the blocks of the energetic method in little memory: nothing ahead of waves, few steps
-behind the last one.
+"""Keep the blocks of the energetic method in little memory.
+
+Nothing is kept ahead of waves, and few steps behind the last one.
 
 Element i starts at node i; entries at nodes come from the element before as well. With r_min and
 r_max the least and greatest distance between the elements of an entry, and h the longest, the
@@ -10,7 +11,8 @@ blocks of step j (times t_(j-1) to t_(j+1))
 for then the points of the integrals stay where they are (quadrature.py). All steps between are
 integrated and kept, and of the tail those from which the others are interpolated (tails.py); of
 symmetric matrices, one half. Blocks are kept AHEAD times as long as asked for: the circle of
-frequencies needs them (frequency_circle.py)."""
+frequencies needs them (frequency_circle.py).
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -34,10 +36,12 @@ BlockSteps = Callable[[Callable[[int], Mask]], Iterable[tuple[Array, Array, Arra
 
 @dataclass(frozen=True)
 class Stretch:
-    """Hold entries of the same window: their places (numbers,) in the matrices of a step, one
-    behind the other, and values (kept steps, numbers): all steps from `first` to `smooth`, then the
-    steps `tail`, with weights that give all steps behind `smooth` and bounds of errors
-    (tails.py)."""
+    """Hold entries of the same window.
+
+    They are their places (numbers,) in the matrices of a step, one behind the other, and values
+    (kept steps, numbers): all steps from `first` to `smooth`, then the steps `tail`, with weights
+    that give all steps behind `smooth` and bounds of errors (tails.py).
+    """
 
     first: int
     smooth: int
@@ -53,7 +57,8 @@ class CompressedBlocks:
     """Hold the blocks of density 1, as EnergeticBlocks does, compressed in time.
 
     places: (28 n²,) of each entry of the matrices of a step, one behind the other, among the
-    numbers of all stretches; steps: asked for; reach: kept."""
+    numbers of all stretches; steps: asked for; reach: kept.
+    """
 
     mesh: BoundaryMesh
     c_p: float
@@ -66,13 +71,17 @@ class CompressedBlocks:
 
     @property
     def errors(self) -> Array:
-        """Return (3,) bounds of what interpolation, not rounding, changes of entries of single,
-        double and hyper."""
+        """Return (3,) bounds of what interpolation, not rounding, changes.
+
+        The entries are those of single, double and hyper.
+        """
         return np.asarray(np.max([part.errors for part in self.stretches], axis=0))
 
     def combined(self, weights: NDArray) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
-        """Yield complex sums of single, double and hyper over all steps, for each of the weights
-        (f, up to reach)."""
+        """Yield complex sums of single, double and hyper over all steps.
+
+        There is one for each of the weights (f, up to reach).
+        """
         f, n, start = len(weights), len(self.mesh), 0
         weights = np.pad(weights, ((0, 0), (0, self.reach - weights.shape[1])))
         numbers = np.empty((2 * f, sum(len(part.places) for part in self.stretches)))
@@ -96,8 +105,10 @@ class CompressedBlocks:
 
     @cached_property
     def _entries(self) -> tuple[Indices, Indices, Indices]:
-        """Return number, row and column of all entries of [V 0 0; 0 K 0; 0 0 Kᵀ; 0 D 0], sorted by
-        number."""
+        """Return number, row and column of all entries of [V 0 0; 0 K 0; 0 0 Kᵀ; 0 D 0].
+
+        They are sorted by number.
+        """
         n = len(self.mesh)
         shapes, at = ((4, 4), (4, 2), (4, 2), (2, 2)), ((0, 0), (4, 4), (8, 6), (10, 4))
         indices = [np.indices((a * n, b * n)).reshape(2, -1) for a, b in shapes]
@@ -112,8 +123,10 @@ class CompressedBlocks:
         return numbers[order], rows[order], columns[order]
 
     def applied(self, p: Array, u: Array, jumps: Array) -> list[Array]:
-        """Return sum_j V^j p_j, K^j u_j, K^jᵀ jumps_j, D^j u_j of histories (steps, 4n or 2n),
-        latest first."""
+        """Return sum_j V^j p_j, K^j u_j, K^jᵀ jumps_j, D^j u_j.
+
+        The histories are (steps, 4n or 2n), latest first.
+        """
         values, start, n = (
             np.pad(np.hstack([p, u, jumps]), ((0, self.reach - len(p)), (0, 0))),
             0,
@@ -141,9 +154,11 @@ def compressed_blocks(
     steps: int,
     assembled: BlockSteps,
 ) -> CompressedBlocks:
-    """Keep the blocks for `steps` steps; speeds: (c_P, c_S) [m/s]; assembled: gives the blocks of
-    all steps from a function of i that returns the pairs (p,) of elements to integrate at time i
-    dt, or None where it has none."""
+    """Keep the blocks for `steps` steps.
+
+    ``speeds`` are (c_P, c_S) [m/s]; ``assembled`` gives the blocks of all steps from a function of
+    i that returns the pairs (p,) of elements to integrate at time i dt, or None where it has none.
+    """
     counted("boundary elements", f"a circle of {steps} steps", steps, "steps", most=LONGEST)
     asked, steps = steps, AHEAD * steps
     n, h, stretches, needed = len(mesh), float(mesh.lengths.max()), [], []

@@ -1,5 +1,6 @@
-"""Describe contact of a body condensed by boundary elements: what it may touch, how it rubs, its
-steps.
+"""Describe contact of a body condensed by boundary elements.
+
+This says what it may touch, how it rubs, and what its steps are.
 
 The condensed body is u_c[k] = sum_(l<=k) W[k-l] lam[l] + u_free[k] (CondensedCompliance). In the
 frames of its nodes, v = N u with the contact direction n and the tangent as rows of N, lam = -Nᵀ r,
@@ -11,7 +12,8 @@ on the right-hand side,
 
 so that every method for the small problem and the certificate of a step serve here too. Reactions r
 = (r_n, r_t) are those of the body on its support, nodal forces [N/m] held during a step; traction =
-force / length."""
+force / length.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -49,11 +51,14 @@ SUPPORTED = 1e-12  # of the largest flexibility: supported unknowns
 
 @dataclass(frozen=True)
 class Conditions:
-    """Hold one contact condition per row: the contact node (row of CondensedCompliance), outward
-    normal, length.
+    """Hold one contact condition per row.
+
+    A condition has the contact node (row of CondensedCompliance), the outward normal and the
+    length.
 
     nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a
-    box in a notch."""
+    box in a notch.
+    """
 
     nodes: Indices
     normals: Array
@@ -79,11 +84,13 @@ class Conditions:
 def conditions_on(
     mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike
 ) -> Conditions:
-    """Return the conditions of several sides, masks of elements (n,): a node of two sides gets one
-    for each.
+    """Return the conditions of several sides.
+
+    Sides are masks of elements (n,); a node of two sides gets one for each.
 
     Raises InputError for a side with nodes that were not condensed, and for more than two sides at
-    a node."""
+    a node.
+    """
     owner = "conditions_on"
     instance(owner, "mesh", mesh, BoundaryMesh, "give the BoundaryMesh of the body")
     instance(owner, "compliance", compliance, CondensedCompliance, "give what condensed() returns")
@@ -115,7 +122,8 @@ class BoundaryContact:
     Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows
     it and no conditions are given, for a symmetric compliance W[0] that is not positive definite
     and any that is singular, supports that hold a contact direction, and bodies that penetrate
-    their obstacle."""
+    their obstacle.
+    """
 
     compliance: CondensedCompliance
     obstacle: Obstacle = field(default_factory=Touching)
@@ -170,8 +178,10 @@ class BoundaryContact:
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:
-        """Refuse one condition along a mean normal at a node at which the contact boundary
-        turns."""
+        """Refuse one condition along a mean normal.
+
+        It is one at a node at which the contact boundary turns.
+        """
         turns, points = self.compliance.turns, self.compliance.points
         if (
             self.conditions is not None
@@ -223,8 +233,10 @@ class BoundaryContact:
 
     @cached_property
     def frames(self) -> Array:
-        """Return N (2m, 2m): v = N u, first the contact directions of all nodes, then tangents or
-        second directions."""
+        """Return N (2m, 2m): v = N u.
+
+        These are the contact directions of all nodes, then tangents or second directions.
+        """
         m, rows, second, directions = self.count, self._rows, self._second, self._facing[0]
         frames = np.tile(np.eye(2), (m, 1, 1))
         frames[rows.nodes[~second]] = nodal_frames(directions[~second]).swapaxes(1, 2)
@@ -288,8 +300,10 @@ class BoundaryContact:
 
     @cached_property
     def p_matrix(self) -> PMatrix:
-        """Tell whether the step matrix, W[0] of contact, is one: steps then have one solution, see
-        there."""
+        """Tell whether the step matrix, W[0] of contact, is one.
+
+        Steps then have one solution, see there.
+        """
         rows = np.arange(self.free.sum()) if self.frictional else self.surface.owned
         found = p_matrix(self.W[0][np.ix_(rows, rows)])
         if not (self.frictional and self.friction.slope(self.surface.weights).any()):
@@ -329,8 +343,10 @@ class BoundaryContact:
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
 
     def step(self, k: int, loads: Array, before: Array, active: Mask) -> StepProblem:
-        """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps;
-        before: v at its start."""
+        """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps.
+
+        ``before`` is v at its start.
+        """
         dt, surface = self.compliance.dt, self.surface
         past = (
             self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0]
@@ -359,6 +375,8 @@ class BoundaryContact:
         return -self.surface.reaction_load(r_n, int(self.free.sum()), r_t)
 
     def cartesian(self, loads: Array) -> Array:
-        """Return (steps, 2m) nodal forces lam on the body, x of all contact nodes, then y, of loads
-        (steps, f)."""
+        """Return (steps, 2m) nodal forces lam on the body.
+
+        They are x of all contact nodes, then y, of loads (steps, f).
+        """
         return np.asarray(loads @ self.frames[self.free])

@@ -25,11 +25,14 @@ log = logging.getLogger(__name__)
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
 ) -> "ContactRun":
-    """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by
-    default ActiveSet, or Lemke where the compliance is not symmetric.
+    """March through all steps of the compliance.
+
+    ``solver`` is Condensed with any of its methods, by default ActiveSet, or Lemke where the
+    compliance is not symmetric.
 
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and
-    residuals."""
+    residuals.
+    """
     instance("march_contact", "contact", contact, BoundaryContact, "give a BoundaryContact")
     hint = "give Condensed() with any of its methods, or None"
     optional(instance, "march_contact", "solver", solver, Condensed, hint)
@@ -65,7 +68,8 @@ class ContactRun:
     (steps, c) in each step [m]; displacement: (steps, 2m) of the contact nodes at the ends and
     forces: (steps, 2m) on the body [N/m] in the order of CondensedCompliance; active: (steps, c).
     certificates: of each step; iterations: (steps,) of the method in a step, or one per window of a
-    method for many steps; history: what such a method logs."""
+    method for many steps; history: what such a method logs.
+    """
 
     contact: BoundaryContact
     times: Array
@@ -112,8 +116,10 @@ class ContactRun:
 
     @property
     def friction_loss(self) -> Array:
-        """Return (steps,) energy that friction has taken, sum r_t slip, never negative in a step
-        [J/m]."""
+        """Return (steps,) energy that friction has taken [J/m].
+
+        It is sum r_t slip, never negative in a step.
+        """
         return np.cumsum((self.r_t * self.slip).sum(axis=1))
 
 

@@ -1,5 +1,7 @@
-"""Pair boundary elements, each pair once, with the distances that decide how they are
-integrated."""
+"""Pair boundary elements, each pair once.
+
+The pairs have the distances that decide how they are integrated.
+"""
 
 from copy import copy
 
@@ -19,8 +21,9 @@ LEAST = 0.05  # of the longer element: nearer ones are refused, for nothing is k
 
 
 class ElementPairs:
-    """Hold all pairs first <= second: x = point + a xi on the first, y on the second, x - y =
-    offset + a xi - b eta.
+    """Hold all pairs first <= second.
+
+    On them x = point + a xi on the first, y on the second, x - y = offset + a xi - b eta.
 
     offset, a, b: (2, p) [m]; r_min, r_max: least and greatest distance [m]; h: the longer element
     [m]; width: what is between them over h; of two elements with a common corner, the distance of a
@@ -29,7 +32,8 @@ class ElementPairs:
 
     Raises InputError for elements that are nearer than a twentieth of the longer one's length, and
     for corners of two elements so sharp, or of lengths so different, that an end of one is as near
-    to the other."""
+    to the other.
+    """
 
     def __init__(self, mesh: BoundaryMesh) -> None:
         instance(

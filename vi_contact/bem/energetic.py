@@ -1,19 +1,22 @@
-"""March the energetic space-time Galerkin method on in time: a block Toeplitz system
-(docs/theory/bem.md).
+"""March the energetic space-time Galerkin method on in time.
+
+It is a block Toeplitz system (docs/theory/bem.md).
 
 Tractions are constant, displacements linear in each time step; the first equation is tested with
 constants, which is collocation at the ends of the steps, the second with the rates of
 displacements, which is the mean over a step. With A, B, C the operators integrated once, twice,
 three times and u_l the increment of the displacement in step l:
 
-    V^j = A_(j+1) - A_j,  K^j = (B_(j+1) - B_j)/dt,  D^j = (C_(j+1) - 2 C_j + C_(j-1))/dt²,  K'^j = (K^j - K^(j-1))ᵀ
-    sum_l V^(k-l) p_l = sum_l (K^(k-l) + M/2) u_l                                                    both forms
+    V^j = A_(j+1) - A_j,  K^j = (B_(j+1) - B_j)/dt,
+    D^j = (C_(j+1) - 2 C_j + C_(j-1))/dt²,  K'^j = (K^j - K^(j-1))ᵀ
+    sum_l V^(k-l) p_l = sum_l (K^(k-l) + M/2) u_l              both forms
     Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l = F_k          symmetric
     Mᵀ p_k                                      = F_k          unsymmetric
 
 F_k is the nodal force [N/m], the mean over step k. In the symmetric form the work sum_k F_k.u_k is
 a positive definite quadratic form of the history of u: the energy of the body, from boundary data
-alone."""
+alone.
+"""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -40,10 +43,12 @@ SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
 
 @dataclass(frozen=True, eq=False)
 class EnergeticBlocks:
-    """Hold the blocks of density 1; they depend on the mesh, the wave speeds and the time step
-    only.
+    """Hold the blocks of density 1.
 
-    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n)."""
+    They depend on the mesh, the wave speeds and the time step only.
+
+    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n).
+    """
 
     mesh: BoundaryMesh
     c_p: float
@@ -90,7 +95,8 @@ def energetic_blocks(
     compressed: whether to keep CompressedBlocks and solve on a circle of frequencies; None does so
     where dense blocks would take 400 MB. threads: how many integrate; answers do not depend on it.
     Raises InputError for a time step far too small or large for the mesh, and for a body too thin
-    or sharp for it."""
+    or sharp for it.
+    """
     owner = "boundary elements"
     check_body(mesh, material, orders)
     steps = whole(owner, "the number of time steps", steps, least=1)
@@ -114,8 +120,11 @@ def energetic_blocks(
     def assembled(
         among: Callable[[int], Mask] | None = None,
     ) -> Iterator[tuple[Array, Array, Array] | None]:
-        """Return V^j, K^j, D^j, right where pairs are ``among`` those of the times j - 1, j and j +
-        1, all if None; None instead of them where there is no pair at j + 1."""
+        """Return V^j, K^j, D^j.
+
+        They are right where pairs are ``among`` those of the times j - 1, j and j + 1, all of them
+        if None; there is None instead of them where there is no pair at j + 1.
+        """
 
         def at(i: int) -> OperatorMatrices | None:
             some, t = copy(galerkin), i * dt
@@ -154,10 +163,12 @@ def marched(
     *,
     symmetric: bool = True,
 ) -> tuple[Array, Array, Array]:
-    """Return displacements (steps, 2n, R) at the ends of the steps, tractions (steps, 4n, R) and
-    nodal forces (steps, 2n, R) in them, reactions included, for R right-hand sides: forces (steps,
-    2n, R), and ``prescribed`` (steps, 2n, R), read at ``fixed`` unknowns (2n,) only. For density 1:
-    divide forces by rho before, multiply after.
+    """Return displacements (steps, 2n, R) at the ends of the steps, for R right-hand sides.
+
+    With them come tractions (steps, 4n, R) and nodal forces (steps, 2n, R) in the steps, reactions
+    included. The R right-hand sides are forces (steps, 2n, R), and ``prescribed`` (steps, 2n, R),
+    read at ``fixed`` unknowns (2n,) only. For density 1: divide forces by rho before, multiply
+    after.
     """
     steps, unknowns, count = forces.shape
     if steps > blocks.steps:
@@ -195,8 +206,10 @@ def marched(
 
 
 def _adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
-    """Return the sum of K' p - D u over the k earlier steps of the symmetric form; K' acts on the
-    jumps of p."""
+    """Return the sum of K' p - D u over the k earlier steps of the symmetric form.
+
+    K' acts on the jumps of p.
+    """
     k, jumps = len(p), np.diff(p, axis=0, prepend=0.0)
     adjoint = summed(blocks.double[k:0:-1].swapaxes(1, 2), jumps) - blocks.double[0].T @ p[-1]
     return adjoint - summed(blocks.hyper[k:0:-1], u)

@@ -1,5 +1,6 @@
-"""Solve boundary value problems of many steps on a circle of frequencies: a dense system each, no
-march.
+"""Solve boundary value problems of many steps on a circle of frequencies.
+
+Each frequency has a dense system of its own; nothing is marched.
 
 With û(z) = sum_j z^j u_j for increments u_j, and so on, the march of energetic.py is a product of
 series in z,
@@ -11,7 +12,8 @@ whose coefficients are those of a Fourier transform on |z| = R < 1. With L point
 R^L to step j, and rounding is magnified by R^-N in the last of N: 1e-12 and 1e6 for L = 2 N. Ch.
 Lubich, Numer. Math. 52 (1988) 413. What is added is the motion in steps N to 3 N: it stays small as
 long as the blocks reach that far, and grows where they are cut off at N. Growth from N to 2 N says
-what wraps around; the equations of the march are asked in two steps."""
+what wraps around; the equations of the march are asked in two steps.
+"""
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve
@@ -35,12 +37,14 @@ def on_circle(
     units: Indices,
     symmetric: bool,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return W (steps, m, m), the displacements of m unknowns after unit nodal forces on them
-    during step 0, and as ``marched`` does displacements (steps, 2n), tractions (steps, 4n), nodal
-    forces (steps, 2n) of one right-hand side: forces and prescribed, of fixed unknowns (2n,), both
-    (steps, 2n). Raises InputError for more steps than the blocks are for and where rounding of D
-    moves a free body, StepFailure where much wraps around, and where the right-hand side or a unit
-    force misses the equations of the march."""
+    """Return W (steps, m, m), the displacements of m unknowns after unit forces in step 0.
+
+    The unit nodal forces act on these unknowns.. With them come, as from ``marched``, displacements
+    (steps, 2n), tractions (steps, 4n), nodal forces (steps, 2n) of one right-hand side: forces and
+    prescribed, of fixed unknowns (2n,), both (steps, 2n). Raises InputError for more steps than the
+    blocks are for and where rounding of D moves a free body, StepFailure where much wraps around,
+    and where the right-hand side or a unit force misses the equations of the march.
+    """
     steps, m, mass, free = len(forces), len(units), blocks.mesh.mass, ~fixed
     if steps > blocks.steps:
         raise InputError(
@@ -98,8 +102,10 @@ def on_circle(
 
 
 def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetric: bool) -> None:
-    """Raise StepFailure unless a motion satisfies the equations of the march in the middle and at
-    the end."""
+    """Raise StepFailure unless a motion satisfies the equations of the march.
+
+    It is checked in the middle and at the end.
+    """
     steps, mass = len(u), 0.5 * blocks.mesh.mass
     changes, jumps = np.diff(u, axis=0, prepend=0.0), np.diff(p, axis=0, prepend=0.0)
     for k in sorted({steps // 2, steps - 1}):
@@ -116,8 +122,10 @@ def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetri
 
 
 def _around(values: Array, radius: float) -> float:
-    """Return what wraps around onto the last of N steps, as a share, if growth from N to 2 N goes
-    on to 3 N."""
+    """Return what wraps around onto the last of N steps.
+
+    It is a share, which holds if growth from N to 2 N goes on to 3 N.
+    """
     size = np.abs(values.reshape(len(values), -1)).max(1, initial=0.0) / radius ** np.arange(
         len(values)
     )
@@ -135,8 +143,9 @@ def _refusal(what: str, symmetric: bool) -> str:
 
 
 def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
-    """Raise InputError where rounding of the second differences D changes the momentum of a
-    drifting body.
+    """Raise InputError where rounding of the second differences D matters.
+
+    What it would change is the momentum of a drifting body.
 
     Behind the last wave the sum of D^j over steps j of a translation vanishes like t^-3; what it
     has instead is force.

@@ -1,15 +1,18 @@
-"""Evaluate radial functions of the fundamental solution of plane-strain elastodynamics in time,
-density 1.
+"""Evaluate the radial functions of the fundamental solution of plane-strain elastodynamics.
+
+It is that in time, of density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S (Laplace domain),
 
-    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,        r̂ = (x - y)/r.
+    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,
+    r̂ = (x - y)/r.
 
 For another density rho divide G by rho; the functions Phi do not depend on it. In the time domain
 everything is integrated n times in time and closed (square roots, logarithms): F_n = n-fold
 integral of H(t - r/c)/sqrt(t² - r²/c²),
 
-    F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),   R = sqrt(t² - r²/c²).
+    F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),
+    R = sqrt(t² - r²/c²).
 
 Zero ahead of its front (r >= c t). See docs/theory/bem.md; n = 0: Achenbach, Wave Propagation in
 Elastic Solids, 3.10.
@@ -33,7 +36,8 @@ class KernelSet(NamedTuple):
 
     single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi =
     Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p,
-    inertia_s), inertia_a = s² Phi_a (in time: Phi_a integrated twice less)."""
+    inertia_s), inertia_a = s² Phi_a (in time: Phi_a integrated twice less).
+    """
 
     single: tuple[NDArray, ...]
     double: tuple[NDArray, ...]
@@ -53,10 +57,12 @@ def check_speeds(kernels: Any) -> None:
 
 @dataclass(frozen=True)
 class TimeKernels:
-    """Evaluate kernels at a time t [s]: G integrated once (single layer), twice (double), three
-    times (hypersingular).
+    """Evaluate kernels at a time t [s].
 
-    That is what functions constant in time (traction) and linear in time (displacement) need."""
+    They are G integrated once (single layer), twice (double) and three times (hypersingular).
+
+    That is what functions constant in time (traction) and linear in time (displacement) need.
+    """
 
     t: float
     c_p: float

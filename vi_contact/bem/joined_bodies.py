@@ -1,5 +1,6 @@
-"""Join two bodies with matching boundary nodes: contact on one part of their interface, welds on
-another.
+"""Join two bodies with matching boundary nodes.
+
+One part of their interface is in contact, another is welded.
 
 Each body has its own mesh, material and operator; only the condensed motion of interface nodes
 meets. With the forces lam on body 1 and -lam on body 2 the relative displacement is
@@ -39,8 +40,9 @@ OfPlace = Callable[[Array, float], Array]
 
 @dataclass(frozen=True, eq=False)
 class TwoBodies:
-    """Describe two boundary value problems whose ``contact`` elements face each other, node on
-    node.
+    """Describe two boundary value problems whose ``contact`` elements face each other.
+
+    They do so node on node.
 
     welded: (n_1,) elements of body 1 on the transmission interface, part of its ``contact``; nodes
     that touch one of them are welded. jump: g [m], a function of (points (m, 2), t) that returns
@@ -79,8 +81,10 @@ class TwoBodies:
                 optional(array, "TwoBodies", name, getattr(self, name), shape)
 
     def jumps(self, t: float) -> Array:
-        """Return g (2, m) at the interface nodes of body 1 at time t; histories are linear in a
-        step."""
+        """Return g (2, m) at the interface nodes of body 1 at time t.
+
+        Histories are linear in a step.
+        """
         nodes = self.one.contact_nodes
         if self.jump is None:
             return np.zeros((2, len(nodes)))
@@ -167,8 +171,10 @@ class TwoBodies:
         return Weld(relative, mesh.nodes_of(elements)[relative.nodes], jumps)
 
     def condensed(self) -> CondensedCompliance:
-        """Return the compliance of the contact nodes, for BoundaryContact; ``normals`` point from
-        body 1 to body 2."""
+        """Return the compliance of the contact nodes, for BoundaryContact.
+
+        ``normals`` point from body 1 to body 2.
+        """
         return self._weld.contact
 
     def contact(
@@ -178,9 +184,11 @@ class TwoBodies:
         conditions: Conditions | None = None,
         bilateral: bool = False,
     ) -> BoundaryContact:
-        """Set up contact of the nodes that are not welded, with the given jump: its normal part is
-        how far body 2 has moved towards body 1 beforehand, its tangential part how far it has
-        slid."""
+        """Set up contact of the nodes that are not welded.
+
+        The normal part of the given jump is how far body 2 has moved towards body 1 beforehand, its
+        tangential part how far it has slid.
+        """
         compliance = self.condensed()
         chosen = np.arange(len(compliance.nodes)) if conditions is None else conditions.nodes
         frames = nodal_frames(compliance.normals if conditions is None else conditions.normals)
@@ -199,8 +207,10 @@ class TwoBodies:
         )
 
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
-        """Return the motions of both bodies under loads, contact forces (steps, 2m_c) on body 1,
-        and the welds."""
+        """Return the motions of both bodies under loads.
+
+        Contact forces (steps, 2m_c) act on body 1; the welds act too.
+        """
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])
         forces = (
@@ -217,8 +227,10 @@ class TwoBodies:
 
 
 def matching(points: Array, others: Array) -> Indices:
-    """Return (m,) number of the point of ``others`` (m, 2) at each of ``points`` (m, 2), or raise
-    InputError."""
+    """Return (m,) number of the point of ``others`` (m, 2).
+
+    It is the one at each of ``points`` (m, 2); where there is none, InputError is raised.
+    """
     distance = np.hypot(*(points[:, None] - others).transpose(2, 0, 1))
     nearest = distance.argmin(axis=1)
     away = distance.min(axis=1)
@@ -233,16 +245,20 @@ def matching(points: Array, others: Array) -> Indices:
 
 
 def inverse(matrix: Array) -> Callable[[Array], Array]:
-    """Return b -> matrix⁻¹ b, by Cholesky's factors or, of a matrix of the unsymmetric form, by LU
-    factors."""
+    """Return b -> matrix⁻¹ b.
+
+    It uses Cholesky's factors or, for a matrix of the unsymmetric form, LU factors.
+    """
     if max_abs(matrix - matrix.T) > ASYMMETRIC * max_abs(matrix):
         return partial(lu_solve, lu_factor(matrix))
     return partial(cho_solve, cho_factor(0.5 * (matrix + matrix.T)))
 
 
 class Weld:
-    """Hold the relative displacement of masked nodes (m,) at given jumps (steps, 2m): ``contact``
-    is what is left of a compliance when the weld forces are eliminated."""
+    """Hold the relative displacement of masked nodes (m,) at given jumps (steps, 2m).
+
+    ``contact`` is what is left of a compliance when the weld forces are eliminated.
+    """
 
     def __init__(self, compliance: CondensedCompliance, nodes: Mask, jumps: Array) -> None:
         W, steps = compliance.W, len(compliance.W)
@@ -275,8 +291,10 @@ class Weld:
         self.contact = replace(compliance, W=W, u_free=u_free, **kept)
 
     def forces(self, contact_forces: Array) -> Array:
-        """Return (steps, 2m): contact forces (steps, 2m_c) and the weld forces that go with
-        them."""
+        """Return (steps, 2m): contact forces (steps, 2m_c).
+
+        With them come the weld forces that go with them.
+        """
         everything = np.zeros((len(contact_forces), len(self._welded)))
         everything[:, self._touching] = contact_forces
         if self._welded.any():

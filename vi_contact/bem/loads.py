@@ -21,8 +21,9 @@ def traction_forces(
     elements: ArrayLike | None = None,
     order: int = 4,
 ) -> Array:
-    """Return (steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t)
-    -> (m, 2) [Pa].
+    """Return (steps, 2, n) nodal forces [N/m].
+
+    They are the means over each step of traction(points, normals, t) -> (m, 2) [Pa].
 
     points, normals: (m, 2); elements: mask (n,) of loaded ones, None: all; order: Gauss points in
     time and along each.

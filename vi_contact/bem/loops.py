@@ -1,5 +1,7 @@
-"""Check closed loops of segments: which way round they run, what they enclose, whether they
-cross."""
+"""Check closed loops of segments.
+
+They are checked for which way round they run, what they enclose and whether they cross.
+"""
 
 import numpy as np
 
@@ -26,8 +28,10 @@ def inside(point: Array, loop: Array) -> bool:
 
 
 def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
-    """Tell whether each loop has to run counter-clockwise: outer loops do, holes not; the reverse
-    if exterior."""
+    """Tell whether each loop has to run counter-clockwise.
+
+    Outer loops do, holes do not; the reverse holds if exterior.
+    """
     depths = [sum(inside(loop[0], other) for other in loops if other is not loop) for loop in loops]
     return [(depth % 2 == 0) != exterior for depth in depths]
 
@@ -47,8 +51,10 @@ def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) 
 
 
 def check_size(points: Array, sizes: tuple[int, ...]) -> None:
-    """Raise InputError when the area of a loop is no number above zero: points on a line, or too
-    large for squares."""
+    """Raise InputError when the area of a loop is no number above zero.
+
+    Its points are then on a line, or too large for squares.
+    """
     for i, loop in enumerate(np.split(points, np.cumsum(sizes)[:-1])):
         with np.errstate(all="ignore"):
             extent = np.ptp(loop, axis=0)
@@ -62,8 +68,10 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
 
 
 def check_simple(points: Array, after: Indices) -> None:
-    """Raise InputError when two elements cross, or a node lies on an element of which it is no
-    end."""
+    """Raise InputError when two elements cross.
+
+    It does so too when a node lies on an element of which it is no end.
+    """
     a, b, index = points, points[after], np.arange(len(points))
     distance = distances(points[:, None], a, b)
     distance[index, index] = distance[after, index] = np.inf
@@ -94,8 +102,10 @@ def check_simple(points: Array, after: Indices) -> None:
 
 
 def distances(x: Array, start: Array, end: Array) -> Array:
-    """Return the distances (...) of points x (..., 2) from segments from start to end, of shapes
-    that fit."""
+    """Return the distances (...) of points x (..., 2) from segments from start to end.
+
+    Their shapes have to fit.
+    """
     along = end - start
     share = np.clip(((x - start) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
     return np.hypot(*np.moveaxis(x - start - share[..., None] * along, -1, 0))

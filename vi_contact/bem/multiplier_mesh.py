@@ -1,11 +1,13 @@
-"""Put the contact multiplier on a mesh (H, DT) of its own, coarser than that of the displacements
-(h, dt).
+"""Put the contact multiplier on a mesh (H, DT) of its own.
+
+It is coarser than that of the displacements (h, dt).
 
 The mixed form of Aimi, Di Credico, Gimperlein (Comput. Methods Appl. Mech. Engrg. 427 (2024)
 117066): lambda is a polynomial on patches of whole elements, discontinuous between them, and
 constant in intervals of whole steps. With its functions psi_p and hats phi_i of the displacement,
 
-    <lambda, v> = sum_p R_p sum_i B_ip v_i,   B_ip = ∫ phi_i psi_p / ∫ psi_p,   R_p = lambda_p ∫ psi_p
+    <lambda, v> = sum_p R_p sum_i B_ip v_i,
+    B_ip = ∫ phi_i psi_p / ∫ psi_p,   R_p = lambda_p ∫ psi_p
 
 with forces R [N/m] of patches and means Bᵀ u over them. The second line is tested by patch and
 interval: the mean of u_n - g, the increment of u_t (the dot of the source stands on the tangential
@@ -42,7 +44,8 @@ class MultiplierMesh:
     normal of a patch is its mean normal; patches end at corners.
 
     Raises InputError for elements not condensed, sides shorter than a patch, patches that turn by
-    more than 30°, steps left over, a weight without means or one that leaves nothing of them."""
+    more than 30°, steps left over, a weight without means or one that leaves nothing of them.
+    """
 
     mesh: BoundaryMesh
     elements: Mask
@@ -112,8 +115,10 @@ class MultiplierMesh:
             )
 
     def _runs(self) -> list[Indices]:
-        """Return the elements of each part of the contact boundary without corners, in the order of
-        the loop."""
+        """Return the elements of each part of the contact boundary without corners.
+
+        They are in the order of the loop.
+        """
         chosen, after = self.elements, self.mesh.after
         turned = self.mesh.node_turns(chosen) > FEATURE_ANGLE * (1.0 + 1e-9)
         starts, runs = chosen & (turned | ~chosen[np.argsort(after)]), list[Indices]()
@@ -131,8 +136,10 @@ class MultiplierMesh:
 
     @cached_property
     def _functions(self) -> Array:
-        """Return (p, n, 2) psi at both ends of each element: 1, or 1 - s and s along a patch; zero
-        elsewhere."""
+        """Return (p, n, 2) psi at both ends of each element.
+
+        It is 1, or 1 - s and s along a patch, and zero elsewhere.
+        """
         psi = np.zeros((len(self.patches), self.degree + 1, len(self.mesh), 2))
         for number, patch in enumerate(self.patches):
             ends = np.cumsum(self.mesh.lengths[patch]) / self.mesh.lengths[patch].sum()
@@ -142,17 +149,23 @@ class MultiplierMesh:
 
     @cached_property
     def pairing(self) -> Array:
-        """Return B (m, p): nodal forces B R of the multiplier's forces R [N/m], and means Bᵀ u of
-        displacements."""
+        """Return B (m, p).
+
+        It gives nodal forces B R of the multiplier's forces R [N/m], and means Bᵀ u of
+        displacements.
+        """
         loads = self._functions @ P1_MASS * self.mesh.lengths[:, None]
         nodal = (loads[:, :, 0] + loads[:, np.argsort(self.mesh.after), 1]).T
         return np.asarray((nodal / nodal.sum(axis=0))[self.compliance.nodes])
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
-        """Return the shares (q + 1,) of the displacements at the start and at the ends of the q
-        steps in the mean of an interval, sum 1, and those (q,) of the increments in these steps in
-        that of an interval, sum q."""
+        """Return the shares (q + 1,) of the displacements in the mean of an interval.
+
+        They are those of the displacements at the start and at the ends of the q steps Their sum is
+        1. With them come the shares (q,) of the increments in these steps in that of an interval,
+        whose sum is q.
+        """
         q, z = self.interval, 2.0 * self.sigma * self.compliance.dt
         if self.testing == "end":
             return np.eye(q + 1)[q], np.ones(q)
@@ -162,8 +175,10 @@ class MultiplierMesh:
         return shares / shares.sum(), q * decay / decay.sum()
 
     def _tested(self, history: Array, normal: Array) -> Array:
-        """Return the displacements (intervals, 2p, …) that are tested, of those (steps, 2p, …) at
-        ends of steps."""
+        """Return the displacements (intervals, 2p, …) that are tested.
+
+        They come from those (steps, 2p, …) at ends of steps.
+        """
         q, (mean, rate) = self.interval, self.weights
         there = np.concatenate([np.zeros_like(history[:1]), history])
         ends = np.stack([there[s : len(there) - q + s : q] for s in range(q + 1)])
@@ -175,13 +190,15 @@ class MultiplierMesh:
         )
 
     def condensed(self) -> CondensedCompliance:
-        """Return the compliance that BoundaryContact takes: its nodes are the functions psi, its
-        steps the intervals.
+        """Return the compliance that BoundaryContact takes.
+
+        Its nodes are the functions psi, its steps the intervals.
 
         ``points`` are centres, so that the gaps of planes are met in the mean. The displacements of
         a run are those tested, so that its works are not those of the body. For obstacles that move
         see ``averaged``. Raises InputError for a weight with which the swing of the means grows
-        SWING times."""
+        SWING times.
+        """
         fine, B, q = self.compliance, self.pairing, self.interval
         growth, intervals = q / (self.weights[0] @ np.arange(q + 1.0)) - 1.0, len(fine.W) // q
         if growth > SWING ** (1.0 / intervals):
@@ -208,15 +225,19 @@ class MultiplierMesh:
         )
 
     def forces(self, forces: Array) -> Array:
-        """Return nodal forces (steps, 2m) [N/m] for BoundaryProblem.solve of those of a run
-        (intervals, 2p)."""
+        """Return nodal forces (steps, 2m) [N/m] for BoundaryProblem.solve.
+
+        They come from those of a run (intervals, 2p).
+        """
         onto, count = np.kron(np.eye(2), self.pairing.T), len(self.compliance.W) // self.interval
         given = array("MultiplierMesh.forces", "forces", forces, (count, len(onto)), unit="N/m")
         return np.repeat(given @ onto, self.interval, axis=0)
 
     def averaged(self, motion: Callable[[float], float | Array]) -> Callable[[float], Array]:
-        """Return the mean over the interval that ends at t of an obstacle's ``motion``, for
-        ``towards``."""
+        """Return the mean over the interval of an obstacle's ``motion``.
+
+        The interval ends at t; the mean is for ``towards``.
+        """
         function("MultiplierMesh.averaged", "motion", motion, "give a function of the time in m")
         shares = list(
             zip(self.weights[0], self.compliance.dt * np.arange(-self.interval, 1), strict=True)

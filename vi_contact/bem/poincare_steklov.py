@@ -1,9 +1,11 @@
-"""Build the Poincaré-Steklov operator of one body, boundary value problems with it, and what
-contact needs of them.
+"""Build the Poincaré-Steklov operator of one body.
+
+With it come boundary value problems, and what contact needs of them.
 
 S maps the history of boundary displacements to nodal forces. Symmetric form S = (K' + 1/2) V⁻¹ (K +
 1/2) - D (default: its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2)
-(positivity not guaranteed)."""
+(positivity not guaranteed).
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -38,14 +40,18 @@ MISSED = 0.1
 
 
 class BodyOperator(Protocol):
-    """Move one body: what a boundary value problem asks of an operator, in either discretisation in
-    time."""
+    """Move one body.
+
+    This is what a boundary value problem asks of an operator, in either discretisation in time.
+    """
 
     @property
-    def mesh(self) -> BoundaryMesh: ...
+    def mesh(self) -> BoundaryMesh:
+        """Return the mesh of the boundary."""
 
     @property
-    def dt(self) -> float: ...
+    def dt(self) -> float:
+        """Return the time step [s]."""
 
     def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
         """Return the shape of nodal forces given in so many dimensions."""
@@ -53,9 +59,11 @@ class BodyOperator(Protocol):
     def motion(
         self, forces: Array, fixed: Mask, prescribed: Array | None
     ) -> tuple[Array, Array, Array]:
-        """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n),
-        reactions included, under forces (steps, pieces of a step, 2n) and prescribed displacements
-        (steps, 2n) of fixed unknowns (2n,)."""
+        """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n).
+
+        Reactions are included. They are those under forces (steps, pieces of a step, 2n) and
+        prescribed displacements (steps, 2n) of fixed unknowns (2n,).
+        """
 
     def condense(
         self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
@@ -131,8 +139,10 @@ class PoincareSteklov:
         return u, self.rho * p, self.rho * total
 
     def _other_equation(self, u: Array, p: Array) -> Array:
-        """Return (2n,) Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l of the last step: forces, in the
-        symmetric form."""
+        """Return (2n,) Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l.
+
+        It is that of the last step; in the symmetric form, these are forces.
+        """
         changes, jumps = (np.diff(values, axis=0, prepend=0.0) for values in (u, p))
         half = 0.5 * self.mesh.mass.T
         if isinstance(self.blocks, CompressedBlocks):
@@ -147,8 +157,10 @@ class PoincareSteklov:
     def condense(
         self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
     ) -> tuple[Array, Array]:
-        """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1
-        columns, or so."""
+        """Return W and u_free of CondensedCompliance for these unknowns.
+
+        They come from one march with 2m + 1 columns, or so.
+        """
         if isinstance(self.blocks, CompressedBlocks):
             W, moved, *_ = on_circle(
                 self.blocks, fixed, forces[:, 0] / self.rho, prescribed, unknowns, self.symmetric
@@ -168,8 +180,10 @@ class PoincareSteklov:
 
 
 def _refuse_growth(moved: Array) -> None:
-    """Raise StepFailure where motions (steps, n, r) after unit forces in step 0 grow so far that
-    rounding shows."""
+    """Raise StepFailure where motions (steps, n, r) after unit forces in step 0 grow too far.
+
+    They do where rounding shows.
+    """
     size = np.abs(moved).max(axis=(1, 2), initial=0.0)
     if not size.max() * EPS <= GROWN * size[0]:
         share = size.max() * EPS / size[0]
@@ -187,7 +201,8 @@ class BoundaryMotion:
 
     times: (steps,) ends of the steps [s]; displacement: (steps, 2, n) there [m]; traction: (steps,
     2, n, 2) in each step [Pa], at both ends of each element; forces: (steps, 2, n) nodal forces
-    [N/m], reactions included."""
+    [N/m], reactions included.
+    """
 
     times: Array
     displacement: Array
@@ -196,14 +211,18 @@ class BoundaryMotion:
 
     @property
     def work(self) -> Array:
-        """Return (steps,) work of all forces up to each time [J/m], the energy of the body
-        (symmetric form: >= 0)."""
+        """Return (steps,) work of all forces up to each time [J/m].
+
+        It is the energy of the body (symmetric form: >= 0).
+        """
         return work(self.forces, self.displacement)
 
 
 def work(forces: Array, displacement: Array) -> Array:
-    """Return (steps,) work up to each time of forces during the steps, displacements at their ends;
-    0 at t_0."""
+    """Return (steps,) work up to each time of forces during the steps.
+
+    Displacements are those at the ends of the steps; the work is 0 at t_0.
+    """
     terms = forces * np.diff(displacement, axis=0, prepend=0.0)
     return np.cumsum(terms.sum(axis=tuple(range(1, terms.ndim))))
 
@@ -217,7 +236,8 @@ class CondensedCompliance:
     contact forces; nodes: (m,) numbers in the mesh; points, normals: (m, 2) places [m] and outward
     unit normals; lengths: (m,) [m] of contact boundary that belongs to a node, traction = force /
     length; dt [s]; turns: (m,) angle [rad] by which the contact boundary turns at a node, None
-    where nobody knows. Rows and columns of supported unknowns are zero."""
+    where nobody knows. Rows and columns of supported unknowns are zero.
+    """
 
     W: Array
     u_free: Array
@@ -257,7 +277,8 @@ class BoundaryProblem:
     (loads.py), means over the steps, or of the shape that the operator asks for (``load_shape``);
     fixed: (2, n) supported unknowns; prescribed: (steps, 2, n) their displacement [m] at the ends
     of the steps, zero if None; contact: (n,) mask of the elements of the contact boundary.
-    Everything else is free of traction. Raises InputError for wrong shapes and what is no mask."""
+    Everything else is free of traction. Raises InputError for wrong shapes and what is no mask.
+    """
 
     operator: BodyOperator
     forces: Array
@@ -291,8 +312,10 @@ class BoundaryProblem:
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
     def _given(self, contact_forces: ArrayLike | None = None) -> tuple[Array, Mask, Array | None]:
-        """Return nodal forces (steps, pieces of a step, 2n), those of contact added; fixed
-        unknowns, their motion."""
+        """Return nodal forces (steps, pieces of a step, 2n).
+
+        Those of contact are added. With them come the fixed unknowns and their motion.
+        """
         steps, n = len(self.forces), len(self.operator.mesh)
         forces = np.array(self.forces, float).reshape(steps, -1, 2, n)
         if contact_forces is not None:
@@ -310,8 +333,10 @@ class BoundaryProblem:
         return forces.reshape(steps, -1, 2 * n), fixed.ravel(), prescribed
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
-        """Return the motion under loads and nodal contact forces (steps, 2m), ordered as
-        CondensedCompliance."""
+        """Return the motion under loads and nodal contact forces (steps, 2m).
+
+        These are ordered as in CondensedCompliance.
+        """
         u, p, forces = self.operator.motion(*self._given(contact_forces))
         n = len(self.operator.mesh)
         return BoundaryMotion(

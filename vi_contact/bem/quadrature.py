@@ -1,5 +1,6 @@
-"""Place points and weights for double integrals over pairs of elements, split where a wave front
-cuts through.
+"""Place points and weights for double integrals over pairs of elements.
+
+They are split where a wave front cuts through.
 
 A kernel at time t has square-root kinks at r = c_S t and r = c_P t and a logarithm at r = 0. Pairs
 of elements that do not touch are integrated with products of Gauss rules, or, where a front
@@ -13,7 +14,8 @@ feet of that element's ends, the integral over w about the foot of one end on th
 (rules.placed).
 
 Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends
-harmless."""
+harmless.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -37,7 +39,8 @@ class Orders:
     """Hold counts of Gauss points.
 
     Far and near pairs (each way); pieces of split pairs, outer and inner; touching pairs; pieces of
-    close pairs."""
+    close pairs.
+    """
 
     far: int = 4
     near: int = 8
@@ -53,8 +56,9 @@ class Orders:
 
 @dataclass(frozen=True)
 class PointSet:
-    """Hold points of some element pairs: x on the first element at xi, y on the second at eta, both
-    in [0, 1].
+    """Hold points of some element pairs.
+
+    They are x on the first element at xi, y on the second at eta, both in [0, 1].
 
     pairs: (p,) numbers of the pairs; owner: (m,) which of them a point belongs to, or None when the
     points come in equal blocks of len(weight); d: (2, m) x - y [m]; r: (m,) its length; xi, eta,
@@ -70,15 +74,19 @@ class PointSet:
     weight: Array
 
     def integrate(self, values: NDArray) -> NDArray:
-        """Return (k, p, 4) integrals of (k, m) values times phi_a(xi) phi_b(eta), [2 a + b], phi =
-        1 - x, x."""
+        """Return (k, p, 4) integrals of (k, m) values times phi_a(xi) phi_b(eta).
+
+        Their index is [2 a + b], and phi = 1 - x, x.
+        """
         if self.owner is None:
             return values.reshape(len(values), len(self.pairs), -1) @ self._weighted
         return np.asarray(self.shapes() @ values.T).T.reshape(len(values), len(self.pairs), 4)
 
     def shapes(self) -> csc_matrix:
-        """Return (4 p, m) weighted shape functions: their product with values at the points
-        integrates them."""
+        """Return (4 p, m) weighted shape functions.
+
+        Their product with values at the points integrates them.
+        """
         count = len(self.pairs)
         owner = np.repeat(np.arange(count), len(self.weight)) if self.owner is None else self.owner
         weighted = np.tile(self._weighted, (count, 1)) if self.owner is None else self._weighted
@@ -95,8 +103,11 @@ class PointSet:
 
 
 def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
-    """Return (k count, m) that adds up values at m points times k weighted shape functions (m, k)
-    of their owners."""
+    """Return (k count, m) that adds up values times shape functions.
+
+    The values are at m points; the k weighted shape functions (m, k) are those of the points'
+    owners.
+    """
     k = weighted.shape[1]
     rows, columns = k * owner[:, None] + np.arange(k), np.arange(0, weighted.size + 1, k)
     return csc_matrix((weighted.ravel(), rows.ravel(), columns), shape=(k * count, len(owner)))
@@ -105,8 +116,10 @@ def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
 def point_sets(
     pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()
 ) -> Iterator[PointSet]:
-    """Return all points for kernels with kinks at r in `fronts` [m], zero beyond the greatest of
-    them; () is smooth."""
+    """Return all points for kernels with kinks at r in `fronts` [m].
+
+    They are zero beyond the greatest of them; () is smooth.
+    """
     reach = max(fronts, default=np.inf)
     crossed = np.zeros(len(pairs), bool)
     behind_soon = np.zeros(len(pairs), bool)
@@ -171,8 +184,11 @@ def _split(
     *,
     close: bool = False,
 ) -> Iterator[PointSet]:
-    """Split the outer integral where fronts reach the second element's ends or graze it, the inner
-    one at the fronts; ``close``: both about the feet as well, and stretched there."""
+    """Split the outer integral where fronts reach the second element's ends or graze it.
+
+    The inner integral is split at the fronts. If ``close``, both are split about the feet as well,
+    and stretched there.
+    """
     for start in range(0, len(chosen), 200):
         part = chosen[start : start + 200]
         owner, xi, weight = _outer(pairs, part, fronts, outer, close)
@@ -207,8 +223,10 @@ def _inner(
     rule: Rule,
     close: bool,
 ) -> tuple[Indices, Array, Array]:
-    """Return (row of ``xi``, eta, weight) of the points on the second elements that the last front
-    has reached."""
+    """Return (row of ``xi``, eta, weight) of points.
+
+    They are those on the second elements that the last front has reached.
+    """
     d, b = pairs.offset[:, pair] + pairs.a[:, pair] * xi, pairs.b[:, pair]
     b2, projection, d2 = (b**2).sum(0), (d * b).sum(0), (d**2).sum(0)
     breaks = [roots(b2, -2.0 * projection, d2 - front**2) for front in fronts]
@@ -222,8 +240,10 @@ def _inner(
 
 
 def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
-    """Return (p, 2) xi of the feet of the second element's ends on the line of the first, and their
-    heights over it."""
+    """Return (p, 2) xi of the feet of the second element's ends on the line of the first.
+
+    With them come their heights over it.
+    """
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
     ends = (-offset, b - offset)
@@ -233,8 +253,10 @@ def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
 
 
 def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -> Array:
-    """Return (p, 6 per front) xi where the first element is a front away from an end of the second,
-    or its line."""
+    """Return (p, 6 per front) xi where the first element is a front away.
+
+    The distance is that from an end of the second element, or from its line.
+    """
     offset, a, b = pairs.offset[:, part], pairs.a[:, part], pairs.b[:, part]
     a2 = (a**2).sum(0)
     normal = np.stack([b[1], -b[0]]) / np.hypot(*b)
@@ -252,8 +274,10 @@ def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -
 def _on_one_element(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int
 ) -> Iterator[PointSet]:
-    """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points
-    across are exact."""
+    """Integrate once in z = |xi - eta|, on which alone r depends.
+
+    The integral is split at the fronts; two points across are exact.
+    """
     row, low, length = _reached(np.hypot(*pairs.a[:, chosen]), fronts)
     x, w = graded(order)
     across, across_weight = gauss(2)
@@ -273,8 +297,10 @@ def _on_one_element(
 
 
 def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
-    """Return the pieces, as of ``pieces``, that the last front has reached, of [0, 1] where r is x
-    times a distance."""
+    """Return the pieces of [0, 1] that the last front has reached.
+
+    They are as those of ``pieces``. Here r is x times a distance.
+    """
     row, low, length = pieces(np.array(fronts, float) / distance[:, None])
     heard = (low + 0.5 * length) * distance[row] < max(fronts, default=np.inf)
     return row[heard], low[heard], length[heard]
@@ -283,9 +309,11 @@ def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, 
 def _at_corners(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int, *, sharp: bool
 ) -> Iterator[PointSet]:
-    """Place points at (u, u w) and (u w, u) from the corner: r = u R(w), inner integral in u split
-    at fronts/R(w); sharp: R(w) falls to a small share of its greatest value at the foot of one end
-    on the other element."""
+    """Place points at (u, u w) and (u w, u) from the corner.
+
+    There r = u R(w). The inner integral in u is split at fronts/R(w). ``sharp`` says that R(w)
+    falls to a small share of its greatest value at the foot of one end on the other element.
+    """
     if not len(chosen):
         return
     at_end = pairs.shares_end[

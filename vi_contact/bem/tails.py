@@ -1,5 +1,6 @@
-"""Interpolate in time what is left behind the last wave from a few of its steps, with a bound of
-the error.
+"""Interpolate in time what is left behind the last wave from a few steps.
+
+It comes with a bound of the error.
 
 Entries of a block are integrals of radial functions f_j(r) over distances r, and behind the last
 wave the points of these integrals do not move: what interpolates all f_j(r), 0 < r <= r_max, from
@@ -9,7 +10,8 @@ steps i interpolates the blocks,
 
 An interpolative decomposition of a table of the functions chooses the steps (Cheng, Gimbutas,
 Martinsson, Rokhlin, SIAM J. Sci. Comput. 26 (2005) 1389). The rows of w add up to one: static parts
-are exact. Errors of functions bound those of entries through the lengths of the elements."""
+are exact. Errors of functions bound those of entries through the lengths of the elements.
+"""
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
@@ -25,9 +27,11 @@ DEGREES = (0, 0, 1, 0, 0, 1, 1, 2, 1, 1, 2, 2, 0, 0)  # of homogeneity in (r, t)
 def tail(
     start: int, steps: int, dt: float, speeds: tuple[float, float], h: float
 ) -> tuple[Indices, Array, Array]:
-    """Return the kept steps (q,) of the tail from `start` to `steps`, weights (length, q) that give
-    all its steps, and bounds (3,) of the errors of entries of V, K and D; speeds: (c_P, c_S) [m/s],
-    h: the longest element [m]."""
+    """Return the kept steps (q,) of the tail from `start` to `steps`.
+
+    With them come weights (length, q) that give all its steps, and bounds (3,) of the errors of
+    entries of V, K and D; ``speeds`` are (c_P, c_S) [m/s], ``h`` is the longest element [m].
+    """
     if start >= steps:
         return np.empty(0, int), np.empty((0, 0)), np.zeros(3)
     reach = (start - 1) * dt * speeds[1] - h
@@ -57,8 +61,10 @@ def tail(
 
 
 def _table(r: Array, start: int, steps: int, dt: float, speeds: tuple[float, float]) -> Array:
-    """Return (steps, 14, points) the radial functions of the blocks, from functions that are
-    homogeneous in r and t."""
+    """Return (steps, 14, points) the radial functions of the blocks.
+
+    They come from functions that are homogeneous in r and t.
+    """
     t = dt * np.arange(start - 1, steps + 1)[:, None]
     q = r / t
     kernels = TimeKernels(1.0, *speeds)(q)

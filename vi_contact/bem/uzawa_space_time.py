@@ -1,15 +1,19 @@
-"""Iterate on the whole space-time problem: Uzawa's algorithm of Aimi, Di Credico, Gimperlein
-(2024), with FFT.
+"""Iterate on the whole space-time problem.
+
+The algorithm is Uzawa's, of Aimi, Di Credico and Gimperlein (2024), with FFT.
 
     solve     v = v_free + W * lam                      all steps at once
-    project   r <- Pr_C(r + rho (v_n - gap, slip)),     Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
-    until     |Pr_C(r + rho_1 (v_n - gap, slip)) - r| <= tolerance |r|,   rho_1 = 1/lambda_max(W[0]), whatever rho is
+    project   r <- Pr_C(r + rho (v_n - gap, slip)),
+              Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
+    until     |Pr_C(r + rho_1 (v_n - gap, slip)) - r| <= tolerance |r|,
+              rho_1 = 1/lambda_max(W[0]), whatever rho is
 
 The normal multiplier meets the gap at the end of each step, the tangential one the slip of the
 step; F is Tresca's threshold or Coulomb's limit of the r_n just found. rho = 1/lambda_max(W[0]) by
 default: that of one step. The operator of all steps is not normal, so that changes grow before they
 shrink, the more the more steps there are, until rounding errors win: long runs are cut into
-windows, one after the other, the past of which is known."""
+windows, one after the other, the past of which is known.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -40,7 +44,8 @@ class SpaceTimeUzawa:
     relative changes. Its certificates measure each step by the largest forces and motions of the
     run, which is what this method solves for.
 
-    Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate."""
+    Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate.
+    """
 
     tolerance: float = 1e-8
     rho: float | None = None
@@ -52,8 +57,11 @@ class SpaceTimeUzawa:
         attributes(self, positive=("tolerance", *rho), counts=("max_iterations", *window))
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
-        """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance, or
-        certificates are not within LOOSE times the tolerance."""
+        """Solve the problem.
+
+        It raises StepFailure when ``max_iterations`` do not reach the tolerance, or certificates
+        are not within LOOSE times the tolerance.
+        """
         instance("SpaceTimeUzawa", "contact", contact, BoundaryContact, "give a BoundaryContact")
         if (
             contact.frictional
@@ -83,8 +91,10 @@ class SpaceTimeUzawa:
         return run
 
     def _window(self, problem: "_SpaceTime", r: Array) -> tuple[Array, list[float]]:
-        """Return the multipliers (steps, 2, c) of the window that was entered, and the relative
-        changes on the way."""
+        """Return the multipliers (steps, 2, c) of the window.
+
+        The window is the one that was entered. With them come the relative changes on the way.
+        """
         rho, unit = self.rho or problem.default_rho, float(norm(problem.violation(r).ravel()))
         changes: list[float] = []
         while len(changes) < self.max_iterations:

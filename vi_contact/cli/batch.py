@@ -2,7 +2,8 @@
 
 The one argument is a JSON object: "case", the file; "settings", "folders" and "restart", an entry
 for each run; "allow" and "wall_time" as of ``vi-contact run``. Lines of JSON tell how a run ended,
-{"ended": its number, "status", "said"}, and now and then {"share": of the steps that are done}."""
+{"ended": its number, "status", "said"}, and now and then {"share": of the steps that are done}.
+"""
 
 import json
 import sys
@@ -27,8 +28,10 @@ SECONDS = 5.0  # between two shares
 
 
 def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) -> Iterator[Ended]:
-    """Yield (number, solution or error) as the runs end; those of a body that serves all
-    excitations go together."""
+    """Yield (number, solution or error) as the runs end.
+
+    Those of a body that serves all excitations go together.
+    """
     runs: Runs = {}
     every = zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
     for number, (settings, folder, restart) in enumerate(every):

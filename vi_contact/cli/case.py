@@ -1,5 +1,7 @@
-"""``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``: options and what the
-commands do."""
+"""Carry out ``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``.
+
+This has their options and what they do.
+"""
 
 import argparse
 import gc
@@ -105,8 +107,10 @@ def _run(options: argparse.Namespace) -> str:
 
 
 def _checked(case: "Case", comm: Any, folder: Path) -> str:
-    """Describe and draw the model of a case; InputError for what is wrong with it, once all the
-    rest is told."""
+    """Describe and draw the model of a case.
+
+    It raises InputError for what is wrong with it, once all the rest is told.
+    """
     from ..core.files import on_root
     from ..core.own_files import inner_folder
     from ..plots.histories import write_picture  # late: matplotlib

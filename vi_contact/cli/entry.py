@@ -12,15 +12,17 @@ from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
 from .ida import add_ida_commands
 
-_DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks every time step.
-Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with -vi_contact_volume_ go to PETSc, for example
--vi_contact_volume_snes_monitor."""
+_DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks
+every time step. Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with
+-vi_contact_volume_ go to PETSc, for example -vi_contact_volume_snes_monitor."""
 _PETSC = "-vi_contact_"
 
 
 def parser(command: str = "") -> argparse.ArgumentParser:
-    """Build the parser of all commands and options; of those for runs alone, which need less, when
-    one is given."""
+    """Build the parser of all commands and options.
+
+    It has those for runs alone, which need less, when one is given.
+    """
     top = Parser(prog="vi-contact", description=_DESCRIPTION)
     top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -38,8 +40,10 @@ def parser(command: str = "") -> argparse.ArgumentParser:
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return (our own arguments, PETSc options); the latter are ``-vi_contact_... [value]``, our
-    PETSc prefixes."""
+    """Return (our own arguments, PETSc options).
+
+    The latter are ``-vi_contact_... [value]``, our PETSc prefixes.
+    """
     own: list[str] = []
     petsc: list[str] = []
     for before, argument in zip(["", *arguments], arguments, strict=False):
@@ -49,8 +53,10 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and print its text; return 0, 1 (one sentence on stderr), 128 + n (signal n) or
-    75 (wall time)."""
+    """Run a command and print its text; return 0, 1 (one sentence on stderr)or more.
+
+    Other statuses are 128 + n (signal n) and 75 (wall time).
+    """
     if (
         arguments is None
     ):  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
@@ -71,8 +77,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def status_of(call: Callable[[], object]) -> int:
-    """Call a command, or the main function of a script, and return 0; other ends are as those of
-    ``main``."""
+    """Call a command, or the main function of a script, and return 0.
+
+    Other ends are as those of ``main``.
+    """
     keep_streams()
     try:
         told(call, {})

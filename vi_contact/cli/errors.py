@@ -1,5 +1,7 @@
-"""Tell errors in one sentence, those of the machine and of libraries too, and end a command on all
-its ranks."""
+"""Tell errors in one sentence, and end a command on all its ranks.
+
+Those of the machine and of libraries are among them.
+"""
 
 import argparse
 import os
@@ -25,8 +27,10 @@ OUT_OF_MEMORY = (
 
 
 def check_words(arguments: Sequence[str]) -> None:
-    """Raise InputError for words that no shell can give or file can have as a name, and for empty
-    names of outputs."""
+    """Raise InputError for impossible names.
+
+    They are words that no shell can give or file can have as a name, and empty names of outputs.
+    """
     for word in arguments:
         if "\0" in word:
             raise InputError(f"{shown(word)} contains the character NUL: leave it out")
@@ -47,16 +51,19 @@ class Parser(argparse.ArgumentParser):
     """Parse as argparse does, with sentences that stay short where a word is long."""
 
     def error(self, message: str) -> NoReturn:
+        """Print usage and message, and end the program."""
         super().error(
             shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …")
         )
 
 
 def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
-    """Return what the call returns; ViContactError of one sentence for errors of memory, files and
-    sizes of numbers.
+    """Return what the call returns.
 
-    spelling: argument -> option: what sentences call units= is --units here."""
+    It raises ViContactError of one sentence for errors of memory, files and sizes of numbers.
+
+    spelling: argument -> option: what sentences call units= is --units here.
+    """
     try:
         return run()
     except ViContactError as error:
@@ -78,16 +85,20 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
 
 
 def printable(text: str) -> str:
-    """Return the text without what standard output cannot write, such as names of files that are no
-    UTF-8, and without characters that steer a terminal."""
+    """Return the text without what standard output cannot write.
+
+    Such are names of files that are no UTF-8. It is also without characters that steer a terminal.
+    """
     text = re.sub("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]", lambda found: ascii(found[0])[1:-1], text)
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def say(text: str) -> None:
-    """Print a text. Where nobody reads it any more (head has ended), it and all that follows is
-    dropped."""
+    """Print a text.
+
+    Where nobody reads it any more (head has ended), it and all that follows is dropped.
+    """
     try:
         print(printable(text), flush=True)
     except BrokenPipeError:
@@ -99,7 +110,8 @@ def say(text: str) -> None:
 def keep_streams() -> None:
     """Give standard streams that are closed, as daemons have them, a place.
 
-    Else the next file that is opened gets their number, and what a library prints goes into it."""
+    Else the next file that is opened gets their number, and what a library prints goes into it.
+    """
     for number in (0, 1, 2):
         try:
             os.fstat(number)
@@ -129,14 +141,18 @@ def _sentence(error: Exception) -> str | None:
 
 
 def world() -> Any:
-    """Return MPI's communicator of all ranks; that of this process alone where MPI has not been
-    started."""
+    """Return MPI's communicator of all ranks.
+
+    It is that of this process alone where MPI has not been started.
+    """
     return sys.modules["mpi4py.MPI"].COMM_WORLD if "mpi4py.MPI" in sys.modules else SerialComm()
 
 
 def fail_together(text: str) -> None:
-    """Return when all ranks come here; else say what stopped this one and end the others, which
-    wait. Collective."""
+    """Return when all ranks come here.
+
+    Else it says what stopped this one and ends the others, which wait. Collective.
+    """
     ranks = world()
     if ranks.size == 1:
         return

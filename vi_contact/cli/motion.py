@@ -98,8 +98,10 @@ def _info(options: argparse.Namespace) -> str:
 
 
 def _told(record: Record) -> str:
-    """Return the table of a record, and where its units, its time step and its number of samples
-    come from."""
+    """Return the table of a record, and where its data come from.
+
+    These are its units, its time step and its number of samples.
+    """
     spelled = {
         "units": record.units_from.replace("option", "--units"),
         "dt": record.dt_from.replace("option", "--dt"),

@@ -25,10 +25,12 @@ def add_command(
     *parts: str,
     words: Mapping[str, Any] | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a command, or an action of one such as "motion info", with these parts of options.toml;
-    return its parser.
+    """Add a command and return its parser.
 
-    run: what it calls. words: what the texts there, and the names of types, are looked up in."""
+    It may be an action of one such as "motion info"; it has these parts of options.toml.
+
+    run: what it calls. words: what the texts there, and the names of types, are looked up in.
+    """
     known, command = {"float": float, "int": int} | dict(words or {}), _TOLD[name]
     told = command["help"]
     about = command.get("description", f"{told[0].upper()}{told[1:]}.")
@@ -71,8 +73,10 @@ def _add(place: Any, table: Mapping[str, Any], known: Mapping[str, Any]) -> None
 
 
 def spaced(option: str, values: Sequence[float]) -> Any:
-    """Read FROM, TO, N as N logarithmically spaced numbers; InputError for others, before memory is
-    taken."""
+    """Read FROM, TO, N as N logarithmically spaced numbers.
+
+    It raises InputError for others, before memory is taken.
+    """
     first, last, count = values
     if not (0.0 < first < last < math.inf and 2 <= count < math.inf and count == int(count)):
         raise InputError(
@@ -91,7 +95,8 @@ def output_file(
 
     reads: files of its input, which it must not overwrite; picture: whether its name says the
     format of a picture. InputError for a folder, a file in no folder, one of ``reads``, or a name
-    without the ending of a picture."""
+    without the ending of a picture.
+    """
     out = Path(path)
     try:
         with suppress(FileNotFoundError):

@@ -75,8 +75,10 @@ def _film(options: argparse.Namespace) -> str:
 
 
 def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | None]:
-    """Return the run, its frames, its title, and the moments asked for, which have to be within the
-    run."""
+    """Return the run, its frames, its title, and the moments.
+
+    These are the moments asked for, which have to be within the run.
+    """
     from ..plots.deformed import read_frames
     from ..run.files.reading import read_run
     from ..studies.cases.library import read_copy

@@ -173,8 +173,10 @@ def _checks(options: argparse.Namespace) -> str:
 
 
 def _table_path(options: argparse.Namespace) -> Path:
-    """Return the table that a command is about to write, a picture of the same name beside it;
-    InputError."""
+    """Return the table that a command is about to write.
+
+    There is a picture of the same name beside it. It raises InputError if it may not.
+    """
     folder = Path(options.folder)
     out = output_file(
         options.out or folder / f"{options.action}.csv", reads=[folder / name for name in FILES]

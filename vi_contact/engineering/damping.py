@@ -3,7 +3,8 @@
     xi_k = phi_kᵀ C phi_k / (2 w_k phi_kᵀ M phi_k),    K phi_k = w_k² M phi_k
 
 with the whole C, of materials and of dashpots, and the contact as it is at the start: closed where
-it is held or has no gap, sticking where there is friction."""
+it is held or has no gap, sticking where there is friction.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,7 +32,8 @@ class FirstModes:
     """Hold the first natural modes with the contact closed where it touches at the start.
 
     periods: T_k [s], the longest first; ratios: xi_k; rigid_motions: how many motions meet no
-    stiffness."""
+    stiffness.
+    """
 
     periods: tuple[float, ...]
     ratios: tuple[float, ...]
@@ -41,7 +43,8 @@ class FirstModes:
 def first_modes(problem: ContactProblem) -> FirstModes:
     """Return the first three undamped natural modes of a problem, with the ratios that its C gives.
 
-    They are found once for a system and a surface. Collective."""
+    They are found once for a system and a surface. Collective.
+    """
     check_problem_given("first_modes", problem)
     surface, frictional = problem.surface, problem.frictional
     known: list[tuple[Any, bool, FirstModes]] = problem.system.cached(KNOWN, list)
@@ -55,7 +58,8 @@ def first_modes(problem: ContactProblem) -> FirstModes:
 def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
     """Return the damping of a problem as a text: "none", or its law and the ratios of its modes.
 
-    The ratios are told where ``first_modes`` have been found; ``unknown``: why they have not."""
+    The ratios are told where ``first_modes`` have been found; ``unknown``: why they have not.
+    """
     system = problem.system
     law = "; ".join(_sources(system))
     if not law:
@@ -70,10 +74,12 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
 
 
 def first_open_period(problem: ContactProblem) -> float | None:
-    """Return the first natural period [s] with the contact open; None where none of it touches at
-    the start.
+    """Return the first natural period [s] with the contact open.
 
-    A body that has lifted off may swing faster than with its contact closed. Collective."""
+    It is None where none of the contact touches at the start.
+
+    A body that has lifted off may swing faster than with its contact closed. Collective.
+    """
     surface = problem.surface
     if not surface.some(_closed_at_start(problem) & ~surface.bilateral):
         return None
@@ -90,11 +96,13 @@ def _closed_at_start(problem: ContactProblem) -> Mask:
 
 
 def _matrices(problem: ContactProblem, closed: Mask) -> tuple[Any, Any, Any, Mask, int]:
-    """Return (algebra, K, M, which unknowns are free, rigid motions at most) with these conditions
-    (m,) closed.
+    """Return (algebra, K, M, which unknowns are free, rigid motions at most).
+
+    These are with the conditions (m,) closed.
 
     The system is that of the nodal frames, without excitation; closed conditions become supports or
-    springs."""
+    springs.
+    """
     system, surface = problem.static_load, problem.surface
     held, springs = np.zeros((2, system.rows))
     rigid = closed & surface.rigid
@@ -125,8 +133,11 @@ def _found(problem: ContactProblem) -> FirstModes:
 
 
 def _of_alike(frequencies: Array, ratios: Array) -> Array:
-    """Return the ratios with their mean over modes of one frequency, of which none is more a mode
-    than another, so that the answer does not depend on the basis that the solver found."""
+    """Return the ratios with their mean over modes of one frequency.
+
+    Of these none is more a mode than another, so that the answer does not depend on the basis that
+    the solver found.
+    """
     close = np.abs(frequencies[:, None] - frequencies) <= ALIKE * frequencies[:, None]
     return np.asarray((close @ ratios) / close.sum(axis=1))
 

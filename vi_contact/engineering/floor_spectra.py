@@ -1,11 +1,13 @@
-"""Compute floor and soil response spectra and transfer functions of the motions that probes
-recorded.
+"""Compute floor and soil response spectra and transfer functions.
+
+The motions are those that probes recorded.
 
 Which motion: a column a_x_<label> of ``Probe(..., acceleration=True)`` is the absolute
 acceleration, that of the equations, relative to the ground, plus that of the ground. Equipment on a
 floor and a layer on rock feel the absolute one, so it is the default; with ``relative`` the
 ground's is taken off again. In a run whose ground moves by prescribed displacements no ground
-acceleration is recorded, and both are the same."""
+acceleration is recorded, and both are the same.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,8 +25,9 @@ BANDWIDTH = 40.0
 
 
 def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool = False) -> Record:
-    """Return the acceleration of a column as a record with even steps: the spectra, intensities and
-    writers take it.
+    """Return the acceleration of a column as a record with even steps.
+
+    The spectra, intensities and writers take it.
 
     Uneven steps (halved at impacts) are interpolated linearly to the most frequent one. Columns
     a_<axis>_<label> are means over the step that ends at t, so their instants are half a step
@@ -82,8 +85,10 @@ def floor_spectrum(
     damping: float = 0.05,
     relative: bool = False,
 ) -> ResponseSpectrum:
-    """Return the response spectrum of an oscillator of each period [s] standing where the column
-    was recorded."""
+    """Return the response spectrum of an oscillator of each period [s].
+
+    The oscillator stands where the column was recorded.
+    """
     return response_spectrum(
         recorded_motion(history, column, relative=relative), periods, damping=damping
     )
@@ -91,8 +96,10 @@ def floor_spectrum(
 
 @dataclass(frozen=True)
 class TransferFunction:
-    """Hold frequencies [Hz] and |surface/base| [-], (m,); nan where the base has no motion to
-    divide by."""
+    """Hold frequencies [Hz] and |surface/base| [-], (m,).
+
+    It is nan where the base has no motion to divide by.
+    """
 
     frequencies: Array
     amplitude: Array
@@ -113,14 +120,16 @@ def transfer_function(
     bandwidth: float | None = BANDWIDTH,
     floor: float = 1e-3,
 ) -> TransferFunction:
-    """Return |A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of
-    two columns.
+    """Return |A_surface(f)| / |A_base(f)| of absolute accelerations.
+
+    It comes from the Fourier amplitudes of two columns.
 
     Amplitudes are smoothed alike with Konno and Ohmachi's window (1998), which widens peaks, before
     they are divided; ``bandwidth=None`` takes the raw ones. The motion has to die away before the
     run ends, or be periodic, else its end leaks into all frequencies. ``frequencies`` None: 200,
     from four periods in the run to four samples in a period; raw all of the transform. nan where
-    the base has below ``floor`` of its peak. InputError for a base without motion."""
+    the base has below ``floor`` of its peak. InputError for a base without motion.
+    """
     number("transfer_function", "floor", floor, positive=True)
     optional(number, "transfer_function", "bandwidth", bandwidth, positive=True)
     top, below = recorded_motion(history, surface), recorded_motion(history, base)
@@ -158,8 +167,10 @@ def transfer_function(
 def konno_ohmachi(
     frequencies: Array, amplitudes: Array, centres: Array, *, bandwidth: float = BANDWIDTH
 ) -> Array:
-    """Smooth amplitudes at the centres with the weights (sin x / x)⁴, x = b log10(f / f_c) (Konno,
-    Ohmachi 1998)."""
+    """Smooth amplitudes at the centres with Konno and Ohmachi's weights.
+
+    The weights are (sin x / x)⁴, x = b log10(f / f_c) (Konno, Ohmachi 1998).
+    """
     smooth = np.empty(len(centres))
     for k, centre in enumerate(centres):
         weights = np.sinc(bandwidth * np.log10(frequencies / centre) / np.pi) ** 4

@@ -14,12 +14,14 @@ SHIFT, RIGID = (
 
 
 def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:
-    """Return f1 [Hz] of K phi = (2 pi f)² M phi without contact, by inverse iteration with one
-    factorisation of K.
+    """Return f1 [Hz] of K phi = (2 pi f)² M phi without contact.
+
+    It is found by inverse iteration with one factorisation of K.
 
     The start vector is the static answer to a uniform acceleration in all directions:
     deterministic, and not orthogonal to the first mode of structures that a base motion can excite.
-    Raises InputError for a floating body (K singular) and when the iteration does not settle."""
+    Raises InputError for a floating body (K singular) and when the iteration does not settle.
+    """
     instance(
         "lowest_frequency",
         "system",
@@ -54,11 +56,14 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
 def natural_modes(
     algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3, rigid: int = 0
 ) -> tuple[Array, Array, int]:
-    """Return (lowest frequencies above zero [Hz], ascending; their modes phi, (rows, k), of this
-    rank's rows; number of rigid motions) of K phi = (2 pi f)² M phi.
+    """Return (frequencies, modes, number of rigid motions) of K phi = (2 pi f)² M phi.
+
+    The frequencies [Hz] are the lowest above zero, ascending; their modes phi are (rows, k), of
+    this rank's rows.
 
     rigid: there are no more rigid motions than these. Solved on rank 0, by Lanczos' method and one
-    factor of K + s M, which there is where bodies float, too. Collective."""
+    factor of K + s M, which there is where bodies float, too. Collective.
+    """
     from scipy.sparse import vstack  # late: no step needs it
     from scipy.sparse.linalg import LinearOperator, eigsh
 

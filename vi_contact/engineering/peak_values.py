@@ -1,5 +1,7 @@
-"""List peak values of histories as a tidy table, and follow loops of a force over a deformation
-with their work."""
+"""List peak values of histories as a tidy table.
+
+Loops of a force over a deformation are followed too, with their work.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
@@ -21,8 +23,10 @@ _NOT_PEAKS = ("t", "k", "iterations", "escalated")
 
 @dataclass(frozen=True)
 class Peak:
-    """Hold the largest and smallest value of a column and when they came first [s]; nan where the
-    column is all nan."""
+    """Hold the largest and smallest value of a column and when they came first [s].
+
+    They are nan where the column is all nan.
+    """
 
     name: str
     quantity: str
@@ -36,8 +40,9 @@ class Peak:
 def peaks(
     history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None
 ) -> list[Peak]:
-    """Return the peaks of these columns, of all columns of numbers but the counters when None. nan
-    values are left out.
+    """Return the peaks of these columns, of all columns of numbers but the counters when None.
+
+    nan values are left out.
 
     The peak of an acceleration is that of the time step where contact closes, and is marked so: it
     grows as dt falls, while displacements and forces converge. InputError for a column that the
@@ -67,17 +72,22 @@ def peaks(
 
 @checked
 def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
-    """Write ``peaks.csv``: name, quantity (its meaning), unit, max, t_max [s], min, t_min [s], to
-    the last bit."""
+    """Write ``peaks.csv``.
+
+    Its columns are name, quantity (its meaning), unit, max, t_max [s], min, t_min [s], to the last
+    bit.
+    """
     return write_csv(path, HEADER, map(astuple, rows))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Hold deformation, force and work, (rows,) each: work is ∫ F dx since the start by the
-    trapezoidal rule.
+    """Hold deformation, force and work, (rows,) each.
 
-    For a closed loop run through clockwise it is the area, the work that the structure took up."""
+    The work is ∫ F dx since the start by the trapezoidal rule.
+
+    For a closed loop run through clockwise it is the area, the work that the structure took up.
+    """
 
     deformation: Array
     force: Array
@@ -85,8 +95,10 @@ class Loop:
 
     @property
     def stiffness(self) -> float:
-        """Return the secant stiffness between the largest and the smallest deformation; nan where
-        nothing moved."""
+        """Return the secant stiffness between the largest and the smallest deformation.
+
+        It is nan where nothing moved.
+        """
         high, low = int(np.argmax(self.deformation)), int(np.argmin(self.deformation))
         way = self.deformation[high] - self.deformation[low]
         return float((self.force[high] - self.force[low]) / way) if way > 0.0 else float("nan")
@@ -95,8 +107,9 @@ class Loop:
 def hysteresis(
     history: Mapping[str, Array], deformation: str, force: str, *, sign: float = 1.0
 ) -> Loop:
-    """Return the loop of two columns: base shear over top displacement, shear over racking, M over
-    theta.
+    """Return the loop of two columns.
+
+    Such are base shear over top displacement, shear over racking, or M over theta.
 
     ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError
     for missing columns.

@@ -1,5 +1,7 @@
-"""Measure the racking of a frame: the shear of four corner points, which no rigid rotation
-changes."""
+"""Measure the racking of a frame.
+
+It is the shear of four corner points, which no rigid rotation changes.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,8 +17,9 @@ from ..core.step import Columns, Report, Row, State
 
 
 def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
-    """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m]; each (...,),
-    in radians.
+    """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m].
+
+    Each is (...,), in radians.
 
     The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy +
     du_y/dx and rotation = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean
@@ -42,7 +45,8 @@ class Racking:
 
     Columns racking_<label>, rotation_<label> [rad]: see ``racking``. A rigid motion of the frame,
     and of the ground, leaves racking alone. InputError for corners that are not four, on one line,
-    or outside the body."""
+    or outside the body.
+    """
 
     frames: Mapping[str, Sequence[Sequence[float]]]
 
@@ -90,6 +94,7 @@ class Racking:
         return self._row(state)
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:

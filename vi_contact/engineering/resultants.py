@@ -1,11 +1,13 @@
-"""Sum up what a part of a contact surface does to its body: uplift, opening, slip, thrust, N, T, M
-and theta.
+"""Sum up what a part of a contact surface does to its body.
+
+That is uplift, opening, slip, thrust, N, T, M and theta.
 
 With the contact direction n of a point (from the body to its obstacle), its tangent t and the
 reactions of the body on the support, the force on the body at a point X is f = -r_n n - r_t t. Over
 the points of a part, about its centre c:
 
-    uplift = 1 - L_contact / L (by weight),    F = sum f,    M = sum (X - c) x f   (anticlockwise positive)
+    uplift = 1 - L_contact / L (by weight),    F = sum f,
+    M = sum (X - c) x f   (anticlockwise positive)
     N = -F·n̄ (compression positive),  T = F·t̄,  e = M / N,    height = sum r_n (X - c)·up / sum r_n
 
 n̄ is the mean direction of the part by weight, t̄ = (-n̄_y, n̄_x), up the last axis. On level
@@ -21,11 +23,13 @@ theta x (X - c) whose normal displacements fit those of the part best, by weight
 say nothing about: a level base does not tell how it turns about the vertical. ``Resultants`` adds
 what a report asks of a part:
 
-    level = h / H,    sliding = (sum w slip / sum w)·t̄,    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
+    level = h / H,    sliding = (sum w slip / sum w)·t̄,
+    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
 
 h is the height of the thrust above the lowest point of the part, H the height of the part;
 pressure_low and pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's
-base."""
+base.
+"""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -61,14 +65,16 @@ def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
 
 
 class Part:
-    """Hold the points of a contact surface that a mask picks, with the directions of its
-    resultants.
+    """Hold the points of a contact surface that a mask picks.
+
+    With them come the directions of its resultants.
 
     ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a
     part without points, a centre of other dimension, or directions that cancel (a closed ring),
     unless ``normal`` says which N is meant. ``centre`` None: the middle of the part by weight, at
     the level of its lowest point. ``slots``: the numbers of the conditions whose share in it is
-    held; those of one rank, all when None."""
+    held; those of one rank, all when None.
+    """
 
     def __init__(
         self,
@@ -124,16 +130,20 @@ class Part:
         return np.asarray(direction / size)
 
     def _ends(self, points: Array) -> Array:
-        """Return rows (2, k) that make the pressures at the low and the high end of r_n, along the
-        longest axis."""
+        """Return rows (2, k) that make the pressures at the low and the high end of r_n.
+
+        The ends are those along the longest axis.
+        """
         along = points[:, np.argmax(np.ptp(points, axis=0))]
         slack = DETERMINED * np.ptp(along)
         ends = np.stack([along <= along.min() + slack, along >= along.max() - slack])
         return np.asarray(ends / (ends @ self.weights)[:, None])
 
     def _fit(self) -> Array:
-        """Return rows (q + 1, k) that make theta and settlement of normal displacements; nan what
-        is not determined."""
+        """Return rows (q + 1, k) that make theta and settlement of normal displacements.
+
+        What is not determined is nan.
+        """
         size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
         turns = [one / size for one in turning(self.arms, self.normals)]
         root, modes = np.sqrt(self.weights), np.column_stack([self.normals, *turns])
@@ -145,8 +155,11 @@ class Part:
         return np.where(told[:, None], asked @ inverse, np.nan)
 
     def sums(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
-        """Return (rows, …) F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions,
-        (rows, m), (rows, m, d - 1) or None, and closed conditions (rows, m)."""
+        """Return (rows, …) of sums.
+
+        They are F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions, (rows, m),
+        (rows, m, d - 1) or None, and of closed conditions (rows, m).
+        """
         r_n = r_n[:, self.mask]
         at_points = -r_n[:, :, None] * self.normals
         if r_t is not None:
@@ -158,16 +171,20 @@ class Part:
         )
 
     def tops(self, gap: Array, slip: Array | None) -> Array:
-        """Return (rows, 1 or 2) the largest gap and slip of rows (rows, m), (rows, m, d - 1) or
-        None."""
+        """Return (rows, 1 or 2) the largest gap and slip.
+
+        They are those of rows (rows, m), (rows, m, d - 1) or None.
+        """
         found = [gap[:, self.mask]]
         if slip is not None and slip.shape[2]:
             found.append(np.linalg.norm(slip[:, self.mask], axis=2))
         return np.column_stack([one.max(axis=1, initial=-np.inf) for one in found])
 
     def quantities(self, sums: Array, tops: Array) -> dict[str, Array]:
-        """Return quantity -> (rows,) of sums and tops of all its points; nan where N or Σ r_n is
-        zero."""
+        """Return quantity -> (rows,) of sums and tops of all its points.
+
+        They are nan where N or Σ r_n is zero.
+        """
         d = self.dimension
         force, moment, (thrust, raised, lifted) = 0.0 + sums[:, :d], sums[:, d:-3], sums.T[-3:]
         compression = 0.0 - force @ self.normal
@@ -198,8 +215,10 @@ class Part:
 
 
 def turning(arms: Array, vectors: Array) -> list[Array]:
-    """Return the components (…) of arms x vectors (…, d): x, y, z in space, z in the plane, none on
-    a line."""
+    """Return the components (…) of arms x vectors (…, d).
+
+    They are x, y, z in space, z in the plane, none on a line.
+    """
     pairs = {1: (), 2: ((0, 1),), 3: ((1, 2), (2, 0), (0, 1))}[arms.shape[-1]]
     return [arms[..., i] * vectors[..., j] - arms[..., j] * vectors[..., i] for i, j in pairs]
 
@@ -272,7 +291,9 @@ class Resultants:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run.
-        Collective."""
+
+        Collective.
+        """
         self._surface, self._problem = problem.surface, problem
         whole = problem.surface.whole()
         where = self.where if self.part is None else self._chosen(whole)
@@ -280,7 +301,10 @@ class Resultants:
         return self._row(state)
 
     def _chosen(self, whole: ContactSurface) -> Where:
-        """What picks the part out of all conditions. Collective."""
+        """Return what picks the part out of all conditions.
+
+        Collective.
+        """
         if hasattr(self.part, "indices"):
             space: Any = self._problem.system.space
             provides(
@@ -315,10 +339,11 @@ class Resultants:
         return lambda points, normals: found
 
     def row(self, report: Report) -> Row:
+        """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        """Sums and maxima of this rank's conditions, then of all ranks."""
+        """Return sums and maxima of this rank's conditions, then of all ranks."""
         surface, part, r_n, d = self._surface, self._part, state.r_n, self._part.dimension
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
@@ -363,12 +388,14 @@ def contact_summary(
     where: Where | None = None,
     normal: Sequence[float] | None = None,
 ) -> dict[str, Array]:
-    """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without
-    theta and settlement.
+    """Return the resultants of a run that recorded ``Contact()``.
+
+    They are quantity -> (rows,), without theta and settlement.
 
     ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``.
     Slip and friction count where they were recorded, with friction. InputError without arrays of
-    the contact points."""
+    the contact points.
+    """
     instance("contact_summary", "history", history, Mapping, "give the history of a solution")
     provides(
         "contact_summary",

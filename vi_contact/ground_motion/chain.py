@@ -1,5 +1,7 @@
-"""Prepare records by the usual steps in the usual order, the last of which scales them to a
-measure."""
+"""Prepare records by the usual steps in the usual order.
+
+The last step scales them to a measure.
+"""
 
 import math
 from dataclasses import dataclass
@@ -22,15 +24,17 @@ from .record import Record
 
 @dataclass(frozen=True)
 class Processing:
-    """Say what to do with a record; calling it gives the new one. Fields are in order, each step is
-    optional.
+    """Say what to do with a record; calling it gives the new one.
+
+    Fields are in order, each step is optional.
 
     trim: (start, end) [s]; pad: zeros (before, after) [s]; mean: remove the mean; taper: fraction
     of the duration at each end; low, high: Butterworth corners [Hz] with order and causal;
     resample: time step [s]; baseline: degree of `baseline_corrected`; then one of scale (factor),
     pga [m/s²], arias [m/s], psa (value [m/s²], period [s]). Filtering and tapering need the
     record's own step, the baseline the final samples; scaling commutes with all. Raises InputError
-    when more than one scaling is asked for; calling raises that of the steps."""
+    when more than one scaling is asked for; calling raises that of the steps.
+    """
 
     trim: tuple[float, float | None] | None = None
     pad: tuple[float, float] | None = None
@@ -58,6 +62,10 @@ class Processing:
 
     def __call__(self, record: Record) -> Record:
         """Return the processed record; its notes tell every step taken."""
+        return self._scale(self._filter(self._cut(record)))
+
+    def _cut(self, record: Record) -> Record:
+        """Choose the time, remove the mean and taper the ends."""
         if self.trim is not None:
             record = trimmed(record, *self.trim)
         if self.pad is not None:
@@ -66,6 +74,10 @@ class Processing:
             record = without_mean(record)
         if self.taper is not None:
             record = tapered(record, fraction=self.taper)
+        return record
+
+    def _filter(self, record: Record) -> Record:
+        """Filter, change the time step and correct the baseline."""
         if self.low is not None or self.high is not None:
             record = filtered(
                 record, low=self.low, high=self.high, order=self.order, causal=self.causal
@@ -74,6 +86,10 @@ class Processing:
             record = resampled(record, self.resample)
         if self.baseline is not None:
             record = baseline_corrected(record, degree=self.baseline)
+        return record
+
+    def _scale(self, record: Record) -> Record:
+        """Scale by what was asked for."""
         if self.scale is not None:
             record = scaled(record, factor=self.scale)
         if self.pga is not None:
@@ -88,15 +104,18 @@ class Processing:
 def scaled_to_pga(record: Record, target: float) -> Record:
     """Scale a record so that its largest |acceleration| is `target` [m/s²], and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero."""
+    Raises InputError unless target > 0 and the record is not all zero.
+    """
     return scaled(record, factor=_ratio(record, "scaled_to_pga", target, pga(record)))
 
 
 def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:
-    """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²], and keep
-    its sign.
+    """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²].
 
-    Raises InputError unless target > 0 and the record is not all zero."""
+    Its sign is kept.
+
+    Raises InputError unless target > 0 and the record is not all zero.
+    """
     return scaled(
         record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping))
     )
@@ -105,7 +124,8 @@ def scaled_to_psa(record: Record, target: float, period: float, *, damping: floa
 def scaled_to_arias(record: Record, target: float) -> Record:
     """Scale a record so that its Arias intensity is `target` [m/s], and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero."""
+    Raises InputError unless target > 0 and the record is not all zero.
+    """
     return scaled(
         record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record)))
     )

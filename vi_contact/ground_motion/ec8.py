@@ -1,5 +1,7 @@
-"""Give the elastic response spectra of Eurocode 8, EN 1998-1:2004, 3.2.2.2 (horizontal) and 3.2.2.3
-(vertical)."""
+"""Give the elastic response spectra of Eurocode 8(EN 1998-1:2004).
+
+They are those of 3.2.2.2 (horizontal) and 3.2.2.3 (vertical).
+"""
 
 import math
 import tomllib
@@ -19,12 +21,14 @@ TYPES = dict(enumerate(_TABLES["type"], start=1))  # of spectra: 1, or 2 for wea
 
 @dataclass(frozen=True)
 class EC8Spectrum:
-    """Hold the elastic spectrum of EN 1998-1, S_e(T) of eqs. 3.2 to 3.5. `on_ground` and `vertical`
-    have its tables.
+    """Hold the elastic spectrum of EN 1998-1, S_e(T) of eqs. 3.2 to 3.5.
+
+    `on_ground` and `vertical` have its tables.
 
     ag: design ground acceleration on ground A, gamma_I a_gR [m/s²]; s: soil factor; tb, tc, td [s];
     damping: ratio; plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers. Raises
-    InputError unless ag, s > 0, 0 < tb <= tc <= td and 0 <= damping < 1."""
+    InputError unless ag, s > 0, 0 < tb <= tc <= td and 0 <= damping < 1.
+    """
 
     ag: float
     s: float
@@ -50,8 +54,10 @@ class EC8Spectrum:
     def on_ground(
         cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05
     ) -> "EC8Spectrum":
-        """Return the horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on
-        ground "A" to "E"."""
+        """Return the horizontal spectrum of type `kind` on ground "A" to "E".
+
+        The type is 1, or 2 for weak near earthquakes.
+        """
         if kind not in TYPES or ground not in TYPES[kind]["ground"]:
             raise InputError(
                 f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 "
@@ -63,8 +69,10 @@ class EC8Spectrum:
     @classmethod
     @checked
     def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
-        """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11, for every ground; ag is the
-        horizontal one."""
+        """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11.
+
+        It holds for every ground; ag is the horizontal one.
+        """
         if kind not in TYPES:
             raise InputError(f"EC8Spectrum: type {kind!r}; give 1 or 2")
         ratio, tb, tc, td = TYPES[kind]["vertical"]

@@ -9,8 +9,9 @@ from .record import Record
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """Describe a recorded motion: a(t) = scale · (straight lines between the samples of `record`,
-    sample k at k · dt).
+    """Describe a recorded motion.
+
+    It is a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
 
     It is zero before the first and after the last sample. scale: a factor; for a peak use
     `scaled_to_pga(record, pga)`. InputError unless scale is finite. Use a time step no longer than

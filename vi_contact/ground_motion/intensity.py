@@ -1,5 +1,8 @@
-"""Measure how strong a record is: peaks, Arias intensity, durations, what spectra say; and tell
-what it holds."""
+"""Measure how strong a record is.
+
+There are peaks, Arias intensity, durations, and what spectra say; there is also a table of what it
+holds.
+"""
 
 import math
 from collections.abc import Callable
@@ -31,32 +34,40 @@ def pga_time(record: Record) -> float:
 
 @checked
 def pgv(record: Record) -> float:
-    """Return the peak ground velocity, the largest |v| at the samples of the integrated record
-    [m/s]."""
+    """Return the peak ground velocity.
+
+    It is the largest |v| at the samples of the integrated record [m/s].
+    """
     return float(np.max(np.abs(integrated(record)[0])))
 
 
 @checked
 def pgd(record: Record) -> float:
-    """Return the peak ground displacement, the largest |u| of the twice integrated samples, with
-    their drift [m]."""
+    """Return the peak ground displacement.
+
+    It is the largest |u| of the twice integrated samples, their drift included [m].
+    """
     return float(np.max(np.abs(integrated(record)[1])))
 
 
 @checked
 def arias(record: Record) -> float:
-    """Return the Arias intensity pi / (2 g) times the integral of a² over the record, by the
-    trapezoidal rule [m/s]."""
+    """Return the Arias intensity of the record.
+
+    It is pi / (2 g) times the integral of a² over the record, by the trapezoidal rule [m/s].
+    """
     return float(husid(record)[-1])
 
 
 @checked
 def d5_95(record: Record) -> float:
-    """Return the time between 5 % and 95 % of the Arias intensity [s], zero for a record that is
-    all zero.
+    """Return the time between 5 % and 95 % of the Arias intensity [s].
+
+    It is zero for a record that is all zero.
 
     Both instants are interpolated linearly in the Husid curve, the Arias intensity accumulated up
-    to t."""
+    to t.
+    """
     return significant_duration(record, 0.05, 0.95)
 
 
@@ -70,8 +81,10 @@ def husid(record: Record) -> Array:
 
 @checked
 def significant_duration(record: Record, start: float, end: float) -> float:
-    """Return the time between fractions `start` and `end` of the Arias intensity [s]; zero if all
-    is zero."""
+    """Return the time between fractions `start` and `end` of the Arias intensity [s].
+
+    It is zero if all is zero.
+    """
     if not 0.0 <= start < end <= 1.0:
         raise InputError(
             f"significant_duration: {start!r} to {end!r}; give fractions with 0 <= start < end <= 1"
@@ -85,8 +98,10 @@ def significant_duration(record: Record, start: float, end: float) -> float:
 
 @checked
 def cav(record: Record) -> float:
-    """Return the cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines
-    between samples."""
+    """Return the cumulative absolute velocity, the integral of |a| [m/s].
+
+    It is exact for straight lines between samples.
+    """
     a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
     change = (
         record.acceleration[:-1] * record.acceleration[1:] < 0.0
@@ -117,16 +132,20 @@ def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
 
 @checked
 def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
-    """Return Housner's spectrum intensity: integral of the pseudo-velocity over T from 0.1 to 2.5 s
-    [m]."""
+    """Return Housner's spectrum intensity.
+
+    It is the integral of the pseudo-velocity over T from 0.1 to 2.5 s [m].
+    """
     psv = response_spectrum(record, HOUSNER_PERIODS, damping=damping).psv
     return float(np.sum(0.5 * (psv[:-1] + psv[1:]) * np.diff(HOUSNER_PERIODS)))
 
 
 @checked
 def predominant_period(record: Record, *, damping: float = 0.05) -> float:
-    """Return the period of the largest pseudo-acceleration from 0.02 (or ten steps of the record)
-    to 10 s [s]."""
+    """Return the period of the largest pseudo-acceleration.
+
+    The range is from 0.02 (or ten steps of the record) to 10 s [s].
+    """
     periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
     if not periods.size:
         raise InputError(
@@ -137,10 +156,12 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
 
 @checked
 def mean_period(record: Record) -> float:
-    """Return the mean period of Rathje, Abrahamson and Bray (1998) [s]: sum(C²/f) / sum(C²), 0.25
-    <= f <= 20 Hz.
+    """Return the mean period of Rathje, Abrahamson and Bray (1998) [s].
 
-    C are the Fourier amplitudes. Raises InputError when nothing lies in that band."""
+    It is sum(C²/f) / sum(C²) over 0.25 <= f <= 20 Hz.
+
+    C are the Fourier amplitudes. Raises InputError when nothing lies in that band.
+    """
     frequencies, amplitudes = fourier_spectrum(record)
     inside = (frequencies >= 0.25) & (frequencies <= 20.0)
     power = amplitudes[inside] ** 2
@@ -153,8 +174,11 @@ def mean_period(record: Record) -> float:
 
 @checked
 def record_info(record: Record) -> str:
-    """Return the table of a record: where it comes from, peaks, intensities, what is left at its
-    end, what is doubted, notes."""
+    """Return the table of a record.
+
+    It says where it comes from, peaks, intensities, what is left at its end, what is doubted, and
+    notes.
+    """
     measures = (pga, pga_time, pgv, pgd, arias, d5_95, cav, rms, housner_intensity)
     found: dict[str, Any] = {one.__name__: one(record) for one in measures}
     for one in (predominant_period, mean_period):
@@ -181,8 +205,10 @@ def record_info(record: Record) -> str:
 
 
 def _period_in_words(period: Callable[[Record], float], record: Record) -> str:
-    """Return a period [s], or why the record has none: all else of the table is told all the
-    same."""
+    """Return a period [s], or why the record has none.
+
+    All else of the table is told all the same.
+    """
     try:
         return f"{period(record):.3g} s"
     except InputError as error:  # "name: why; remedy"

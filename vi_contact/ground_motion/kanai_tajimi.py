@@ -1,5 +1,7 @@
-"""Make stochastic motions: white noise filtered by the ground (Kanai-Tajimi), without long periods
-(Clough-Penzien)."""
+"""Make stochastic motions: white noise filtered by the ground.
+
+That is Kanai and Tajimi's filter; Clough and Penzien's leaves long periods out.
+"""
 
 import math
 from dataclasses import dataclass
@@ -15,13 +17,15 @@ from .record import Record
 
 @dataclass(frozen=True)
 class KanaiTajimi:
-    """Describe a two-sided power spectral density of the ground acceleration [m²/s³]; its integral
-    is the variance.
+    """Describe a two-sided power spectral density of the ground acceleration [m²/s³].
+
+    Its integral is the variance.
 
     S = S0 (wg⁴ + 4 zg² wg² w²) / ((wg² - w²)² + 4 zg² wg² w²) · w⁴ / ((wf² - w²)² + 4 zf² wf² w²),
     the last factor only when omega_f > 0 (Clough and Penzien, 1975). s0: density of the rock's
     white noise [m²/s³]; omega_g, omega_f [rad/s]; zeta_g, zeta_f: damping ratios. The default is
-    firm ground. Raises InputError unless s0, omega_g, zeta_g, zeta_f > 0 and omega_f >= 0."""
+    firm ground. Raises InputError unless s0, omega_g, zeta_g, zeta_f > 0 and omega_f >= 0.
+    """
 
     s0: float
     omega_g: float = 15.6
@@ -48,10 +52,12 @@ class KanaiTajimi:
 
 @dataclass(frozen=True)
 class Envelope:
-    """Describe an envelope (t/rise)², then 1, then exp(-decay (t - end)): Jennings, Housner and
-    Tsai (1968).
+    """Describe an envelope (t/rise)², then 1, then exp(-decay (t - end)).
 
-    rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise."""
+    It is that of Jennings, Housner and Tsai (1968).
+
+    rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise.
+    """
 
     rise: float
     end: float
@@ -78,14 +84,16 @@ def synthetic(
     seed: int,
     envelope: Envelope | None = None,
 ) -> Record:
-    """Make a motion of this density: a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform
-    from `seed`.
+    """Make a motion of this density.
+
+    It is a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
 
     Spectral representation (Shinozuka and Deodatis, 1991) with w_k = k dw, dw = 2 pi / period; the
     period, the next power of two of steps from twice the duration, keeps the motion from repeating.
     Without an envelope it is stationary over all seeds, of mean 0 and variance 2 sum S(w_k) dw. One
     seed gives one motion on all ranks. Scale with `scaled_to_pga`; correct the baseline where
-    displacements are prescribed. InputError unless 0 < dt < duration."""
+    displacements are prescribed. InputError unless 0 < dt < duration.
+    """
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
     seed = whole("synthetic", "seed", seed, most=2**63 - 1)

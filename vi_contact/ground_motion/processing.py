@@ -1,7 +1,8 @@
 """Scale, resample, integrate, cut, lengthen, taper and filter records, and correct their baselines.
 
 Every function returns a new value and notes what it did. Between samples the acceleration is a
-straight line."""
+straight line.
+"""
 
 import math
 from dataclasses import replace
@@ -22,16 +23,20 @@ HIGHEST = 6  # highest degree of a baseline: beyond it a polynomial follows the 
 
 @checked
 def scaled(record: Record, *, factor: float) -> Record:
-    """Scale every sample by `factor`; a negative one turns the motion round. Raises InputError
-    unless it is finite."""
+    """Scale every sample by `factor`; a negative one turns the motion round.
+
+    Raises InputError unless it is finite.
+    """
     factor = number("scaled", "factor", factor)
     return record.changed(factor * record.acceleration, f"scaled by {factor:.6g}")
 
 
 @checked
 def resampled(record: Record, dt: float) -> Record:
-    """Return the record at time step dt [s]: band-limited interpolation up, anti-aliased decimation
-    down.
+    """Return the record at time step dt [s].
+
+    It is interpolated band-limited to smaller steps, and decimated with anti-aliasing to larger
+    ones.
 
     scipy.signal.resample_poly: a zero-phase windowed-sinc filter (Kaiser, beta 5) whose amplitude
     is halved at the lower of the two Nyquist frequencies 1 / (2 dt). The record is taken as zero
@@ -39,7 +44,8 @@ def resampled(record: Record, dt: float) -> Record:
     ten steps, of the longer kind, at each end. dt must be the record's step times a ratio of whole
     numbers up to 1000; `GroundMotion` interpolates for any other step. Sample 0 stays at t = 0; the
     new record ends at the last multiple of dt inside the old one. Raises InputError when dt is not
-    positive, not such a ratio, or longer than the record."""
+    positive, not such a ratio, or longer than the record.
+    """
     dt = number("resampled", "dt", dt, positive=True, unit="seconds")
     counted("resampled", f"dt={dt!r} s", record.duration / dt)
     from scipy.signal import (
@@ -69,13 +75,15 @@ def resampled(record: Record, dt: float) -> Record:
 
 @checked
 def integrated(record: Record) -> tuple[Array, Array]:
-    """Return ground velocity [m/s] and displacement [m] at the samples, both shape (n,) and zero at
-    t = 0.
+    """Return ground velocity [m/s] and displacement [m] at the samples.
+
+    Both have shape (n,) and are zero at t = 0.
 
     Exact for an acceleration that is a straight line between samples: the trapezoidal rule for the
     velocity, v_{k+1} = v_k + dt (a_k + a_{k+1}) / 2, and u_{k+1} = u_k + dt v_k + dt² (2 a_k +
     a_{k+1}) / 6. Nothing is filtered and no baseline is corrected: what is left at the end is the
-    drift of the record."""
+    drift of the record.
+    """
     a, dt = record.acceleration, record.dt
     velocity = np.concatenate(([0.0], np.cumsum(0.5 * dt * (a[:-1] + a[1:]))))
     displacement = np.concatenate(
@@ -86,10 +94,12 @@ def integrated(record: Record) -> tuple[Array, Array]:
 
 @checked
 def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Record:
-    """Keep the samples at start <= t <= end [s]; the first one kept becomes t = 0. end: the
-    record's last sample.
+    """Keep the samples at start <= t <= end [s]; the first one kept becomes t = 0.
 
-    Raises InputError unless 0 <= start < end <= duration and two samples are left."""
+    end: the record's last sample.
+
+    Raises InputError unless 0 <= start < end <= duration and two samples are left.
+    """
     last = record.duration if end is None else end
     slack = 1e-9 * record.dt
     if not -slack <= start < last <= record.duration + slack:
@@ -111,10 +121,12 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
 
 @checked
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
-    """Add zeros for `before` seconds ahead of the record and `after` seconds behind it, rounded up
-    to whole steps.
+    """Add zeros for `before` seconds ahead of the record and `after` seconds behind it.
 
-    Raises InputError unless both are zero or positive."""
+    Both are rounded up to whole steps.
+
+    Raises InputError unless both are zero or positive.
+    """
     if not all(0.0 <= length < math.inf for length in (before, after)):
         raise InputError(
             f"padded: before={before!r} and after={after!r} s; give zero or positive lengths"
@@ -130,10 +142,12 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
 
 @checked
 def without_mean(record: Record, *, until: float | None = None) -> Record:
-    """Subtract the mean of the record, or of the samples at t <= until [s], the quiet before the
-    shaking.
+    """Subtract the mean of the record, or of the samples at t <= until [s].
 
-    Raises InputError when until is not within the record."""
+    These are the quiet before the shaking.
+
+    Raises InputError when until is not within the record.
+    """
     end = record.duration if until is None else until
     if not 0.0 <= end <= record.duration:
         raise InputError(
@@ -172,8 +186,9 @@ def filtered(
     order: int = 4,
     causal: bool = False,
 ) -> Record:
-    """Apply a Butterworth high-pass above `low` [Hz], low-pass below `high` [Hz], or band-pass
-    between them.
+    """Apply a Butterworth high-pass above `low` [Hz], a low-pass below `high` [Hz], or a band-pass.
+
+    The band-pass lies between the two.
 
     One pass has the gain |H|² = 1 / (1 + (f/high)^(2 order)) and likewise (low/f) of the high-pass,
     each applied by itself, so a band-pass has `order` on both flanks; the bilinear transform
@@ -181,7 +196,8 @@ def filtered(
     and backward: no phase shift and the gain |H|², -6 dB at the corners. The record is taken as
     zero outside; it keeps its length, so what a zero-phase filter sends out before the start and
     after the end is cut off: use `padded` before where that matters. Raises InputError for corners
-    that are not 0 < low < high < Nyquist frequency, or an order outside 1 to 10."""
+    that are not 0 < low < high < Nyquist frequency, or an order outside 1 to 10.
+    """
     nyquist = 0.5 / record.dt
     corners = [corner for corner in (low, high) if corner is not None]
     if (
@@ -229,14 +245,16 @@ def filtered(
 
 @checked
 def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = False) -> Record:
-    """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration; c fits the
-    integrated motion.
+    """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration.
+
+    The coefficients c fit the integrated motion.
 
     c minimises the sum of squares of the velocity left over (of the displacement, if
     `displacement`), subject to v(T) = u(T) = 0; v and u are those of `integrated`, so both end at
     zero to round-off. A second correction changes nothing, and a record that is itself such a
     polynomial becomes zero. Raises InputError unless degree is a whole number from 1 to 6 and below
-    the number of samples."""
+    the number of samples.
+    """
     if degree not in range(1, min(HIGHEST, record.acceleration.size - 1) + 1):
         raise InputError(
             f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, "

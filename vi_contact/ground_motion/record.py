@@ -23,13 +23,17 @@ UNITS = {
 """Name the accepted units of acceleration, and give their size in m/s²."""
 
 LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
-"""Peak acceleration [m/s²] beyond which units are doubted: the strongest ground motions on record reach half of it."""
+"""Peak acceleration [m/s²] beyond which units are doubted.
+
+The strongest ground motions on record reach half of it.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Describe equally spaced accelerations: sample k is the acceleration at t = k · dt, the first
-    one at t = 0.
+    """Describe equally spaced accelerations.
+
+    Sample k is the acceleration at t = k · dt, the first one at t = 0.
 
     acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0;
     title; source: path of the file; format: name of its format; units: of the file, before
@@ -40,7 +44,8 @@ class Record:
     "counted"); doubts: what was read in one of several ways that were possible, one sentence each.
     Between samples the acceleration is a straight line. Two records are equal only if they are the
     same object. Raises InputError for NaN or infinite samples, fewer than two of them, or a time
-    step that is not positive."""
+    step that is not positive.
+    """
 
     acceleration: Array
     dt: float
@@ -126,8 +131,10 @@ def known_units(units: str) -> str | None:
 
 @checked
 def canonical_units(source: str, units: str) -> str:
-    """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if
-    there is none."""
+    """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2").
+
+    It raises InputError if there is none.
+    """
     text = known_units(units) if isinstance(units, str) else None
     if text is None:
         raise InputError(

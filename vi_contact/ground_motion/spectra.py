@@ -1,11 +1,13 @@
-"""Compute response spectra by exact integration of piecewise linear accelerations, and Fourier
-spectra.
+"""Compute response spectra by exact integration of accelerations, and Fourier spectra.
+
+The accelerations are piecewise linear.
 
 Nigam and Jennings (1969): between samples the acceleration is a straight line, so the oscillator
 u'' + 2 zeta omega u' + omega² u = -a(t) has a closed solution from one sample to the next, exact
 for any period and step. Peaks between samples are found too: the same solution is read at 64
 instants a period or more, and 4 a step, so the peak of a vibration is at most 1 - cos(pi/64) = 0.12
-% low. The free vibration after the last sample counts."""
+% low. The free vibration after the last sample counts.
+"""
 
 import math
 from dataclasses import dataclass
@@ -19,10 +21,16 @@ from ..core.errors import InputError
 from .record import Record
 
 PER_PERIOD, PER_STEP = 64, 4
-"""The response is looked at this often in a period of the oscillator, or in a step of the record, whatever is more."""
+"""The response is looked at this often in a period of the oscillator, or in a step of the record.
+
+What counts is whatever is more.
+"""
 
 SHORTEST, MOST = 1000, 10**10
-"""Steps of the record in the shortest period that is looked at, at most; and samples times periods, at most."""
+"""Steps of the record in the shortest period that is looked at, at most.
+
+The second number is that of samples times periods, at most.
+"""
 
 _SMALL, _TERMS = (
     0.3,
@@ -37,7 +45,8 @@ class ResponseSpectrum:
     """Hold the peaks of the response of damped oscillators at rest at t = 0, each of shape (m,).
 
     periods [s]; damping: ratio zeta; displacement: relative, SD [m]; velocity: relative, SV [m/s];
-    acceleration: absolute, SA = max |u'' + a| [m/s²]."""
+    acceleration: absolute, SA = max |u'' + a| [m/s²].
+    """
 
     periods: Array
     damping: float
@@ -57,11 +66,13 @@ class ResponseSpectrum:
 
 
 def _factors(time: Array | float, length: Array | float, omega: Array, zeta: float) -> Array:
-    """Return (4, 2, m): what u, v, a0 and a1 add to displacement and velocity after `time`, for
-    each omega.
+    """Return (4, 2, m).
+
+    They are what u, v, a0 and a1 add to displacement and velocity after `time`, for each omega.
 
     The acceleration goes from a0 to a1 in `length`; free vibration about -(a0 + s t)/omega² + 2
-    zeta s/omega³."""
+    zeta s/omega³.
+    """
     root = math.sqrt(1.0 - zeta**2)
     decay, angle = np.exp(-zeta * omega * time), root * omega * time
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -89,9 +100,11 @@ def _moved(factors: Array, u: Array, v: Array, a0: Array | float, a1: Array | fl
 
 
 def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
-    """Return the motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest, a power
-    series (2, m): u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta omega (k-1)
-    c_{k-1} - omega² c_{k-2}."""
+    """Return the motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest.
+
+    It is a power series (2, m): u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta
+    omega (k-1) c_{k-1} - omega² c_{k-2}.
+    """
     term = -(np.asarray(time, dtype=float) ** first) / math.factorial(first) * np.ones_like(omega)
     before = np.zeros_like(term)
     total, rate = term, first * term / time
@@ -106,12 +119,15 @@ def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array
 
 @checked
 def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) -> ResponseSpectrum:
-    """Return the peaks of relative displacement, relative velocity and absolute acceleration at
-    each period [s].
+    """Return the peaks of the responses at each period [s].
+
+    They are the peaks of relative displacement, relative velocity and absolute acceleration at each
+    period.
 
     A record says little about periods below ten of its steps: between its samples nothing is known
     but the straight line assumed here. Raises InputError unless every period is positive and 0 <=
-    damping < 1."""
+    damping < 1.
+    """
     row = np.atleast_1d(np.asarray(periods, dtype=float))
     if row.ndim != 1 or not row.size or not np.all(np.isfinite(row)) or np.any(row <= 0.0):
         raise InputError(
@@ -145,12 +161,14 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
 
 @checked
 def fourier_spectrum(record: Record) -> tuple[Array, Array]:
-    """Return the frequencies [Hz] and Fourier amplitudes |A(f)| [m/s], from 0 to the Nyquist
-    frequency.
+    """Return the frequencies [Hz] and Fourier amplitudes |A(f)| [m/s].
+
+    They go from 0 to the Nyquist frequency.
 
     A(f) is the integral of a(t) exp(-2 pi i f t), by the rectangle rule: dt times the discrete
     transform, no window. Two-sided: the integral of |A|² over all f, negative ones too, is dt sum
-    a² (Parseval)."""
+    a² (Parseval).
+    """
     amplitudes = record.dt * np.abs(np.fft.rfft(record.acceleration))
     return np.fft.rfftfreq(record.acceleration.size, record.dt), amplitudes
 

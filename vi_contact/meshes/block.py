@@ -1,9 +1,11 @@
-"""Mesh a bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body
-of most tests.
+"""Mesh a bar, rectangle or box.
+
+It is evenly divided and, if wanted, bent by a smooth map and turned; it is the body of most tests.
 
 Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y),
 "back", "front" (z, front towards the viewer). A bar has the first two, a rectangle four, a box
-six."""
+six.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -26,7 +28,8 @@ class BlockMesh:
 
     A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle`
     [rad] about the origin (the z axis in space). `deform` takes and returns points (n, d) [m].
-    InputError if the sizes make no box."""
+    InputError if the sizes make no box.
+    """
 
     lengths: tuple[float, ...] = (1.0, 1.0)
     divisions: tuple[int, ...] = (1, 1)
@@ -79,8 +82,10 @@ class BlockMesh:
 
 
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
-    """Raise InputError unless there are 1 to 3 positive lengths [m], each with a positive number of
-    divisions."""
+    """Raise InputError unless there are 1 to 3 positive lengths [m].
+
+    Each needs a positive number of divisions.
+    """
     if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
         raise InputError(
             f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of "

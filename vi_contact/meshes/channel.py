@@ -1,11 +1,13 @@
-"""Mesh a U-shaped channel in a soil layer on bedrock (Fig. 6 of the boundary method): two bodies,
-nodes of their own.
+"""Mesh a U-shaped channel in a soil layer on bedrock.
+
+It is that of Fig. 6 of the boundary method: two bodies with nodes of their own.
 
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x =
 0, width), "surface" (y = depth); the interface from both sides, "channel_left", "channel_base",
 "channel_right" and "soil_left", "soil_base", "soil_right", divided alike; "channel_inside" (what
 the water wets) and "channel_top" (the tops of its walls, which end at the surface). Of two nodes at
-one place the channel's comes first."""
+one place the channel's comes first.
+"""
 
 import math
 from collections.abc import Sequence
@@ -25,13 +27,15 @@ from vi_contact.meshes.rows import Mask, Rows
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelMesh:
-    """Describe a layer, width x depth [m], and a channel in it, `outer_width` x `height`, of `wall`
-    and `slab` [m].
+    """Describe a layer, width x depth [m], and a channel in it.
+
+    The channel is `outer_width` x `height`, of `wall` and `slab` [m].
 
     `left` is x of the outer left side of the channel, which is in the middle by default. Every part
     is divided evenly into rectangles of about `size` [m], or with `triangles` into their halves.
     With `far` [m] the mesh has irregular triangles, which grow from `size` at the channel to `far`
-    at bedrock and sides. Raises InputError for sizes that make no such layer."""
+    at bedrock and sides. Raises InputError for sizes that make no such layer.
+    """
 
     width: float = 24.0
     depth: float = 8.0
@@ -81,8 +85,10 @@ class ChannelMesh:
 
     @property
     def x(self) -> tuple[float, ...]:
-        """Return the ends of the layer, outer and inner sides of the walls, from left to right
-        [m]."""
+        """Return the ends of the layer, outer and inner sides of the walls.
+
+        They go from left to right [m].
+        """
         left = 0.5 * (self.width - self.outer_width) if self.left is None else self.left
         right = left + self.outer_width
         return 0.0, left, left + self.wall, right - self.wall, right, self.width
@@ -127,11 +133,13 @@ class ChannelMesh:
 def channel_grid(
     x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False
 ) -> MeshArrays:
-    """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh` into cells of
-    about `size` [m].
+    """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh`.
+
+    The cells are of about `size` [m].
 
     Diagonals of triangles run upwards to the middle of the channel on both sides of it: symmetric
-    layers stay so."""
+    layers stay so.
+    """
     xs, ys = _divided(x, size), _divided(y, size)
     middle_x, middle_y = (0.5 * (line[1:] + line[:-1]) for line in (xs, ys))
     right, up = np.meshgrid(middle_x, middle_y, indexing="ij")
@@ -182,8 +190,10 @@ def _divided(places: Sequence[float], size: float) -> Array:
 def _body(
     xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool
 ) -> tuple[Array, Rows, Rows]:
-    """Return (points, cells, number of the point at every node of the grid, -1 for none) of the
-    kept boxes."""
+    """Return (points, cells, numbers of the points) of the kept boxes.
+
+    The numbers are those of the point at every node of the grid, -1 for none.
+    """
     column, row = np.nonzero(kept)
     around = (
         np.stack([column, column + 1, column + 1, column]),
@@ -206,8 +216,10 @@ def _body(
 
 
 def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
-    """Return the facets of a body on a straight line: from x[0] to x[-1] at one y, or from y[0] to
-    y[-1] at one x."""
+    """Return the facets of a body on a straight line.
+
+    It goes from x[0] to x[-1] at one y, or from y[0] to y[-1] at one x.
+    """
     i, j = (
         np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y))
     )

@@ -1,9 +1,11 @@
-"""Check what a solver asks of a mesh: cells with volume, neither twisted nor folded; boundary
-groups of their sides.
+"""Check what a solver asks of a mesh.
+
+Cells need a volume, and may be neither twisted nor folded; boundary groups are of their sides.
 
 Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points,
 vertices in Gmsh's order. Cells may run either way round (finite elements use |det J|), neighbours
-may not lie on the same side of a facet."""
+may not lie on the same side of a facet.
+"""
 
 import numpy as np
 
@@ -15,8 +17,10 @@ _ROUND_OFF = 1024 * np.finfo(float).eps
 
 
 def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
-    """Raise InputError for cells of no volume and for twisted ones (det J of both signs at the
-    corners)."""
+    """Raise InputError for cells of no volume and for twisted ones.
+
+    A twisted cell has det J of both signs at the corners.
+    """
     corners = np.array(CORNERS[cell])
     x = points[cells[:, corners]]  # (n_cells, n_corners, 1 + d, d)
     edges = x[:, :, 1:] - x[:, :, :1]
@@ -33,8 +37,10 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
 
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
-    """Raise InputError where three cells share a facet or two neighbours lie on the same side of
-    theirs."""
+    """Raise InputError where three cells share a facet or two lie on one side of it.
+
+    Such two are neighbours.
+    """
     sides, owner = cell_sides(cells, cell)
     (number,) = number_alike(sides)
     x = points[sides[:, : points.shape[1]]]
@@ -60,8 +66,10 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
 
 
 def _normals(x: Array) -> Array:
-    """Return the normals of facets through their first d vertices, (n, d, d) -> (n, d), of any
-    length and direction."""
+    """Return the normals of facets through their first d vertices.
+
+    It is (n, d, d) -> (n, d), of any length and direction.
+    """
     d = x.shape[-1]
     if d == 1:
         return np.ones((len(x), 1))

@@ -1,9 +1,11 @@
-"""Make joints and cracks: nodes along an inner boundary are doubled, or those of two bodies welded
-into one.
+"""Make joints and cracks.
+
+Nodes along an inner boundary are doubled, or those of two bodies welded into one.
 
 Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented
 along the joint and conforming there, gets them by `CutOpen`; bodies meshed one by one have them
-already."""
+already.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,9 +22,12 @@ from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_ali
 
 @dataclass(frozen=True)
 class CutOpen:
-    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group,
-    or between two groups of cells, which need no boundary group then: their joint is called
-    "<first>_<second>", side 1 is the first's."""
+    """Describe the mesh of `source`, cut open.
+
+    The source is a script or a file. It is cut along its inner boundary group, or between two
+    groups of cells, which need no boundary group then: their joint is called "<first>_<second>",
+    side 1 is the first's.
+    """
 
     source: Source
     group: str | None = None
@@ -60,8 +65,9 @@ def cut_open(
     towards: Sequence[float] | None = None,
     between: Sequence[str] | None = None,
 ) -> MeshArrays:
-    """Double the nodes along an inner boundary; its two sides become the groups "<group>_1",
-    "<group>_2".
+    """Double the nodes along an inner boundary.
+
+    Its two sides become the groups "<group>_1", "<group>_2".
 
     Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads
     across the boundary: give one of them. With `between`, two groups of cells, the boundary is all
@@ -74,7 +80,8 @@ def cut_open(
     side 2 of both.
 
     InputError for a group that does not exist or lies on the outside, sides that cannot be told,
-    cell groups without a common facet, and names of sides that the mesh has already."""
+    cell groups without a common facet, and names of sides that the mesh has already.
+    """
     if (group is None) == (between is None):
         raise InputError(
             "CutOpen: give group=, the name of an inner boundary, or between=, two groups of cells"
@@ -112,8 +119,10 @@ def cut_open(
     cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
 
     def moved(rows: Rows, number: Rows, at: Rows) -> Rows:
-        """Return the facets `rows` of these numbers as the cells beside them know them now; `at`:
-        rows of sides."""
+        """Return the facets `rows` as the cells beside them know them now.
+
+        The rows are those of these numbers; `at` are rows of sides.
+        """
         known, place = np.unique(number, return_index=True)
         before = rows[place[np.searchsorted(known, side[at])]]
         match = arrays.cells[owner[at]][:, None, :] == before[:, :, None]
@@ -183,8 +192,10 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
 def _joint(
     arrays: MeshArrays, between: Sequence[str], inside: str | None, towards: Sequence[float] | None
 ) -> tuple[MeshArrays, str, str]:
-    """Return (the mesh with a boundary group of all facets between two cell groups, its name, the
-    group of side 1)."""
+    """Return (the mesh with a boundary group of all facets, its name, the group of side 1).
+
+    The facets are those between two cell groups.
+    """
     names = tuple(between) if not isinstance(between, str) else ()
     if len(names) != 2 or names[0] == names[1]:
         raise InputError(
@@ -267,8 +278,10 @@ def _on_first_side(
 def _doubled(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
 ) -> tuple[Rows, Array]:
-    """Give each node a copy for every part of its cells that facets (rows `one`, `other`) connect:
-    (cells, points)."""
+    """Give each node a copy for every part of its cells that facets connect.
+
+    The facets are the rows `one` and `other`; the result is (cells, points).
+    """
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))
     node = arrays.cells[around, column]

@@ -1,8 +1,11 @@
-"""Turn Gmsh's current model into plain arrays: nodes renumbered, groups named, what solvers choke
-on refused; and back.
+"""Turn Gmsh's current model into plain arrays.
+
+Nodes are renumbered, groups named, and what solvers choke on is refused; there is also the way
+back.
 
 DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on
-missing groups, so nothing of them is used. Vertices stay in Gmsh's order here."""
+missing groups, so nothing of them is used. Vertices stay in Gmsh's order here.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -28,7 +31,10 @@ from vi_contact.meshes.rows import (
 
 Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]
-"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements, and the entity (n,) that holds each."""
+"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements.
+
+With them comes the entity (n,) that holds each.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +43,8 @@ class MeshArrays:
 
     `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_nodes) rows of
     points, vertices first. Groups by name: of cells as masks (n_cells,), of facets as rows of
-    points (n_facets, n_facet_vertices)."""
+    points (n_facets, n_facet_vertices).
+    """
 
     cell: str
     points: Array
@@ -47,8 +54,10 @@ class MeshArrays:
 
 
 def arrays_from_file(path: str | Path) -> MeshArrays:
-    """Read a mesh file in Gmsh's own format, MSH 2 to 4, text or binary. InputError like `copied`
-    and `extract`."""
+    """Read a mesh file in Gmsh's own format, MSH 2 to 4, text or binary.
+
+    InputError like `copied` and `extract`.
+    """
     file = Path(path)
     with TemporaryDirectory(prefix="vi_contact-") as folder:
         copy = safe_copy(file, Path(folder))
@@ -62,8 +71,10 @@ def arrays_from_file(path: str | Path) -> MeshArrays:
 
 
 def arrays_from_script(mesh: MeshScript) -> MeshArrays:
-    """Build a mesh in memory, without Gmsh where it is made of grids. Raises InputError like
-    `extract`."""
+    """Build a mesh in memory, without Gmsh where it is made of grids.
+
+    Raises InputError like `extract`.
+    """
     source = type(mesh).__name__
     grids: Sequence[Grid] = getattr(mesh, "grids", list)()
     if grids:
@@ -109,7 +120,8 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     cells are taken, as a group "all". Nodes no cell uses are dropped, the others numbered from 0 in
     the order of their tags. Raises InputError for a model without cells; mixed cells, or of an
     order above 2; cells without volume, twisted, or folded over a neighbour; a mesh of triangles or
-    quadrilaterals outside the plane z = 0; named facets that are no sides of cells."""
+    quadrilaterals outside the plane z = 0; named facets that are no sides of cells.
+    """
     model = gmsh.model
     d = max(
         (model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]),
@@ -156,8 +168,10 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
 
 
 def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
-    """Return the entities of each physical group of a dimension; a group without a name is called
-    by its number."""
+    """Return the entities of each physical group of a dimension.
+
+    A group without a name is called by its number.
+    """
     groups: dict[str, list[int]] = {}
     for _, tag in model.getPhysicalGroups(dim) if dim >= 0 else ():
         name = model.getPhysicalName(dim, tag) or str(tag)
@@ -219,8 +233,10 @@ def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, 
 
 
 def _folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
-    """Tell which curved cells of entities, in this order, have Jacobians of both signs at points of
-    quadrature."""
+    """Tell which curved cells of entities are folded.
+
+    They are in this order; a folded one has Jacobians of both signs at points of quadrature.
+    """
     places, _ = model.mesh.getIntegrationPoints(kind, "Gauss4")
     bad = []
     for one in dict.fromkeys(entity.tolist()):
@@ -233,8 +249,10 @@ def _folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
 
 
 def _coordinates(model: Any, tags: Rows, source: str) -> Array:
-    """Return the coordinates (n, 3) of the nodes with the given tags, which may start anywhere and
-    have holes."""
+    """Return the coordinates (n, 3) of the nodes with the given tags.
+
+    The tags may start anywhere and have holes.
+    """
     known, coordinates, _ = model.mesh.getNodes()
     order = np.argsort(known)
     place = order[np.minimum(np.searchsorted(known, tags, sorter=order), len(known) - 1)]
@@ -261,8 +279,10 @@ def _flat(points: Array, d: int, source: str) -> Array:
 
 
 def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
-    """Return the rows kept (first of each with the same members), and for every row its place among
-    these."""
+    """Return the rows kept, and the place of every row among these.
+
+    Of rows with the same members the first is kept.
+    """
     _, first, place = np.unique(number_alike(rows)[0], return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -273,12 +293,14 @@ def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
 def _facets(
     model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str
 ) -> Rows:
-    """Return the facets of a group as rows of points at their vertices, each once; -1 for nodes
-    that are at no point.
+    """Return the facets of a group as rows of points at their vertices, each once.
+
+    Nodes that are at no point are -1.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is
     then meshed by itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands
-    for the one point at its place."""
+    for the one point at its place.
+    """
     found = _elements(model, model.mesh.getElementProperties(kind)[1], entities)
     if not found:
         return np.empty((0, 1), dtype=np.int64)
@@ -297,8 +319,10 @@ def _facets(
 
 
 def _at_same_place(places: Array, points: Array) -> Rows:
-    """Find for each place the one point there, -1 if there is none or more than one (two bodies in
-    touch)."""
+    """Find for each place the one point there.
+
+    It is -1 if there is none or more than one (two bodies in touch).
+    """
     tolerance = 1e-10 * np.ptp(points, axis=0).max()
     from scipy.spatial import cKDTree  # late: few meshes need it
 
@@ -314,8 +338,10 @@ def arrays_of(source: Source) -> MeshArrays:
 
 
 def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
-    """Add a mesh to the empty current model: its points in order, a discrete entity for every set
-    of groups."""
+    """Add a mesh to the empty current model.
+
+    Its points come in order, with a discrete entity for every set of groups.
+    """
     d = arrays.points.shape[1]
     cell, side = GMSH_NUMBERS[arrays.cell]
     points = np.zeros((len(arrays.points), 3))

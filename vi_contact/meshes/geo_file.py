@@ -1,7 +1,8 @@
 """Mesh a Gmsh script (.geo) that holds nothing but geometry, sizes, groups and arithmetic.
 
 ``geo_script`` writes the script anew in words that can do no harm. A process of its own meshes it,
-for a limited time and in half of the machine's memory."""
+for a limited time and in half of the machine's memory.
+"""
 
 import ctypes
 import logging
@@ -34,8 +35,9 @@ _NOT_TRANSFINITE = re.compile(
 
 @dataclass(frozen=True, kw_only=True)
 class GeoFile:
-    """Describe the mesh of a Gmsh script: its physical groups, cells of the highest dimension that
-    they have.
+    """Describe the mesh of a Gmsh script.
+
+    It has its physical groups, and cells of the highest dimension that they have.
 
     Statements that change no mesh, such as ``Printf``, ``Save``, ``Mesh 2`` and options of Gmsh's
     window, are left out, and a warning in the log lists them.
@@ -125,8 +127,10 @@ class GeoFile:
 
 
 def mesh_here(refine: int, time_limit: float) -> None:
-    """Mesh script.geo of this folder as made.msh: for a process of its own, which ends with its
-    parent or its time."""
+    """Mesh script.geo of this folder as made.msh.
+
+    This is for a process of its own, which ends with its parent or its time.
+    """
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     signal.setitimer(signal.ITIMER_REAL, time_limit + 1.0)
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
@@ -156,8 +160,10 @@ def mesh_here(refine: int, time_limit: float) -> None:
 
 
 def _tell_errors(lines: Sequence[str]) -> None:
-    """Print a note where Gmsh left a transfinite mesh out, and end the process at any other error
-    of its log."""
+    """Print a note where Gmsh left a transfinite mesh out.
+
+    At any other error of its log, the process ends.
+    """
     for before, line in pairwise(["", *lines]):
         if match := _NOT_TRANSFINITE.match(
             line

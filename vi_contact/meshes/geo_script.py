@@ -66,8 +66,10 @@ _CHECKED = (
 
 
 class Token(NamedTuple):
-    """Hold a piece of a script: blank, open (comment), text, escaped (text), name, sign, or "" for
-    what is none."""
+    """Hold a piece of a script.
+
+    It is blank, open (comment), text, escaped (text), name, sign, or "" for what is none.
+    """
 
     kind: str
     word: str
@@ -137,8 +139,10 @@ def _tokens(text: str) -> list[Token]:
 
 
 def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, str]]]:
-    """Return the tokens without the statements that change no mesh, and (line, beginning) of each
-    of these."""
+    """Return the tokens without the statements that change no mesh.
+
+    With them comes (line, beginning) of each of these statements.
+    """
     kept: list[Token] = []
     left_out: list[tuple[int, str]] = []
     before = ""  # the last word that is no blank
@@ -173,8 +177,10 @@ def _beginning(statement: Sequence[Token]) -> str:
 
 
 def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
-    """Return the place after the statement that begins at ``start`` if it changes no mesh, else
-    ``start``."""
+    """Return the place after the statement at ``start`` if it changes no mesh.
+
+    Else it is ``start``.
+    """
     heads = [token.word for token in tokens[start : start + 12] if token.kind != "blank"][:3]
     heads += [""] * (3 - len(heads))
     first, second, third = heads
@@ -193,8 +199,9 @@ def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
 
 
 def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
-    """Return the place after the statement that begins at ``start``; ``start`` where it does not
-    end.
+    """Return the place after the statement that begins at ``start``.
+
+    It is ``start`` where the statement does not end.
 
     braces: whether a closing brace ends it too, unless another brace opens behind it: Color {1, 2,
     3} { Line{1}; }
@@ -224,8 +231,10 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
 
 
 def _without_parameters(tokens: Sequence[Token]) -> list[Token]:
-    """Return the tokens with DefineConstant[ h = {1, Name "size", Min 0} ] as DefineConstant[ h = 1
-    ].
+    """Replace definitions of parameters.
+
+    The tokens are returned with DefineConstant[ h = {1, Name "size", Min 0} ] as DefineConstant[ h
+    = 1 ].
 
     What follows the value tells a window how to show it, and a text could name a file.
     """
@@ -284,8 +293,10 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
 
 
 def _write(path: Path, tokens: Sequence[Token], own: set[str]) -> Iterator[str]:
-    """Yield the words that Gmsh gets; InputError for all that are not allowed. ``own``: names of
-    the script."""
+    """Yield the words that Gmsh gets; InputError for all that are not allowed.
+
+    ``own``: names of the script.
+    """
     refused: list[tuple[Token, bool]] = []  # with whether it is a value that nobody has set
     words = ["", "", ""]
     level = 0  # brackets that are open since the last For
@@ -329,8 +340,10 @@ def _fits(kind: str, word: str, words: Sequence[str], own: set[str]) -> bool:
 
 
 def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool:
-    """Whether a name stands where a number is wanted: it is no command, no function, no option, no
-    kind of field."""
+    """Tell whether a name stands where a number is wanted.
+
+    It is then no command, no function, no option and no kind of field.
+    """
     before = words[-1]
     is_field = list(words[-2:]) == ["]", "="] and "Field" in words[-6:]
     token = tokens[place]

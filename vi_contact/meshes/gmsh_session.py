@@ -1,5 +1,7 @@
-"""Run a quiet, reproducible Gmsh for the length of a with-block, and in it build a mesh and write
-it."""
+"""Run a quiet, reproducible Gmsh for the length of a with-block.
+
+In it, build a mesh and write it.
+"""
 
 import ctypes
 import inspect
@@ -23,7 +25,8 @@ class MeshScript(Protocol):
         """Add geometry, named physical groups and cells to the current (empty) model.
 
         They are of first order unless it says ``gmsh.model.mesh.setOrder(2)`` at its end, which
-        puts mid-points on the curves of the geometry."""
+        puts mid-points on the curves of the geometry.
+        """
 
 
 @contextmanager
@@ -31,7 +34,8 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
     """Give the gmsh module with an empty current model; all traces are removed afterwards.
 
     A Gmsh the caller has already initialised is borrowed: its models, current model and options are
-    left as they were. Raises InputError if Gmsh is not installed."""
+    left as they were. Raises InputError if Gmsh is not installed.
+    """
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: the module is there, its library is not
@@ -72,8 +76,10 @@ def options(gmsh: Any, wanted: Mapping[str, float]) -> Iterator[None]:
 
 
 def write(mesh: MeshScript, path: str | Path) -> None:
-    """Build the mesh and write it to a file in the format Gmsh gives to that suffix (.msh: format
-    4.1, text)."""
+    """Build the mesh and write it to a file of any format.
+
+    The format is the one that Gmsh gives to that suffix (.msh: format 4.1, text).
+    """
     target = Path(path)
     if not target.parent.is_dir():
         raise InputError(
@@ -89,7 +95,8 @@ def _is_initialised(gmsh: Any) -> bool:
 
     4.8 (Debian 12) lists no model before initialize() and complains after finalize(), from C++ and
     past sys.stderr, by an option that it has not set yet, and ends the process if that is 4: new
-    memory is zeroed so that it is not."""
+    memory is zeroed so that it is not.
+    """
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
     perturb = getattr(

@@ -1,7 +1,8 @@
 """Mesh bars, rectangles and boxes node by node: Gmsh's transfinite curves are only exact to 1e-11.
 
 A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written
-as a file."""
+as a file.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,8 +19,10 @@ _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
 
 
 def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
-    """Return the nodes of an evenly divided box with one corner at the origin, (n_1+1, ..., n_d+1,
-    d) [m]."""
+    """Return the nodes of an evenly divided box with one corner at the origin.
+
+    They are (n_1+1, ..., n_d+1, d) [m].
+    """
     axes = [length * np.arange(n + 1) / n for length, n in zip(lengths, divisions, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
@@ -30,7 +33,8 @@ class Grid:
 
     `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the
     two sides on which lattice index a is lowest and highest; `body` names all cells. `simplices`
-    splits boxes along a diagonal (Kuhn)."""
+    splits boxes along a diagonal (Kuhn).
+    """
 
     nodes: Array
     simplices: bool
@@ -57,8 +61,10 @@ class Grid:
 
 
 def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
-    """Add structured meshes to the current model as discrete entities with named physical
-    groups."""
+    """Add structured meshes to the current model as discrete entities.
+
+    They get named physical groups.
+    """
     model, first = gmsh.model, 1  # tag of the first node
     for grid in grids:
         points, cells, faces = grid.numbered()
@@ -82,11 +88,13 @@ def add_outline(
     sizes: Sequence[float],
     cells: Sequence[int] = (),
 ) -> int:
-    """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be
-    meshed irregularly.
+    """Add a surface within an outline, to be meshed irregularly.
+
+    Its curves are in the groups ``names``; its tag is returned.
 
     ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first
-    curves."""
+    curves.
+    """
     points = [
         model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)
     ]
@@ -112,8 +120,10 @@ def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -
 
 
 def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
-    """Return the vertices of every cell of a lattice of node tags, in Gmsh's order, (n_cells,
-    n_vertices)."""
+    """Return the vertices of every cell of a lattice of node tags.
+
+    They are in Gmsh's order, (n_cells, n_vertices).
+    """
     d = tags.ndim
     shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
     count = [n - 1 for n in tags.shape]
@@ -137,8 +147,10 @@ def _box_corners(d: int) -> list[tuple[int, ...]]:
 
 
 def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
-    """Return the d! simplices walked from corner (0,...,0) to (1,...,1) along the axes, positively
-    oriented."""
+    """Return the d! simplices of a cell, positively oriented.
+
+    They are walked from corner (0,...,0) to (1,...,1) along the axes.
+    """
     simplices = []
     for order in permutations(range(d)):
         steps = np.eye(d, dtype=int)[list(order)]

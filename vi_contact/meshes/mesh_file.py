@@ -1,10 +1,12 @@
-"""Check a mesh file on its way to Gmsh: only what is certainly a mesh, under a name and in a folder
-of our own.
+"""Check a mesh file on its way to Gmsh.
+
+Only what is certainly a mesh goes there, under a name and in a folder of our own.
 
 Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of
 the shell. It decides by the name of a file, else by the first word in it, and it runs FILE.opt
 beside a mesh too. So a mesh file is read only if its first bytes are those of Gmsh's own format,
-and from a copy called mesh.msh, alone in a new folder."""
+and from a copy called mesh.msh, alone in a new folder.
+"""
 
 import mmap
 import re
@@ -24,7 +26,8 @@ def safe_copy(file: Path, folder: Path) -> Path:
     """Copy a mesh file into this folder, safe for Gmsh to read.
 
     InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces
-    more than it holds."""
+    more than it holds.
+    """
     copy = folder / "mesh.msh"
     try:
         there = file.is_file()
@@ -58,8 +61,10 @@ def _check_magic(data: mmap.mmap, file: Path) -> None:
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:
-    """Refuse sections not closed, or that announce more than the file holds: Gmsh makes room before
-    it reads."""
+    """Refuse sections not closed, or that announce more than the file holds.
+
+    Gmsh makes room before it reads.
+    """
     version, binary = (data[:SHORT].split() + [b"", b""])[1:3]
     opened, name = b"", b""
     for section in _SECTION.finditer(data):
@@ -87,14 +92,18 @@ def _check_sections(data: mmap.mmap, file: Path) -> None:
 
 
 def _written(ahead: bytes) -> tuple[int, ...]:
-    """Return the first two numbers after a section's name: blocks and items in format 4, items and
-    more in 2."""
+    """Return the first two numbers after a section's name.
+
+    They are blocks and items in format 4, items and more in 2.
+    """
     return tuple(int(word) if word.isdigit() else 0 for word in ahead.split()[:2]) or (0,)
 
 
 def _packed(ahead: bytes) -> tuple[int, ...]:
-    """Return these numbers of a binary file: 8 bytes each, in the order of bytes that makes them
-    smaller."""
+    """Return these numbers of a binary file.
+
+    They have 8 bytes each, in the order of bytes that makes them smaller.
+    """
     head = ahead[1:17]
     both = [struct.unpack(order, head) for order in ("<2Q", ">2Q")] if len(head) == 16 else []
     return min([*both, _written(ahead)] if ahead[1:2].isdigit() else both, key=max, default=(0,))

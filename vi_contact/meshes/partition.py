@@ -1,7 +1,8 @@
 """Assign cells to ranks by repeated halving across the longest side, the same every time.
 
 Graph partitioners give smaller interfaces but, in parallel, another answer, and so other results,
-on every run."""
+on every run.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +14,10 @@ Ranks = npt.NDArray[np.int32]
 
 
 def halve(centres: Array, n: int) -> Ranks:
-    """Return the owner, 0 to n - 1, of each of the points (n_points, d); equal shares but for one
-    point."""
+    """Return the owner of each of the points (n_points, d).
+
+    It is 0 to n - 1; shares are equal but for one point.
+    """
     owner = np.zeros(len(centres), dtype=np.int32)
 
     def split(rows: npt.NDArray[np.intp], first: int, count: int) -> None:
@@ -33,10 +36,12 @@ def halve(centres: Array, n: int) -> Ranks:
 
 
 def destinations(points: Array, cells: Rows, cell: str, n: int) -> tuple[Ranks, Ranks]:
-    """Return the ranks each cell goes to, as one list and the n_cells + 1 offsets of the cells in
-    it.
+    """Return the ranks each cell goes to.
 
-    First its owner, then, as a ghost, the owners of its neighbours across a facet."""
+    They are one list and the n_cells + 1 offsets of the cells in it.
+
+    First its owner, then, as a ghost, the owners of its neighbours across a facet.
+    """
     owner = halve(points[cells].mean(axis=1), n)
     sides, at = cell_sides(cells, cell)
     (number,) = number_alike(sides)

@@ -1,5 +1,7 @@
-"""Handle rows of vertices: the sides of cells, which rows have the same members, and what hangs
-together."""
+"""Handle rows of vertices.
+
+These are the sides of cells, which rows have the same members, and what hangs together.
+"""
 
 import tomllib
 from pathlib import Path
@@ -26,18 +28,22 @@ def vertex_count(cell: str) -> int:
 
 
 def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
-    """Return all sides (n_cells * n_sides, n_side_vertices), vertices ascending, and the cell of
-    each side."""
+    """Return all sides (n_cells * n_sides, n_side_vertices), and the cell of each.
+
+    Their vertices are ascending.
+    """
     sides = np.array(SIDES[cell])
     rows = np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
     return rows, np.repeat(np.arange(len(cells)), len(sides))
 
 
 def number_alike(*tables: Rows) -> list[Rows]:
-    """Number the rows of tables of one width: rows with equal members, in any order, have equal
-    numbers.
+    """Give numbers to the rows of tables of one width.
 
-    Members are at least -1. Much faster than np.unique(axis=0)."""
+    Rows with equal members, in any order, have equal numbers.
+
+    Members are at least -1. Much faster than np.unique(axis=0).
+    """
     rows = np.sort(np.concatenate(tables), axis=1) + 1
     if not len(rows):
         return [np.zeros(0, dtype=np.int64) for _ in tables]
@@ -56,8 +62,10 @@ def found_in(numbers: Rows, among: Rows) -> Mask:
 
 
 def connected(count: int, one: Rows, other: Rows) -> Rows:
-    """Return the number of the part (count,) that each of so many things belongs to when pairs
-    one-other are linked."""
+    """Return the number of the part (count,) of each thing.
+
+    There are so many things, of which pairs one-other are linked.
+    """
     graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
     from scipy.sparse.csgraph import connected_components  # late: it takes a while
 

@@ -1,8 +1,10 @@
-"""Mesh bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed
-each for itself.
+"""Mesh bars, rectangles or boxes that touch without sharing a node.
+
+They are bodies of their own, meshed each for itself.
 
 Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x
-lowest, highest), "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z)."""
+lowest, highest), "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -16,8 +18,10 @@ from vi_contact.meshes.grid import Grid, add_grids
 
 @dataclass(frozen=True)
 class Blocks:
-    """Hold blocks by name, each a body of its own. InputError for blocks of different dimension or
-    cells."""
+    """Hold blocks by name, each a body of its own.
+
+    InputError for blocks of different dimension or cells.
+    """
 
     blocks: Mapping[str, BlockMesh]
 

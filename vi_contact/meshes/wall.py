@@ -1,9 +1,11 @@
-"""Mesh the wall of Fig. 2 of the boundary method: a rectangle on its base, one-sided supports along
-its right side.
+"""Mesh the wall of Fig. 2 of the boundary method.
+
+It is a rectangle on its base, with one-sided supports along its right side.
 
 Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the contact side), "top",
 "back" (x = 0). The defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes
-0.75 m apart."""
+0.75 m apart.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +26,8 @@ class WallMesh:
     `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an
     irregular mesh of about that cell size instead. If neither is given, the mesh has 8 x 12 cells.
     `triangles` asks for triangles instead of quadrilaterals. Raises InputError for sizes that make
-    no wall."""
+    no wall.
+    """
 
     height: float = 9.0
     width: float = 6.0

@@ -1,8 +1,10 @@
-"""Draw runs, records and studies, and write the report on a run. matplotlib is imported when
-something is drawn.
+"""Draw runs, records and studies, and write the report on a run.
+
+matplotlib is imported when something is drawn.
 
 Begin with ``draw_run(run.read_run(folder), "pictures", title="Wall")``; ``studies.report(folder)``
-writes the report. The ending of a file's name says its format: docs/guide/outputs.md."""
+writes the report. The ending of a file's name says its format: docs/guide/outputs.md.
+"""
 
 from ..core.lazy import lazy
 

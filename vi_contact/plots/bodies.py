@@ -1,5 +1,7 @@
-"""Draw the bodies of a run where they are at some times, in plane and space, and a film: from a
-folder alone."""
+"""Draw the bodies of a run at some times, and a film.
+
+They are in plane or space, and need a folder alone.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,8 +46,9 @@ INWARDS = 0.015
 
 @dataclass(frozen=True)
 class Scene:
-    """Hold what is seen of bodies at ``times`` (k,) [s]: cells in the plane, in space the
-    boundary's sides of cells.
+    """Hold what is seen of bodies at ``times`` (k,) [s].
+
+    That is cells in the plane, in space the boundary's sides of cells.
 
     ``points`` (s, d) [m] of their nodes; ``polygons`` (p, corners), the number of the ``body`` (p,)
     of each; u (k, s, d) [m], drawn ``magnified`` times; von Mises stresses (k, p) [Pa].
@@ -68,8 +71,10 @@ class Scene:
 
     @classmethod
     def of(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
-        """Read the frames next to ``times``; ``magnified``: a round number that shows the
-        displacements when None."""
+        """Read the frames next to ``times``.
+
+        ``magnified`` is a round number that shows the displacements when None.
+        """
         frames, history = read_frames(run), run.history
         if frames.cells.shape[1] < 3:
             raise InputError(
@@ -137,9 +142,11 @@ class Scene:
         return Painter.of_pressure(self.pressure)
 
     def draw(self, axis: Any, k: int, states: bool = False) -> None:
-        """Draw the bodies at the time number k, each with edges of a colour of its own; in the
-        plane dots inside of them with the contact pressure, or the ``states`` of the points, those
-        of both sides of a corner apart."""
+        """Draw the bodies at the time number k.
+
+        Each has edges of a colour of its own. In the plane there are dots inside of them with the
+        contact pressure, or the ``states`` of the points, those of both sides of a corner apart.
+        """
         moved, colours = self.moved(k), self.stresses.colours(self.stress[k])
         flat, polygons = moved.shape[1] == 2, moved[self.polygons]
         colours = np.full_like(colours, 0.95) if states else colours
@@ -173,14 +180,16 @@ def plot_deformed(
     magnified: float | None = None,
     title: str = "Deformed bodies",
 ) -> Path:
-    """Draw the deformed bodies of a run, coloured by von Mises stress, in the frames next to
-    ``times`` [s].
+    """Draw the deformed bodies of a run in the frames next to ``times`` [s].
+
+    They are coloured by von Mises stress.
 
     None: the first, the last, and when most happens. The edges of elements have the colour of their
     body. In the plane dots show the contact pressure, and below them which points are open, stick
     and slip. In space y points upwards where contact is along y rather than z, else z.
     ``magnified``: how many times larger displacements are drawn; None: a round number that shows
-    them. InputError for a run without fields or in one dimension."""
+    them. InputError for a run without fields or in one dimension.
+    """
     scene = Scene.of(run, moments(run.history) if times is None else times, magnified)
     flat = scene.points.shape[1] == 2
     with_states = flat and scene.contact is not None
@@ -197,7 +206,7 @@ def plot_deformed(
 
 
 def _headed(title: str, scene: Scene) -> str:
-    """A title on lines that fit above the picture."""
+    """Return a title on lines that fit above the picture."""
     told = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
     return "\n".join(wrap(plain(title) + told, 64))
 
@@ -213,13 +222,15 @@ def film(
     title: str = "",
     fps: int = 10,
 ) -> Path:
-    """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4, of the frames next to
-    ``times`` [s].
+    """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4.
+
+    Its frames are those next to ``times`` [s].
 
     None: up to 48 frames around the one in which most happens. In space the pressure on each
     contact face is beside the bodies. Below them is a ``column`` of the history with the moment
     marked, and dashed the motion of the ground. InputError for another kind of file, .mp4 without
-    ffmpeg, a column that the run does not have, and as ``plot_deformed``."""
+    ffmpeg, a column that the run does not have, and as ``plot_deformed``.
+    """
     require_matplotlib()
     import matplotlib
     from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -277,7 +288,7 @@ def film(
 
 
 def _around(run: RunFolder) -> list[float]:
-    """The times of the frames next to the one in which most happens."""
+    """Return the times of the frames next to the one in which most happens."""
     t = read_frames(run).t
     (middle,) = nearest(t, [moments(run.history)[1]])
     first = max(min(middle - FILM_FRAMES // 2, len(t) - FILM_FRAMES), 0)
@@ -285,8 +296,10 @@ def _around(run: RunFolder) -> list[float]:
 
 
 def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
-    """Draw a column of the history and, dashed, the ground's acceleration during the film; return
-    the moment's line."""
+    """Draw a column of the history and, dashed the ground's acceleration.
+
+    It is that during the film. The moment's line is returned.
+    """
     history = run.history
     if column not in run.columns or np.ndim(history.get(column, 0)) != 1:
         raise InputError(f"the run has no column '{column}': see columns.json in its folder")
@@ -312,11 +325,13 @@ def draw_run(
     times: Sequence[float] | None = None,
     magnified: float | None = None,
 ) -> list[Path]:
-    """Draw the bodies of a run with fields as deformed.png and, in space with ``Contact()``, its
-    contact faces as faces.png, into the folder ``out``, next to the ``times`` [s]. None: the first,
-    the last, and when most happens.
+    """Draw the bodies of a run with fields into the folder ``out``.
 
-    ``magnified``: how many times larger displacements are drawn, None: so that they are seen."""
+    They are drawn as deformed.png and, in space with ``Contact()``, the contact faces as faces.png,
+    next to the ``times`` [s]. None: the first, the last, and when most happens.
+
+    ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
+    """
     drawn, contact, history = [], run.contact, run.history
     if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
         drawn.append(

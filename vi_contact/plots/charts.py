@@ -1,5 +1,7 @@
-"""Choose what curves show a run, as numbers that the printed page and the one for browsers draw
-alike."""
+"""Choose what curves show a run.
+
+They are numbers that the printed page and the one for browsers draw alike.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,8 +32,10 @@ Run = Any  # a Solution, or a RunFolder, which needs h5py
 
 @dataclass(frozen=True)
 class Line:
-    """Hold a curve: its name, numbers x and y (n,); ``pale`` where they say little; a colour and a
-    style of print."""
+    """Hold a curve: its name, numbers x and y (n,).
+
+    It is ``pale`` where the numbers say little; it has a colour and a style of print.
+    """
 
     name: str
     x: Array
@@ -43,8 +47,10 @@ class Line:
 
 @dataclass(frozen=True)
 class Chart:
-    """Hold curves over one axis, those that matter most first; y with its unit. ``bound``: a level
-    that is marked."""
+    """Hold curves over one axis, those that matter most first; y with its unit.
+
+    ``bound``: a level that is marked.
+    """
 
     title: str
     x: str
@@ -61,8 +67,10 @@ class Chart:
 
 
 def motion_charts(run: Run) -> list[Chart]:
-    """Return the ground's acceleration in a run, and its response spectrum; none where it was at
-    rest."""
+    """Return the ground's acceleration in a run, and its response spectrum.
+
+    There are none where it was at rest.
+    """
     ground = [f"a_g_{axis}" for axis in shaken(run.history)]
     if not ground:
         return []
@@ -71,8 +79,10 @@ def motion_charts(run: Run) -> list[Chart]:
 
 
 def history_charts(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart]:
-    """Return a chart for every title whose columns move: those of the first of its beginnings of
-    names that do."""
+    """Return a chart for every title whose columns move.
+
+    They are those of the first of its beginnings of names that do.
+    """
     charts = []
     for title, prefixes in groups.items():
         found = next(filter(None, (varying(run, prefix) for prefix in prefixes)), [])
@@ -92,8 +102,10 @@ def of_columns(run: Run, names: Sequence[str], title: str) -> Chart:
 
 
 def chosen_charts(run: Run, columns: Sequence[Sequence[str]]) -> list[Chart]:
-    """Return a chart for each group of columns. InputError for columns that do not exist, or of
-    different units."""
+    """Return a chart for each group of columns.
+
+    InputError for columns that do not exist, or of different units.
+    """
     for group in columns:
         for name in group:
             if name not in run.columns or np.ndim(run.history.get(name, 0)) != 1:
@@ -120,8 +132,10 @@ def _range(run: Run, name: str) -> float:
 
 
 def _spectrum(run: Run, names: Sequence[str]) -> Chart:
-    """Pseudo-acceleration of the ground's motion, 5 % damping; pale at periods that its steps do
-    not resolve."""
+    """Return the pseudo-acceleration of the ground's motion.
+
+    The damping is 5 %; the line is pale at periods that its steps do not resolve.
+    """
     lines = []
     for name in names:
         record = recorded_motion(run.history, name)
@@ -134,17 +148,22 @@ def _spectrum(run: Run, names: Sequence[str]) -> Chart:
 
 
 def shown_periods(record: Record) -> Array:
-    """Return the periods [s] of a spectrum: from 0.02 s, for what is short is what structures with
-    contact feel, to twice the duration, or 10 s."""
+    """Return the periods [s] of a spectrum.
+
+    They go from 0.02 s, for what is short is what structures with contact feel, to twice the
+    duration, or 10 s.
+    """
     last = max(2.0 * record.duration, 1.0)
     return np.geomspace(FIRST_PERIOD, min(last, 10.0) if record.duration > 1.0 else last, 150)
 
 
 def smoothed(run: Run, name: str) -> tuple[Record, Record, float]:
-    """Return an acceleration raw and low-passed, with the corner [Hz]: Butterworth of order 4,
-    forward and backward.
+    """Return an acceleration raw and low-passed, with the corner [Hz].
 
-    That of column v_<axis>_<label> where it was recorded: it has the jumps of an impact law."""
+    The filter is Butterworth's of order 4, forward and backward.
+
+    That of column v_<axis>_<label> where it was recorded: it has the jumps of an impact law.
+    """
     speed = "v" + name[1:]
     raw = recorded_motion(run.history, speed if speed in run.history else name)
     corner = min(LOW_PASS, 1.0 / (STEPS_A_PERIOD * raw.dt))
@@ -180,8 +199,10 @@ def energy_chart(run: Run) -> Chart | None:
 
 
 def certificate_chart(run: Run) -> Chart:
-    """Return the worst residual of every step, and the tolerance; exact zeros are drawn at the
-    bottom, at 1e-18."""
+    """Return the worst residual of every step, and the tolerance.
+
+    Exact zeros are drawn at the bottom, at 1e-18.
+    """
     worst = Line(
         "worst residual",
         run.history["t"][1:],
@@ -252,9 +273,11 @@ def draw_chart(axis: Any, chart: Chart) -> None:
 
 
 def plot_overview(run: Run) -> Any:
-    """Return a matplotlib Figure of a Solution or RunFolder. It has the displacements of the first
-    8 probes, the contact force, the energy ledger, as far as they were recorded, and the
-    certificate of every step."""
+    """Return a matplotlib Figure of a Solution or RunFolder.
+
+    It has the displacements of the first 8 probes, the contact force, the energy ledger, as far as
+    they were recorded, and the certificate of every step.
+    """
     provides(
         "plot_overview",
         "run",

@@ -1,8 +1,10 @@
-"""Read bodies and what happens on their contact from the folder of a run, in the plane and in
-space, to draw them.
+"""Read bodies and what happens on their contact to draw them.
+
+They come from the folder of a run, in the plane and in space.
 
 A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that
-is needed there."""
+is needed there.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -37,8 +39,11 @@ CELLS = {
 
 @dataclass(frozen=True)
 class StoredFrames:
-    """Hold fields of a run: ``points`` (n, d) [m], ``cells`` (c, corners), times ``t`` (f,) [s],
-    (file, group) each."""
+    """Hold fields of a run.
+
+    There are ``points`` (n, d) [m], ``cells`` (c, corners), times ``t`` (f,) [s], (file, group)
+    each.
+    """
 
     points: Array
     cells: Indices
@@ -46,8 +51,10 @@ class StoredFrames:
     places: tuple[tuple[Path, str], ...]
 
     def at(self, t: float) -> tuple[float, Array, Array]:
-        """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) of the frame nearest to
-        t; stresses are NaN where the run has none."""
+        """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) at t.
+
+        They are those of the frame nearest to t; stresses are NaN where the run has none.
+        """
         (row,) = nearest(self.t, [t])
         path, group = self.places[row]
         with _opened(path) as file:
@@ -60,8 +67,10 @@ class StoredFrames:
 
     @cached_property
     def bodies(self) -> Indices:
-        """Return the number (c,) of the body of each cell: cells that share nodes are of one
-        body."""
+        """Return the number (c,) of the body of each cell.
+
+        Cells that share nodes are of one body.
+        """
         count, corners = self.cells.shape
         links = (
             np.repeat(np.arange(count), corners),
@@ -71,8 +80,10 @@ class StoredFrames:
 
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:
-        """Return the sides of cells (s, corners) that are no other cell's, and the cell (s,) of
-        each."""
+        """Return the sides of cells (s, corners) that are no other cell's.
+
+        The cell (s,) of each comes with them.
+        """
         sides = self.cells[:, np.array(SIDES[CELLS[self.points.shape[1], self.cells.shape[1]]])]
         rows = np.sort(sides.reshape(-1, sides.shape[2]), axis=1)
         _, first, counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
@@ -80,9 +91,11 @@ class StoredFrames:
         return sides.reshape(rows.shape)[alone], alone // sides.shape[1]
 
     def facing(self, contact: Geometry) -> tuple[Indices, Indices]:
-        """Return the boundary's sides whose corners are contact points, as conditions (s, corners),
-        and the node (m,) of each condition: on the body that its direction points away from, not on
-        one that it touches there."""
+        """Return the boundary's sides whose corners are contact points.
+
+        They are conditions (s, corners). With them comes the node (m,) of each condition, on the
+        body that its direction points away from, not on one that it touches there.
+        """
         sides, cell = self.boundary
         nodes, place = np.unique(sides, return_inverse=True)
         reach = SAME * float(np.ptp(self.points, axis=0).max())
@@ -105,8 +118,10 @@ class StoredFrames:
 
 
 def plane_normals(polygons: Array) -> Array:
-    """Return a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3), of one without
-    any size zero."""
+    """Return a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3).
+
+    That of one without any size is zero.
+    """
     if polygons.shape[2] == 2:
         normals = (polygons[:, 1] - polygons[:, 0]) @ np.array([[0.0, -1.0], [1.0, 0.0]])
     else:  # of quadrilaterals by their diagonals
@@ -116,8 +131,10 @@ def plane_normals(polygons: Array) -> Array:
 
 
 def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
-    """Return the rows of ``t`` next to each of ``times`` [s]. InputError for no times, or what is
-    none."""
+    """Return the rows of ``t`` next to each of ``times`` [s].
+
+    InputError for no times, or what is none.
+    """
     wanted = array("pictures of a run", "times", times, (None,), unit="seconds")
     if not len(wanted):
         raise InputError(
@@ -127,11 +144,13 @@ def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
 
 
 def contact_states(history: Mapping[str, Array]) -> Array:
-    """Return 1 open, 2 stick, 3 slip, (rows, m): closed points slip when their slip changed since
-    the row before.
+    """Return 1 open, 2 stick, 3 slip, (rows, m).
+
+    Closed points slip when their slip changed since the row before.
 
     Changes below 1e-9 of the largest one are rounding. In the first row, and without friction,
-    closed points stick."""
+    closed points stick.
+    """
     rows = len(history["t"])
     active = np.reshape(history["active"], (rows, -1)).astype(bool)
     change = np.zeros(active.shape)
@@ -144,8 +163,10 @@ def contact_states(history: Mapping[str, Array]) -> Array:
 
 
 def stored_tangents(contact: Geometry) -> Array:
-    """Return the tangents (m, d, d - 1) of slip and traction_t in a history; what is at one place
-    is one node."""
+    """Return the tangents (m, d, d - 1) of slip and traction_t in a history.
+
+    What is at one place is one node.
+    """
     return tangent_vectors(
         contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel()
     )
@@ -153,8 +174,10 @@ def stored_tangents(contact: Geometry) -> Array:
 
 @checked
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
-    """Read the frames from the fields of a run in plane or space. InputError for a folder without
-    them."""
+    """Read the frames from the fields of a run in plane or space.
+
+    InputError for a folder without them.
+    """
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
     places = frames_of(folder)
     if places:

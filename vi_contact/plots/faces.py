@@ -27,9 +27,12 @@ STATES = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", 
 
 @dataclass(frozen=True)
 class Face:
-    """Hold a contact face: conditions (k,) and their ``points`` (k, 3); ``axes`` (3, 2) of the
-    plane it lies in, None of a curved one; parts of the sides of elements (p, 4, 3) with the
-    condition (p,) of each, none without fields."""
+    """Hold a contact face.
+
+    It has conditions (k,) and their ``points`` (k, 3); ``axes`` (3, 2) of the plane it lies in,
+    None if it is curved; parts of the sides of elements (p, 4, 3) with the condition (p,) of each,
+    and none without fields.
+    """
 
     name: str
     conditions: Indices
@@ -39,15 +42,19 @@ class Face:
     owners: Indices
 
     def seen(self, vectors: Array) -> Array:
-        """Return vectors (..., 3) in the plane of the face, (..., 2), as they are where it is
-        curved."""
+        """Return vectors (..., 3) in the plane of the face, (..., 2).
+
+        They are as they are where it is curved.
+        """
         return vectors if self.axes is None else vectors @ self.axes
 
 
 def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
-    """Return the faces of a contact surface: points near to each other whose directions differ by
-    less than 30°; pieces in one plane are one face. ``sides`` of elements, as conditions (n,
-    corners), are shared by their corners."""
+    """Return the faces of a contact surface.
+
+    They are points near to each other whose directions differ by less than 30°; pieces in one plane
+    are one face. ``sides`` of elements, as conditions (n, corners), are shared by their corners.
+    """
     points, normals = contact.points, contact.normals
     m, size = len(points), float(np.ptp(points, axis=0).max()) or 1.0
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
@@ -89,8 +96,10 @@ def direction(way: Array) -> str:
 
 @dataclass(frozen=True)
 class Painter:
-    """Draw on faces: colours by ``norm`` and ``cmap`` of values times ``factor``, named
-    ``label``."""
+    """Draw on faces.
+
+    The colours are by ``norm`` and ``cmap`` of values times ``factor``, named ``label``.
+    """
 
     norm: Any
     cmap: Any
@@ -99,9 +108,11 @@ class Painter:
 
     @classmethod
     def of_pressure(cls, pressure: Array) -> "Painter":
-        """Make the colours for all pressures [Pa] that are drawn: open points white, on a root
-        scale, as edges of faces carry much more than the rest; where some points pull these blue,
-        on a linear one."""
+        """Make the colours for all drawn pressures [Pa].
+
+        Open points are white, on a root scale, as edges of faces carry much more than the rest;
+        where some points pull, these are drawn blue, on a linear one.
+        """
         from matplotlib import colormaps
         from matplotlib.colors import ListedColormap, Normalize, PowerNorm
 
@@ -140,8 +151,10 @@ class Painter:
         figure.colorbar(shown, ax=axes, label=self.label, fraction=0.04, aspect=25, **look)
 
     def draw(self, axis: Any, face: Face, values: Array) -> None:
-        """Draw values (m,) of all conditions on a face: each on its share of the element sides, as
-        dots without."""
+        """Draw values (m,) of all conditions on a face.
+
+        Each is drawn on its share of the element sides, and as a dot where there are none.
+        """
         if len(face.parts):
             look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.7", "linewidths": 0.2}
             parts = add_polygons(axis, face.seen(face.parts), **look)
@@ -185,8 +198,10 @@ def limit(
     margin: float = 0.0,
     up: str = "z",
 ) -> None:
-    """Set limits (d,) [m], one scale along all axes, and their names; ``margin``: part of the
-    largest size; ``up``: the axis that points upwards in projection."""
+    """Set limits (d,) [m], one scale along all axes, and their names.
+
+    ``margin`` is a part of the largest size; ``up`` is the axis that points upwards in projection.
+    """
     room = margin * (float((high - low).max()) or 1.0)
     axis.grid(False)
     for letter, name, a, b in zip(AXES, names, low - room, high + room, strict=False):
@@ -211,8 +226,11 @@ def limit(
 
 
 def leading(history: History) -> tuple[str, int]:
-    """Return the column and the row that tell when most happens: of uplift, largest pressure and
-    displacements the first one that is not largest in size at the start."""
+    """Return the column and the row that tell when most happens.
+
+    Of uplift, largest pressure and displacements it is the first one that is not largest in size at
+    the start.
+    """
     names = (
         "contact_uplift",
         "contact_max_pressure",
@@ -245,7 +263,8 @@ def plot_faces(
     its slip. Flat faces are drawn in their plane, curved ones in projection. Each point colours its
     share of the element sides around it, where the run stored fields, or is a dot. Arrows are the
     tangential displacements on the support of closed points. InputError for a run in the plane or
-    without arrays of ``Contact()``."""
+    without arrays of ``Contact()``.
+    """
     contact, history = run.contact, run.history
     if contact is None or "active" not in history or contact.points.shape[1] != 3:
         raise InputError(
@@ -283,8 +302,10 @@ def plot_faces(
 
 
 def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tuple[Any, Array]:
-    """Make (figure, axes (rows, columns)), each of a size [inches]; rows that are not flat are in
-    projection."""
+    """Make (figure, axes (rows, columns)), each of a size [inches].
+
+    Rows that are not flat are in projection.
+    """
     require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
@@ -305,7 +326,7 @@ def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tupl
 
 
 def _arrows(axis: Any, face: Face, slip: Array) -> None:
-    """The slips (m, 3) of a face as long as they are to be drawn; specks are left out."""
+    """Return the slips (m, 3) of a face as long as they are to be drawn; specks are left out."""
     own = np.linalg.norm(slip[face.conditions], axis=1) > SAME * float(
         np.ptp(face.points, axis=0).max()
     )
@@ -316,8 +337,10 @@ def _arrows(axis: Any, face: Face, slip: Array) -> None:
 
 
 def name_states(figure: Any, frictional: bool, longest: float = 0.0) -> None:
-    """Write below what the colours of the states mean and, where there are arrows, how long the
-    longest is [m]."""
+    """Write below what the colours of the states mean.
+
+    Where there are arrows, say too how long the longest is [m].
+    """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -1,7 +1,8 @@
 """Draw recorded histories and save them as PNG on rank 0.
 
 matplotlib is imported late, and its state is left alone: neither the user's backend nor his
-settings change."""
+settings change.
+"""
 
 import os
 from collections.abc import Mapping
@@ -24,8 +25,10 @@ STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.s
 def canvas(
     rows: int, columns: int, size: tuple[float, float], lattice: bool = True, **more: Any
 ) -> tuple[Any, Any]:
-    """Make (figure, its axes (rows, columns)); ``lattice``: whether grid lines are drawn behind the
-    curves."""
+    """Make (figure, its axes (rows, columns)).
+
+    ``lattice`` says whether grid lines are drawn behind the curves.
+    """
     require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
@@ -57,8 +60,10 @@ def plain(text: str) -> str:
 
 
 def length_unit(size: float) -> tuple[float, str]:
-    """Return (metres per unit, name) so that a length of this size has one to three digits before
-    the point."""
+    """Return (metres per unit, name) that fits a length.
+
+    A length of this size then has one to three digits before the point.
+    """
     for metres, name in _UNITS:
         if size >= metres:
             return metres, name
@@ -66,8 +71,10 @@ def length_unit(size: float) -> tuple[float, str]:
 
 
 def scaled(values: Array, unit: str) -> tuple[Array, str]:
-    """Return the values over the power of 1000 that fits their size, and the unit with its prefix;
-    "-" has none."""
+    """Return the values over the power of 1000, and the unit with its prefix.
+
+    The power is the one that fits their size; "-" has no prefix.
+    """
     size = 0.0 if unit == "-" else float(np.nanmax(np.abs(values), initial=0.0))
     for factor, prefix in (
         (1e9, "G"),
@@ -124,8 +131,10 @@ def image_of(figure: Any, kind: str = "png", **more: Any) -> bytes:
 
 
 def require_matplotlib() -> None:
-    """Raise InputError when the settings of matplotlib keep it from being imported, though it is
-    there."""
+    """Raise InputError when matplotlib cannot be imported.
+
+    This is when its settings keep it from that, though it is there.
+    """
     try:
         import matplotlib  # noqa: F401
     except (
@@ -146,8 +155,10 @@ LEDGER = tuple(
 
 
 def cell_edges(centres: Array) -> Array:
-    """Return the borders of cells around their centres; a single cell is as wide as its distance
-    from zero, or one."""
+    """Return the borders of cells around their centres.
+
+    A single cell is as wide as its distance from zero, or one.
+    """
     if len(centres) == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])

@@ -1,5 +1,7 @@
-"""Draw maps of contact quantities over position and time, for surfaces that are lines: straight,
-bent or U-shaped."""
+"""Draw maps of contact quantities over position and time.
+
+They are for surfaces that are lines: straight, bent or U-shaped.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -24,7 +26,8 @@ def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, st
 
     Points on a straight line along an axis: their coordinate; on another one: the length along it;
     else the arc length of the chain that starts at the highest point (of those the leftmost) and
-    goes on to the nearest one each time."""
+    goes on to the nearest one each time.
+    """
     arms = points - points.mean(axis=0)
     _, values, axes = np.linalg.svd(arms, full_matrices=False)
     if values[-1] <= STRAIGHT * values[0]:
@@ -58,8 +61,10 @@ def chain(points: Array) -> Indices:
 
 
 def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
-    """Return at most ``rows`` instants: of neighbours the value of every point that is largest in
-    size: peaks stay."""
+    """Return at most ``rows`` instants.
+
+    Of neighbours it takes the value of every point that is largest in size, so that peaks stay.
+    """
     if len(t) <= rows:
         return t, values
     starts = np.linspace(0, len(t), rows, endpoint=False).astype(int)
@@ -81,8 +86,10 @@ def draw_map(
     axis_label: str,
     colours: str,
 ) -> None:
-    """Draw values (rows, m) as colours, zero white; points at the same place (corners) side by side
-    in their order."""
+    """Draw values (rows, m) as colours, zero white.
+
+    Points at the same place (corners) stand side by side in their order.
+    """
     image, prefixed, _ = coloured(axis, t, position, values, unit, colours)
     axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
     axis.set(xlabel="time [s]", ylabel=axis_label)
@@ -92,8 +99,11 @@ def draw_map(
 def coloured(
     axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str
 ) -> tuple[Any, str, bool]:
-    """Draw values in colours: return (image, unit with its prefix, whether some are negative), from
-    white upwards or to both sides of it."""
+    """Draw values in colours.
+
+    It returns (image, unit with its prefix, whether some are negative). The colours go from white
+    upwards, or to both sides of it.
+    """
     from matplotlib import colormaps
 
     order = np.argsort(position, kind="stable")
@@ -116,8 +126,10 @@ def coloured(
 
 
 def maps_of(run: Any) -> list[Drawing]:
-    """Return what draws the maps of the contact line of a run, of its pressure and, if it opens, of
-    its opening."""
+    """Return what draws the maps of the contact line of a run.
+
+    The maps are those of its pressure and, if it opens, of its opening.
+    """
     contact, history = run.contact, run.history
     if (
         contact is None

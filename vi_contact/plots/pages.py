@@ -121,8 +121,10 @@ class _Pages:
 def write_pages(
     path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
 ) -> Path:
-    """Write a PDF: the title, (name, value) of facts, the sections, and a line at the foot of every
-    page."""
+    """Write a PDF.
+
+    It has the title, (name, value) of facts, the sections, and a line at the foot of every page.
+    """
     require_matplotlib()
     import matplotlib
     from matplotlib.backends.backend_pdf import PdfPages

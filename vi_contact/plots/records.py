@@ -1,5 +1,7 @@
-"""Draw ground motions, response spectra and a target, transfer functions, loops of force and
-deformation."""
+"""Draw ground motions, response spectra and a target.
+
+Transfer functions, and loops of force and deformation, are drawn too.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,10 +31,12 @@ SAMPLES_A_PERIOD = (
 def plot_motion(
     record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2"
 ) -> Path:
-    """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked
-    and D5-95 shaded.
+    """Draw acceleration in `units`, velocity, displacement and the Husid curve.
 
-    title: default the record's. Nothing is corrected: a drift of the record shows."""
+    Peaks are marked and D5-95 is shaded.
+
+    title: default the record's. Nothing is corrected: a drift of the record shows.
+    """
     units = canonical_units("plot_motion: units", units)
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
@@ -64,10 +68,12 @@ def plot_spectra(
     title: str = "Response spectra",
     units: str = "g",
 ) -> Path:
-    """Draw pseudo-acceleration in `units` and displacement over the period, one line for each
-    label, the target dashed.
+    """Draw pseudo-acceleration in `units` and displacement over the period.
 
-    steps: time step [s] of the record behind each label; below ten of them its line is pale."""
+    There is one line for each label; the target is dashed.
+
+    steps: time step [s] of the record behind each label; below ten of them its line is pale.
+    """
     units = canonical_units("plot_spectra: units", units)
     if not spectra:
         raise InputError(
@@ -130,8 +136,10 @@ def plot_loop(
     y: tuple[str, str],
     title: str | None = None,
 ) -> Path:
-    """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the
-    work at the end."""
+    """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two.
+
+    The title says the work at the end.
+    """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
     across, x_unit = scaled(loop.deformation, x[1])
     up, y_unit = scaled(loop.force, y[1])
@@ -172,7 +180,7 @@ def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> P
 
 
 def _line(axis: Any, times: Array, values: Array, label: str) -> None:
-    """A history with its peak marked and written."""
+    """Return a history with its peak marked and written."""
     axis.plot(times, values, color="black", lw=0.7)
     peak = int(np.argmax(np.abs(values)))
     axis.plot(times[peak], values[peak], "o", ms=4, color="tab:red", clip_on=False)
@@ -209,8 +217,10 @@ def _husid(axis: Any, record: Record) -> None:
 
 
 def _size(values: Array) -> tuple[float, str]:
-    """Unit of length that fits; centimetres in place of hundreds of millimetres, as is usual for
-    ground motions."""
+    """Return the unit of length that fits.
+
+    There are centimetres in place of hundreds of millimetres, as is usual for ground motions.
+    """
     peak = float(np.max(np.abs(values)))
     return (0.01, "cm") if 0.001 <= peak < 10.0 else length_unit(peak)
 

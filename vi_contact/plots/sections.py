@@ -1,5 +1,7 @@
-"""Say in words, tables and curves what a run tells a design engineer: the content of the page,
-whatever draws it."""
+"""Say in words, tables and curves what a run tells a design engineer.
+
+This is the content of the page, whatever draws it.
+"""
 
 import tomllib
 from collections import defaultdict
@@ -37,8 +39,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """Hold a part of the page, in this order: sentences, tables, curves, drawings on one axis each,
-    pictures."""
+    """Hold a part of the page.
+
+    It has, in this order, sentences, tables, curves, drawings on one axis each, pictures.
+    """
 
     title: str
     sentences: Sequence[str] = ()
@@ -51,8 +55,11 @@ class Section:
 def sections_of(
     run: RunFolder, model: Mapping[str, Any], columns: Sequence[Sequence[str]] | None = None
 ) -> list[Section]:
-    """Return the sections that a run has data for; ``model``: model.json, empty where there is
-    none; ``columns``: groups of columns for the histories, in place of those that move."""
+    """Return the sections that a run has data for.
+
+    ``model`` is model.json, empty where there is none; ``columns`` are groups of columns for the
+    histories, in place of those that move.
+    """
     if len(run.history["t"]) < 2:
         raise InputError(
             f"the run in '{run.folder}' has no steps yet: report on it when it has some"
@@ -83,8 +90,10 @@ def number(value: float) -> str:
 
 
 def words(value: Any, depth: int = 9) -> str:
-    """Return a value of a file as it is read by people; what is nested deeper than anybody would is
-    left out."""
+    """Return a value of a file as it is read by people.
+
+    What is nested deeper than anybody would is left out.
+    """
     if isinstance(value, Mapping) and depth:
         return ", ".join(f"{key} = {words(one, depth - 1)}" for key, one in value.items())
     if isinstance(value, list | tuple | Mapping):
@@ -95,8 +104,10 @@ def words(value: Any, depth: int = 9) -> str:
 
 
 def table_of(title: str, rows: Any) -> list[Table]:
-    """Return the table of objects that a file lists, a column for each of their keys; none for
-    anything else."""
+    """Return the table of objects that a file lists.
+
+    It has a column for each of their keys; there is none for anything else.
+    """
     given = (
         [one for one in rows if isinstance(one, Mapping)] if isinstance(rows, list | tuple) else []
     )
@@ -149,8 +160,10 @@ def _results(run: RunFolder) -> Section:
 
 
 def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Iterable[list[str]]:
-    """Rows of the columns that begin so: of heights at the largest thrust, for without thrust they
-    say nothing."""
+    """Return the rows of the columns that begin so.
+
+    Of heights, the row is at the largest thrust, for without thrust they say nothing.
+    """
     t = run.history["t"]
     for name in (name for name in run.columns if name.startswith(prefixes)):
         values = run.history.get(name, np.zeros((0, 0)))
@@ -177,8 +190,10 @@ def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Itera
 
 
 def _safety(run: RunFolder) -> Iterable[list[str]]:
-    """Rows of the parts of the contact: 1 / (1 - margin) is the friction that they could carry over
-    what they do."""
+    """Return the rows of the parts of the contact.
+
+    In them 1 / (1 - margin) is the friction that they could carry over what they do.
+    """
     for name in (name for name in run.history if name.startswith("margin_")):
         used = 1.0 - run.history[name]
         if not np.isnan(used).all() and np.nanmax(used) > 0.0:
@@ -218,7 +233,7 @@ def _accelerations(run: RunFolder) -> Section:
 
 
 def _certificate(run: RunFolder) -> Section:
-    """What the certificate and the ledger say, and what they do not."""
+    """Return what the certificate and the ledger say, and what they do not."""
     facts, history = run.facts, run.history
     worst, steps = float(np.max(history["certificate"])), len(history["t"]) - 1
     asked = f", {facts['tolerance']:.0e} was asked for" if facts.get("tolerance") else ""
@@ -258,8 +273,10 @@ def _peaks(run: RunFolder) -> Section:
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
-    """Return (name, value) of what the report says first: of the method, and of the outcome; a dash
-    for unknown."""
+    """Return (name, value) of what the report says first.
+
+    They are of the method, and of the outcome; a dash is for what is unknown.
+    """
     t, facts = run.history["t"], {key: one for key, one in run.facts.items() if one is not None}
     facts |= {
         "count": len(t) - 1,

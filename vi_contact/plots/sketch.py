@@ -30,10 +30,13 @@ DOTS = ("tab:red", "tab:orange", "tab:pink", "maroon")  # parts of the contact
 
 
 def sketch(model: Mapping[str, Any]) -> Any:
-    """Return a matplotlib Figure of a model: its outline, in space boxes around its bodies; in
-    colours the groups that hold it, and as dots the points of each part of the contact.
+    """Return a matplotlib Figure of a model.
 
-    model: the keys title, dimension, outline, supports and contact of model.json."""
+    There is its outline, in space boxes around its bodies; in colours there are the groups that
+    hold it, and as dots the points of each part of the contact.
+
+    model: the keys title, dimension, outline, supports and contact of model.json.
+    """
     d, colours = model["dimension"], dict[str, str]()
     figure, axes = sheet([d < 3], 1, (7.6, 6.0))
     axis = axes[0, 0]

@@ -17,9 +17,11 @@ _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:
 
 @dataclass(frozen=True)
 class DemandPanel:
-    """Describe one demand in its SI unit: curves record -> (intensities, demands); fractiles (n, 3)
-    of 16, 50 and 84 % at the levels (n,); intensities of runs that failed, marked at the right
-    edge."""
+    """Describe one demand in its SI unit.
+
+    It has curves record -> (intensities, demands); fractiles (n, 3) of 16, 50 and 84 % at the
+    levels (n,); and intensities of runs that failed, marked at the right edge.
+    """
 
     label: str
     unit: str
@@ -33,8 +35,10 @@ class DemandPanel:
 def plot_ida(
     demands: Sequence[DemandPanel], path: str | Path, *, intensity: str, unit: str
 ) -> Path:
-    """Draw a panel for every demand: a grey curve for each record, and the fractiles. Accelerations
-    are in g."""
+    """Draw a panel for every demand: a grey curve for each record, and the fractiles.
+
+    Accelerations are in g.
+    """
     figure, ((*axes,),) = canvas(1, len(demands), (1.0 + 4.4 * len(demands), 4.6), sharey=True)
     factor, unit = _in_g(unit)
     for axis, panel in zip(axes, demands, strict=True):
@@ -58,8 +62,11 @@ def plot_fragility(
     intensity: str,
     unit: str,
 ) -> Path:
-    """Draw the probability that each limit is passed, (3, n) lower bound, curve, upper bound at
-    intensities (n,), and the brackets (records, 2) that it is fitted to, one above the other."""
+    """Draw the probability that each limit is passed.
+
+    It is (3, n) lower bound, curve, upper bound at intensities (n,). The brackets (records, 2) that
+    it is fitted to are drawn one above the other.
+    """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.4))
     factor, unit = _in_g(unit)
     every = np.concatenate([brackets for _, brackets in curves.values()])

@@ -1,8 +1,10 @@
-"""Write sections about a run as one HTML file that loads nothing and runs no script but its own
-two.
+"""Write sections about a run as one HTML file.
+
+It loads nothing and runs no script but its own two.
 
 Texts of files are escaped by the template's engine, those in curves once more, for Plotly reads
-some HTML in them."""
+some HTML in them.
+"""
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
@@ -42,10 +44,13 @@ def can_write() -> bool:
 def write_web_page(
     path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
 ) -> Path:
-    """Write a page: the title, (name, value) of facts, the sections with curves to zoom and tables
-    to sort, a foot.
+    """Write a page.
 
-    Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly."""
+    It has the title, (name, value) of facts, the sections with curves to zoom and tables to sort,
+    and a foot.
+
+    Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly.
+    """
     if not can_write():
         raise InputError(MISSING)
     from jinja2 import Environment, FileSystemLoader
@@ -102,8 +107,10 @@ def write_web_page(
 
 
 def extremes(values: Array, most: int) -> Indices:
-    """Return at most ``most`` rows (k,) in order, with the smallest and the largest of equal parts;
-    all of few."""
+    """Return at most ``most`` rows (k,) in order.
+
+    They are the smallest and the largest of equal parts; of few rows they are all.
+    """
     if len(values) <= most:
         return np.arange(len(values))
     starts = np.linspace(0, len(values), most // 2, endpoint=False).astype(int)
@@ -116,7 +123,7 @@ def extremes(values: Array, most: int) -> Indices:
 
 
 def _chart(chart: Chart, most: int) -> Mapping[str, Any]:
-    """What the script draws."""
+    """Return what the script draws."""
     lines = []
     for line in chart.lines:
         rows = extremes(line.y, most)
@@ -147,7 +154,7 @@ def _numbers(values: Iterable[float], digits: int) -> list[float | None]:
 
 
 def _drawn(drawing: Drawing) -> bytes:
-    """The PNG of a drawing."""
+    """Return the PNG of a drawing."""
     require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure

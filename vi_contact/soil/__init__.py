@@ -1,12 +1,14 @@
-"""Bring the motion of the ground to a body: moved bases, upgoing waves, soil columns, free-field
-sides.
+"""Bring the motion of the ground to a body.
 
-Begin with docs/guide/soil.md, which tells ``base_motion`` (rock that moves) from ``upgoing`` (a wave in
-``fem.CompliantBase``, half the motion of an outcrop); ``FreeField`` goes to the sides.
+There are moved bases, upgoing waves, soil columns and free-field sides.
 
+Begin with docs/guide/soil.md, which tells ``base_motion`` (rock that moves) from ``upgoing`` (a
+wave in ``fem.CompliantBase``, half the motion of an outcrop); ``FreeField`` goes to the sides.
 >>> from vi_contact import laws, soil
->>> print(soil.upgoing(laws.FullSine(amplitude=1.0, duration=1.0), dt=0.01)(0.5).round(2))  # m/s: 1 / (2 pi)
-[0.16 0.  ]"""
+>>> motion = laws.FullSine(amplitude=1.0, duration=1.0)
+>>> print(soil.upgoing(motion, dt=0.01)(0.5).round(2))  # m/s: 1 / (2 pi)
+[0.16 0.  ]
+"""
 
 from ..core.lazy import lazy
 

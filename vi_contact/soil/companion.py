@@ -1,9 +1,11 @@
-"""March a small linear system beside a run: the ground, or a free-field column, with the run's own
-scheme and steps.
+"""March a small linear system beside a run.
+
+It is the ground, or a free-field column, with the run's own scheme and steps.
 
 Loads of the run ask for its motion. Displacement and velocity are straight lines between the steps,
 as in the schemes' averages, so that such a load enters the equation of motion with the same weights
-as the run's own u and v."""
+as the run's own u and v.
+"""
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
@@ -27,12 +29,14 @@ from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
 
 
 class CompanionRun:
-    """March a serial system without contact from rest at t = 0, as far as somebody asks for its
-    u(t) and v(t).
+    """March a serial system without contact from rest at t = 0.
+
+    It goes as far as somebody asks for its u(t) and v(t).
 
     ``name`` is for messages; ``problem`` makes the system, with consistent mass, when it is first
     needed. A run *binds* it to its scheme and time steps, with which the motion is then integrated.
-    Each rank marches its own copy."""
+    Each rank marches its own copy.
+    """
 
     def __init__(self, name: str, problem: Callable[[], ContactProblem]) -> None:
         self.name, self._make = name, problem
@@ -43,10 +47,12 @@ class CompanionRun:
         return replace(self._make(), mass=ConsistentMass())
 
     def bind(self, scheme: Scheme, dt: TimeSteps) -> None:
-        """March with this scheme and these time steps [s] from now on; nothing happens when they
-        are those it has.
+        """March with this scheme and these time steps [s] from now on.
 
-        InputError for steps that the run itself chooses while it goes (``HalvedAtImpact``)."""
+        Nothing happens when they are those it has.
+
+        InputError for steps that the run itself chooses while it goes (``HalvedAtImpact``).
+        """
         if self._bound is not None and self._bound == (scheme, dt):
             return
         if isinstance(dt, HalvedAtImpact):
@@ -67,8 +73,10 @@ class CompanionRun:
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """Return (u, v) at time t [s]; up to t = 0 the system is as it starts. InputError before a
-        run has bound it."""
+        """Return (u, v) at time t [s]; up to t = 0 the system is as it starts.
+
+        InputError before a run has bound it.
+        """
         if t <= 0.0:
             return self._problem.system.u0.copy(), self._problem.system.v0.copy()
         if self._bound is None:
@@ -93,8 +101,10 @@ class CompanionRun:
 
 
 def linear_problem(M: Any, C: Any | None, K: Any, load: Load, dimension: int) -> ContactProblem:
-    """Return M u'' + C u' + K u = f, sparse matrices, at rest and without contact, ``dimension``
-    unknowns a node."""
+    """Return M u'' + C u' + K u = f, at rest.
+
+    The matrices are sparse; there is no contact, and a node has ``dimension`` unknowns.
+    """
     nowhere = np.zeros((M.shape[0] // dimension, dimension))  # nobody asks a companion for points
     system = system_from_arrays(M, C, K, coordinates=nowhere, load=load)
     return ContactProblem(system, empty_surface(SerialComm(), dimension))

@@ -1,5 +1,7 @@
-"""Say how soil softens and damps as it is sheared: curves of G/Gmax and of the damping ratio over
-the shear strain."""
+"""Say how soil softens and damps as it is sheared.
+
+There are curves of G/Gmax and of the damping ratio over the shear strain.
+"""
 
 import tomllib
 from collections.abc import Sequence
@@ -21,13 +23,15 @@ _TABLES = tomllib.loads(files(__package__).joinpath("curves.toml").read_text(enc
 
 @dataclass(frozen=True)
 class SoilCurves:
-    """Hold G/Gmax and the damping ratio at shear strains; straight lines over the logarithm of the
-    strain between them.
+    """Hold G/Gmax and the damping ratio at shear strains.
+
+    Between them there are straight lines over the logarithm of the strain.
 
     strain: rising, as numbers, not per cent (1e-3 is 0.1 %); reduction: G/Gmax, from at least 0.95
     falling, above zero; damping: ratios below 1/2. Smaller strains than the first have its values;
     larger ones than the last are outside: ``equivalent_linear`` and ``strain_compatible`` refuse to
-    end there. InputError for other tables."""
+    end there. InputError for other tables.
+    """
 
     strain: Sequence[float]
     reduction: Sequence[float]
@@ -67,16 +71,20 @@ class SoilCurves:
 
     @classmethod
     def linear(cls, damping: float) -> "SoilCurves":
-        """Return those of what keeps its stiffness and this damping ratio at any strain: a
-        structure, stiff rock."""
+        """Return the curves of what keeps its stiffness and damping ratio at any strain.
+
+        That is a structure, or stiff rock.
+        """
         xi = number("SoilCurves.linear", "the damping ratio", damping, not_negative=True)
         return cls((1e-9, 1e9), (1.0, 1.0), (xi, xi), f"linear, {xi:g}")
 
     @classmethod
     def seed_idriss(cls, bound: str = "mean") -> "SoilCurves":
-        """Return those of sands, Seed and Idriss (1970), as pystrata 0.5.4 has read them from the
-        figures: "mean", or "upper" modulus with lower damping, which SHAKE91 goes by. Strains up to
-        1 %."""
+        """Return the curves of sands, Seed and Idriss (1970).
+
+        They are as pystrata 0.5.4 has read them from the figures. They are "mean", or "upper"
+        modulus with lower damping, which SHAKE91 goes by. Strains up to 1 %.
+        """
         known = _TABLES["seed_idriss"]
         check_word("bound of seed_idriss", bound, tuple(known))
         return cls(
@@ -88,9 +96,11 @@ class SoilCurves:
 
     @classmethod
     def vucetic_dobry(cls, plasticity: float) -> "SoilCurves":
-        """Return those of a plasticity index from 0 to 200 [%], Vucetic and Dobry (1991), read
-        likewise: published for 0, 15, 30, 50, 100 and 200, straight lines over the index between.
-        Strains up to 1 %."""
+        """Return the curves of a plasticity index from 0 to 200 [%].
+
+        They are those of Vucetic and Dobry (1991), read likewise. They are published for 0, 15, 30,
+        50, 100 and 200, with straight lines over the index between. Strains up to 1 %.
+        """
         index = number(
             "SoilCurves.vucetic_dobry", "the plasticity index [%]", plasticity, not_negative=True
         )
@@ -117,15 +127,17 @@ class SoilCurves:
         frequency: float = 1.0,
         cycles: float = 10.0,
     ) -> "SoilCurves":
-        """Return those of Darendeli (2001), for p = mean_stress / 1 atm, PI in %, strains in % up
-        to 1:
+        """Return the curves of Darendeli (2001).
+
+        With p = mean_stress / 1 atm, PI in % and strains in % up to 1:
 
             G/Gmax = 1 / (1 + (s/s_r)^0.919),    s_r = (0.0352 + 0.001 PI ocr^0.3246) p^0.3483
             xi = (0.6329 - 0.00566 ln N) (G/Gmax)^0.1 D_Masing + xi_min
             xi_min = (0.8005 + 0.0129 PI ocr^-0.1069) p^-0.2889 (1 + 0.2919 ln f)
 
         with his D_Masing. mean_stress: effective [Pa] > 0; ocr: at least 1; frequency f [Hz], N
-        cycles > 0."""
+        cycles > 0.
+        """
         owner = "SoilCurves.darendeli"
         p = number(owner, "mean_stress [Pa]", mean_stress, positive=True) / ATMOSPHERE
         index = number(owner, "plasticity [%]", plasticity, not_negative=True)
@@ -154,8 +166,10 @@ class SoilCurves:
         return cls(rows[0], rows[1], rows[2], f"Darendeli PI {index:g}, {mean_stress:g} Pa")
 
     def beyond(self, strain: float, place: str) -> str:
-        """Return the sentence about an effective strain beyond the largest of the curves; empty
-        where it is not."""
+        """Return the sentence about an effective strain beyond the largest of the curves.
+
+        It is empty where it is not beyond.
+        """
         return (
             ""
             if strain <= self.strain[-1]
@@ -167,7 +181,9 @@ class SoilCurves:
         )
 
     def at(self, strain: Array) -> tuple[Array, Array]:
-        """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its
-        values."""
+        """Return (G/Gmax, damping ratio) at these shear strains.
+
+        Beyond the last strain there are its values.
+        """
         place, known = np.log(np.maximum(strain, self.strain[0])), np.log(self.strain)
         return np.interp(place, known, self.reduction), np.interp(place, known, self.damping)

@@ -1,5 +1,6 @@
-"""Shake level ground whose layers soften and damp as they are sheared: equivalent-linear columns,
-as SHAKE does.
+"""Shake level ground whose layers soften and damp as they are sheared.
+
+Columns are equivalent-linear, as in SHAKE.
 
 Vertical shear waves in layers on rock, in the frequency domain; depth z from the top of a layer,
 downwards:
@@ -9,7 +10,8 @@ downwards:
 Every layer has one G and one xi, those of its curves at ``ratio`` times the largest strain in its
 middle, and the waves are computed again until neither changes by more than ``tolerance``. Sources:
 Schnabel, Lysmer and Seed, EERC 72-12 (1972); Idriss and Sun, SHAKE91 (1992); Kramer (1996), ch.
-7."""
+7.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -36,9 +38,11 @@ Layer = tuple[
 
 @dataclass(frozen=True)
 class SiteResponse:
-    """Hold what ``equivalent_linear`` found. From the top: ``shear`` [Pa] and ``damping`` of every
-    layer, and its largest ``strain``, (n,); ``surface``: the motion at the surface; ``iterations``:
-    how many it took."""
+    """Hold what ``equivalent_linear`` found.
+
+    From the top: ``shear`` [Pa] and ``damping`` of every layer, and its largest ``strain``, (n,);
+    ``surface``: the motion at the surface; ``iterations``: how many it took.
+    """
 
     layers: tuple[Layer, ...]
     shear: Array
@@ -48,9 +52,11 @@ class SiteResponse:
     iterations: int
 
     def column(self, *, frequency: float, height: float) -> SoilColumn:
-        """Return the column for runs in time, base at y = 0, damped by beta = xi / (pi f) at this
-        frequency [Hz]; its elements have at most this height [m], and Poisson's ratio is that of
-        the layers."""
+        """Return the column for runs in time.
+
+        Its base is at y = 0. It is damped by beta = xi / (pi f) at this frequency [Hz]. Its
+        elements have at most this height [m], and Poisson's ratio is that of the layers.
+        """
         f, most = (
             number("SiteResponse.column", name, one, positive=True)
             for name, one in (("frequency", frequency), ("height", height))
@@ -87,7 +93,8 @@ def equivalent_linear(
     tolerance: relative, of G and xi. frequency: None for xi at all frequencies; f [Hz] for G* = G
     (1 + 2 i xi w/(2 pi f)), the damping of ``column`` and DampingRatio. The record is followed by
     as long a quiet time. InputError where the effective strain ends beyond its curves;
-    ViContactError without convergence in so many iterations."""
+    ViContactError without convergence in so many iterations.
+    """
     owner = "equivalent_linear"
     remedy = "give (thickness, LinearElastic, SoilCurves) of each layer, from the top"
     layers = tuple(
@@ -167,9 +174,11 @@ def iterated(
     most: int,
     comm: Comm,
 ) -> tuple[T, Array, tuple[float, ...]]:
-    """Return (what the last run returned, the values it had, changes) as soon as none of
-    run(values) -> (…, new values) changes by more than the tolerance, relative to the new one.
-    ViContactError after so many runs. Collective."""
+    """Return (what the last run returned, the values it had, changes) of runs.
+
+    It does so as soon as none of run(values) -> (…, new values) changes by more than the tolerance,
+    relative to the new one. ViContactError after so many runs. Collective.
+    """
     number(owner, "tolerance", tolerance, positive=True)
     changes: list[float] = []
     for _ in range(whole(owner, "most", most, least=1)):
@@ -193,11 +202,13 @@ def _waves(
     slope: Array,
     rock: NDArray[np.complex128] | None,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Surface acceleration and strains in the middle of the layers, (n, frequencies), over the
-    acceleration given.
+    """Return the surface acceleration and the strains over the given acceleration.
+
+    The strains are those in the middle of the layers, (n, frequencies).
 
     From the top down: B/A, and A over that of the layer below, of which none grows with depth or
-    frequency. Below a base that moves as given any rock does."""
+    frequency. Below a base that moves as given any rock does.
+    """
     thick, rho = np.array([[thickness, material.rho] for thickness, material, _ in layers]).T[
         :, :, None
     ]

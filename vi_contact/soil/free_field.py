@@ -1,5 +1,6 @@
-"""Continue level ground behind a body's sides: dashpots on the difference to the free field, and
-its stress.
+"""Continue level ground behind a body's sides.
+
+There are dashpots on the difference to the free field, and its stress.
 
 On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the
 ground far away,
@@ -10,7 +11,8 @@ ground far away,
 v_ff and the side is not there: exact here to round-off, as the column has the heights and materials
 of the side's own elements and is marched with the run's scheme. Waves that a structure sends out
 leave through the dashpots. No static load is held: for a gravity stage put the sides on rollers,
-then ``release`` them."""
+then ``release`` them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -54,15 +56,19 @@ class FreeField(Dashpots):
 
     @property
     def ground(self) -> CompliantBase | GroundFrame:
-        """Return what the column stands on: the base, or the frame of the ground that the
-        excitations shake."""
+        """Return what the column stands on.
+
+        It is the base, or the frame of the ground that the excitations shake.
+        """
         if isinstance(self.base, BaseMotion | CompliantBase):
             return self.base
         return GroundFrame(tuple(self.base) if isinstance(self.base, Sequence) else (self.base,))
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
-        """Return the stress of the free field on the side, D v_ff, and the column that both are
-        taken from."""
+        """Return the stress of the free field on the side.
+
+        It is joined by D v_ff, and by the column that both are taken from.
+        """
         side = FreeFieldSide(matrix, self, forms)
         return BoundaryLoads(
             (side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ()))
@@ -70,6 +76,7 @@ class FreeField(Dashpots):
 
     @property
     def expects(self) -> str:
+        """Return in words which motion it expects."""
         if self.ground.lets_waves_in:
             return "expects the upgoing motion of the compliant base"
         return "expects the motion of the rigid base itself (within motion)"
@@ -115,7 +122,7 @@ class FreeFieldSide:
             )
 
     def _problem(self) -> ContactProblem:
-        """The column on its base."""
+        """Return the column on its base."""
         ground, column = self._ground, self.column
         if isinstance(ground, CompliantBase):
             normal, shear = impedances(
@@ -157,8 +164,10 @@ class FreeFieldSide:
 
 
 def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
-    """The column beside the side, the same on every rank, and the sign of the side's outward
-    normal."""
+    """Return the column beside the side.
+
+    It is the same on every rank. With it comes the sign of the side's outward normal.
+    """
     mesh, name = space.mesh, given.facets.name
     owned = given.facets.indices[given.facets.indices < mesh.topology.index_map(1).size_local]
     mesh.topology.create_connectivity(1, 2)

@@ -1,5 +1,6 @@
-"""Integrate the motion (u, v, a) of a base that an acceleration shakes, by the time scheme of the
-run.
+"""Integrate the motion (u, v, a) of a base that an acceleration shakes.
+
+The time scheme is that of the run.
 
 A run in the frame of the ground, -M r a_g (``ContactProblem(excitation=...)``), and one whose base
 is moved (``fem.Prescribed``) are the same problem in two frames, u = u_relative + r u_g. They are
@@ -12,7 +13,8 @@ The scheme is asked: a free unit mass is marched with it under the force a_g. Ma
 damping acts on the absolute velocity of a moved base and on the relative one in the frame of the
 ground: with alpha M the frames differ. So do MoreauJean and ContactStabilisedNewmark, whose contact
 looks at velocities or at a prediction. Source: seismic practice, prescribed base; a base moved by
-(u, v, a) integrated otherwise drifts against its inertia."""
+(u, v, a) integrated otherwise drifts against its inertia.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -32,8 +34,10 @@ from .companion import CompanionRun, linear_problem
 
 @dataclass(frozen=True)
 class GroundFrame:
-    """Describe the base in the frame of the ground: at rest, shaken by the excitations as inertia
-    loads."""
+    """Describe the base in the frame of the ground.
+
+    There it is at rest, and the excitations shake as inertia loads.
+    """
 
     excitations: tuple[Excitation, ...]
     lets_waves_in: ClassVar[bool] = False
@@ -49,11 +53,13 @@ class GroundFrame:
 
 @dataclass(frozen=True)
 class BaseMotion(GroundFrame):
-    """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from
-    rest at t = 0.
+    """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground.
+
+    It starts from rest at t = 0.
 
     ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d),
-    as ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors."""
+    as ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors.
+    """
 
     path: CompanionRun = field(repr=False)
 
@@ -81,7 +87,8 @@ class BaseMotion(GroundFrame):
     def carrying(self, surface: ContactSurface, system: SemiDiscreteSystem) -> ContactSurface:
         """Return the contact surface of ``system`` on an obstacle that moves with the ground.
 
-        Between two deformable bodies nothing changes: both are moved by the ground."""
+        Between two deformable bodies nothing changes: both are moved by the ground.
+        """
         rigid = np.array([surface.in_frames(r) for r in system.influence.T])
         if (
             surface.coupling is not None
@@ -98,13 +105,15 @@ class BaseMotion(GroundFrame):
 
 
 def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
-    """Return the ground motion that the run's scheme makes of an acceleration, with the run's time
-    steps.
+    """Return the ground motion that the run's scheme makes of an acceleration.
+
+    It has the run's time steps.
 
     Systems and surfaces that it moves hand it to the run, which binds it (``CompanionRun.bind``).
     What the acceleration leaves behind (a final velocity, a drift) is in it: correct the baseline
     of a record first (``baseline_corrected``). InputError for no excitation, or excitations of
-    different dimensions."""
+    different dimensions.
+    """
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
     for one in excitations:
         provides(

@@ -3,11 +3,13 @@
 Linear elements between given heights, two displacement components at every node: shear waves move
 x, pressure waves y,
 
-    rho u_x'' = (G u_x,y),y    rho u_y'' = ((lambda + 2 G) u_y,y),y    sigma_xy = G u_x,y    sigma_xx = lambda u_y,y
+    rho u_x'' = (G u_x,y),y    rho u_y'' = ((lambda + 2 G) u_y,y),y
+    sigma_xy = G u_x,y    sigma_xx = lambda u_y,y
 
 and with damping C = alpha M + beta K the stresses get beta times those of the velocity. It is what
 a strip of finite elements does whose sides move together, to the last digit: linear elements of
-such a strip have no other motion."""
+such a strip have no other motion.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,8 +27,10 @@ from .companion import linear_problem
 
 @dataclass(frozen=True)
 class SoilColumn:
-    """Describe elements between ``heights`` (n+1,) [m]; lame, shear [Pa], rho [kg/m³], alpha [1/s],
-    beta [s]: (n,)."""
+    """Describe elements between ``heights`` (n+1,) [m].
+
+    Of each element there are lame, shear [Pa], rho [kg/m³], alpha [1/s] and beta [s], (n,).
+    """
 
     heights: Array
     lame: Array
@@ -66,11 +70,13 @@ class SoilColumn:
         acceleration: Callable[[float], Array],
         velocity: Callable[[float], Array] | None = None,
     ) -> ContactProblem:
-        """Return the system of nodes 1 to n, node 0 held, in the frame of a base with this
-        acceleration (2,).
+        """Return the system of nodes 1 to n, node 0 held.
+
+        It is in the frame of a base with this acceleration (2,).
 
         velocity: of the base, where mass damping acts on absolute velocities; None where it acts on
-        relative ones."""
+        relative ones.
+        """
         M, C, K = self.matrices()
         rigid = np.tile(np.eye(2), (len(self.heights), 1))
         inertia, drag = -(M @ rigid)[2:], -(C @ rigid)[2:]
@@ -87,8 +93,10 @@ class SoilColumn:
     def on_dashpots(
         self, shear: float, normal: float, upgoing: Callable[[float], Array]
     ) -> ContactProblem:
-        """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m];
-        ``upgoing``: (2,) [m/s]."""
+        """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m].
+
+        ``upgoing`` is (2,) [m/s].
+        """
         M, C, K = self.matrices()
         impedance = np.array([shear, normal])
         foot = sp.csr_matrix((impedance, ([0, 1], [0, 1])), shape=C.shape)
@@ -101,7 +109,9 @@ class SoilColumn:
         return linear_problem(M, C + foot, K, Load(np.zeros(C.shape[0]), general=(load,)), 2)
 
     def stress(self, u: Array) -> Array:
-        """Return (sigma_xx, sigma_xy) [Pa] of every element, (n, 2), of nodal displacements (n+1,
-        2)."""
+        """Return (sigma_xx, sigma_xy) [Pa] of every element.
+
+        It is (n, 2), of nodal displacements (n+1, 2).
+        """
         strain = np.diff(u, axis=0) / np.diff(self.heights)[:, None]
         return np.column_stack([self.lame * strain[:, 1], self.shear * strain[:, 0]])

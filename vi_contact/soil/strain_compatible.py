@@ -1,5 +1,7 @@
-"""Make the soil of a model strain-compatible: run it again with the stiffness and damping that its
-strains ask for."""
+"""Make the soil of a model strain-compatible.
+
+It is run again with the stiffness and damping that its strains ask for.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,9 +29,11 @@ OWNER = "strain_compatible"
 
 @dataclass(frozen=True)
 class StrainCompatible(Generic[T]):
-    """Hold what ``strain_compatible`` found: what the last ``run`` returned; the ``material`` it
-    had, E and xi among it as Functions of DG0; its effective ``strain``, likewise; ``changes``: the
-    largest one after every run."""
+    """Hold what ``strain_compatible`` found.
+
+    That is what the last ``run`` returned; the ``material`` it had, E and xi among it as Functions
+    of DG0; its effective ``strain``, likewise; ``changes``: the largest one after every run.
+    """
 
     solution: T
     material: Heterogeneous
@@ -129,8 +133,10 @@ def strain_compatible(
 def _refuse_lost_ratios(
     material: Materials, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm
 ) -> None:
-    """Raise InputError for a material with a damping ratio whose cells all have curves, which give
-    it another one."""
+    """Raise InputError for a damping ratio of a material whose cells all have curves.
+
+    The curves give it another one.
+    """
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])

@@ -3,7 +3,8 @@
 A record from an outcrop, where up- and downgoing waves are equal, is twice the upgoing wave; a
 record from within a profile holds what came back down and is of no use here without deconvolution.
 Wording as in PLAXIS: a fixed base expects the *within* motion, a compliant base the *upgoing* one
-(Mejia and Dawson 2006)."""
+(Mejia and Dawson 2006).
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -18,11 +19,13 @@ from ..ground_motion.record import Record
 
 
 class UpgoingVelocity:
-    """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t =
-    0.
+    """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation.
+
+    The excitation is at rest before t = 0.
 
     Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} -
-    a_k) s²/(2 dt)."""
+    a_k) s²/(2 dt).
+    """
 
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
         number("UpgoingVelocity", "dt", dt, positive=True, unit="s")
@@ -38,6 +41,7 @@ class UpgoingVelocity:
         self._a, self._v = [excitation.acceleration(0.0)], [0.0]
 
     def __call__(self, t: float) -> Array:
+        """Return v_up (d,) [m/s] at time t [s]."""
         t = max(t, 0.0)
         k = int(t / self.dt)
         while len(self._v) < k + 2:
@@ -55,14 +59,16 @@ def upgoing(
     dt: float | None = None,
     outcrop: bool = True,
 ) -> Callable[[float], Array]:
-    """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False
-    (already upgoing).
+    """Return the upgoing velocity of a motion: half its velocity.
+
+    It is all of it when ``outcrop`` is False (already upgoing).
 
     motion: a record, along ``direction``, or an excitation, which has its own, or several, which
     act together (the components of an earthquake). dt: step of the integration [s], of the record
     when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
     InputError for an excitation other than a record without dt, a dt that is not positive, none at
-    all, records in a list, or directions of different numbers of components."""
+    all, records in a list, or directions of different numbers of components.
+    """
     flag("upgoing", "outcrop", outcrop)
     if isinstance(motion, Sequence) and not isinstance(motion, str):
         if any(isinstance(one, Record) for one in motion):

@@ -1,12 +1,13 @@
 """Study a problem that is written down: case files, and many runs of one case.
 
-``read_case(path)`` reads a TOML file whose tables are calls of the Python interface, its ``run(comm)`` computes it;
-``run_ida`` makes an incremental dynamic analysis of it: docs/guide/studies.md; ``report(folder)`` reports on a run.
-
+``read_case(path)`` reads a TOML file whose tables are calls of the Python interface, its
+``run(comm)`` computes it; ``run_ida`` makes an incremental dynamic analysis of it:
+docs/guide/studies.md; ``report(folder)`` reports on a run.
 >>> from vi_contact.studies import read_case
 >>> from vi_contact.studies.cases.library import located  # of the cases that ship
 >>> read_case(located("wall"), ["run.steps=10"]).tables["run"]["steps"]
-10"""
+10
+"""
 
 from ..core.lazy import lazy
 

@@ -1,5 +1,7 @@
-"""Repeat a run with half the element size and with half the time step, and set the peaks beside
-each other."""
+"""Repeat a run with half the element size and with half the time step.
+
+The peaks are set beside each other.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -32,11 +34,13 @@ def refine(
     folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True
 ) -> dict[str, str]:
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt.
+
     Return name -> why it failed. A finished run is kept, and an interrupted run is continued.
     Collective.
 
     InputError for a folder without case file or whose run has not finished. ``allow``: as of
-    ``read_case``."""
+    ``read_case``.
+    """
     from .cases.case import read_case  # late: finite elements
 
     check("refine", "folder", folder, str | Path)
@@ -71,8 +75,10 @@ def _same(run: RunFolder, name: str) -> bool:
 
 
 def _halved(folder: RunFolder, name: str) -> Iterator[str]:
-    """Yield the settings that halve elements or time steps, of the same duration, without
-    fields."""
+    """Yield the settings that halve elements or time steps.
+
+    The runs have the same duration and no fields.
+    """
     tables, dt = read_copy(folder.folder), folder.facts.get("dt")
     if "fields" in tables:
         yield "fields="
@@ -102,7 +108,10 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
 
 
 def _plain(value: Any, key: str) -> Any:
-    """A number of the case; InputError for one that is written as a text, which has no half."""
+    """Return a number of the case.
+
+    It raises InputError for one that is written as a text, which has no half.
+    """
     if isinstance(value, int | float):
         return value
     raise InputError(
@@ -115,8 +124,10 @@ def _status(folder: Path) -> str:
 
 
 def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
-    """Return the section with the peaks of a run and of those in its folder ``refined``, or that
-    there are none; ``failed``: name -> why, of ``refine``."""
+    """Return the section with the peaks of a run and of those in its folder ``refined``.
+
+    It says so if there are none; ``failed`` is name -> why, of ``refine``.
+    """
     found = {}
     for name in NAMES:
         if name in failed:

@@ -1,5 +1,7 @@
-"""Report on the run of a case: what its folder holds, the checks that the case asks for, and its
-discretisation."""
+"""Report on the run of a case.
+
+It says what its folder holds, the checks that the case asks for, and its discretisation.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -39,14 +41,16 @@ def report(
     columns: Sequence[Sequence[str]] | None = None,
     failed: Mapping[str, str] | None = None,
 ) -> tuple[Section, list[Path]]:
-    """Write the report on a run folder, and beside it the table peaks.csv and the pictures. Return
-    what the report says of the discretisation error, and the paths of the files.
+    """Write the report on a run folder, and beside it the table peaks.csv and the pictures.
+
+    Return what the report says of the discretisation error, and the paths of the files.
 
     ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly,
     report.html. ``columns``: groups of columns of one unit, a chart each, in place of those that
     move; ``failed``: what ``refine`` returned. What has no data is left out. InputError as of
     ``read_run``, for a run of one row, columns that do not exist, another kind of file, .html
-    without jinja2 and plotly, and a damaged model.json."""
+    without jinja2 and plotly, and a damaged model.json.
+    """
     folder = Path(folder)
     case = read_copy(folder)
     run = read_run(folder)
@@ -83,7 +87,7 @@ def report(
 
 
 def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
-    """What model.json says, and its sketch; nothing where there is none."""
+    """Return what model.json says, and its sketch; nothing where there is none."""
     if not is_own(folder / MODEL):
         return {}, []
     try:
@@ -110,8 +114,10 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
 
 @checked
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
-    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps;
-    InputError without a run."""
+    """Return the comparisons of a run folder.
+
+    There is one for each [[check]] of the case it keeps; it raises InputError without a run.
+    """
     folder = Path(folder)
     table = read_copy(folder).get("check", [])
     words = Words(
@@ -130,7 +136,7 @@ def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
 
 
 def _checks(folder: Path) -> Section:
-    """What the run found beside the formulas that its case names."""
+    """Return what the run found beside the formulas that its case names."""
     rows = [
         [
             one.name,

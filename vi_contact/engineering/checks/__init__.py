@@ -1,5 +1,7 @@
-"""Check a run against the formulas of textbooks: each prints its formula, inputs and range,
-docs/guide/checks.md."""
+"""Check a run against the formulas of textbooks.
+
+Each check prints its formula, inputs and range; see docs/guide/checks.md.
+"""
 
 from ...core.lazy import lazy
 

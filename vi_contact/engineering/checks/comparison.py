@@ -1,5 +1,7 @@
-"""Set what a run found beside what a formula expects: what all checks of ``engineering.checks``
-have in common."""
+"""Set what a run found beside what a formula expects.
+
+This is what all checks of ``engineering.checks`` have in common.
+"""
 
 import math
 import tomllib
@@ -28,7 +30,8 @@ class Comparison:
 
     name, formula, source: of the check; inputs: name -> (value, unit) of what went into the
     formula; applies: empty, or the sentence that says why the formula does not apply: then
-    ``expected`` is nan. found: nan without its columns. range: where it applies, in words."""
+    ``expected`` is nan. found: nan without its columns. range: where it applies, in words.
+    """
 
     name: str
     formula: str
@@ -48,18 +51,23 @@ class Comparison:
 
 @dataclass(frozen=True, kw_only=True)
 class Check(ABC):
-    """Compare a run with a formula: base of all checks, frozen dataclasses with fields in SI units,
-    angles in radians.
+    """Compare a run with a formula.
+
+    This is the base of all checks, which are frozen dataclasses with fields in SI units and angles
+    in radians.
 
     checks.toml tells what each says of itself. InputError for numbers that are not above zero, or
-    beyond its limits."""
+    beyond its limits.
+    """
 
     of: str = ""
 
     @property
     def said(self) -> Mapping[str, Any]:
-        """Return formula, source, range, fields and answers with their units, and the columns that
-        are read."""
+        """Return formula, source, range, fields and answers with their units.
+
+        With them come the columns that are read.
+        """
         return _SAID[type(self).__name__]
 
     def __post_init__(self) -> None:
@@ -77,8 +85,10 @@ class Check(ABC):
 
     @abstractmethod
     def numbers(self, history: History) -> Numbers:
-        """Return both numbers, why they cannot be compared, and the inputs of the run, which has
-        the columns."""
+        """Return both numbers, why they cannot be compared.
+
+        With them come the inputs of the run, which has the columns.
+        """
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
@@ -89,8 +99,10 @@ class Check(ABC):
         }
 
     def compare(self, history: History) -> Comparison:
-        """Return the comparison for the history of a run: column -> values (rows,), as of a
-        solution or run folder."""
+        """Return the comparison for the history of a run.
+
+        The history is column -> values (rows,), as of a solution or run folder.
+        """
         lacking = [
             name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history
         ]

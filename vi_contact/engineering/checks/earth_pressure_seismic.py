@@ -1,9 +1,11 @@
-"""Expect what an earthquake adds to the pressure on a wall: Mononobe and Okabe, Wood, Veletsos and
-Younan.
+"""Expect what an earthquake adds to the pressure on a wall.
+
+The theories are those of Mononobe and Okabe, Wood, Veletsos and Younan.
 
 Mononobe and Okabe's wedge yields, and stands beside a run with elastic soil. Wood's, and Veletsos
 and Younan's elastic layer of height H on rock is held by a rigid smooth wall that stays on it:
-these are to be met by such a run."""
+these are to be met by such a run.
+"""
 
 import math
 from abc import abstractmethod
@@ -25,12 +27,14 @@ LIFTED = 0.05
 
 
 def smooth_wall(nu: float, length: float, terms: int = 2000) -> tuple[float, float]:
-    """Return Q/(rho a H²) and h/H of an elastic layer between smooth rigid walls at a distance
-    ``length``/H.
+    """Return Q/(rho a H²) and h/H of an elastic layer between smooth walls.
+
+    The walls are rigid, at a distance ``length``/H.
 
     u = sum U_n(y) sin k x, v = sum V_n(y) cos k x, k = n pi/length, n odd, with u = v = 0 on the
     rock and free ground above: exact plane strain (Wood 1973). Q and its moment follow by
-    equilibrium from the stresses on the rock."""
+    equilibrium from the stresses on the rock.
+    """
     n = 2.0 * np.arange(1, terms + 1) - 1.0
     k = n * math.pi / length
     sinh, cosh = (
@@ -46,27 +50,32 @@ def smooth_wall(nu: float, length: float, terms: int = 2000) -> tuple[float, flo
 
 @dataclass(frozen=True, kw_only=True)
 class MononobeOkabe(Coulomb):
-    """Expect the largest thrust of Coulomb's wedge, weight and earthquake together; it acts at H/3
-    in this theory.
+    """Expect the largest thrust of Coulomb's wedge.
+
+    Weight and earthquake act together; the thrust acts at H/3 in this theory.
 
     kh, kv: accelerations towards the wall and upwards, of gravity. It applies as Coulomb's wedge
-    does."""
+    does.
+    """
 
     kh: float
     kv: float = 0.0
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
+        """Return K (1 - kv) under gravity turned by psi [rad] and the earthquake, and why none."""
         found, why = super().coefficient(psi + math.atan(self.kh / (1.0 - self.kv)))
         return found * (1.0 - self.kv), why
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Layer(EarthPressure):
-    """Compare the largest thrust that is added to that of the first row, or the height of what is
-    added.
+    """Compare the largest thrust that is added to the first row's.
+
+    Else compare the height of what is added.
 
     nu, c_s: Poisson's ratio and speed of shear waves [m/s] of the layer; on_left: of the wall, else
-    on its right; acceleration: column of the ground's."""
+    on its right; acceleration: column of the ground's.
+    """
 
     nu: float
     c_s: float
@@ -75,8 +84,10 @@ class _Layer(EarthPressure):
 
     @abstractmethod
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
-        """Return the largest Q [N/m], its height [m], and why there is none; push: acceleration
-        towards the wall."""
+        """Return the largest Q [N/m], its height [m], or why there is none.
+
+        ``push`` is the acceleration towards the wall.
+        """
 
     def numbers(self, history: History) -> Numbers:
         thrust, height, opened = (
@@ -109,11 +120,13 @@ class Wood(_Layer):
 
     length: distance to the next smooth rigid wall [m], such as a side of the model that holds u;
     None: far away. It applies below 0.3 of the layer's lowest frequency, c_s/(4 H); that of a
-    motion is max a/(pi (max v - min v))."""
+    motion is max a/(pi (max v - min v)).
+    """
 
     length: float | None = None
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
+        """Return the largest Q [N/m], its height [m], and why there is none."""
         factor, arm = smooth_wall(
             self.nu, 20.0 if self.length is None else self.length / self.height
         )
@@ -132,15 +145,18 @@ class Wood(_Layer):
 
 @dataclass(frozen=True, kw_only=True)
 class VeletsosYounan(_Layer):
-    """Expect the added thrust under the whole motion, of the theory that leaves vertical stresses
-    out.
+    """Expect the added thrust under the whole motion.
+
+    The theory leaves vertical stresses out.
 
     damping: xi of the soil, hysteretic; w_n = n pi c_s/(2 H), n odd. Slow ones give 3 to 6 % more
-    than ``Wood``'s."""
+    than ``Wood``'s.
+    """
 
     damping: float = 0.05
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
+        """Return the largest Q [N/m], its height [m], and why there is none."""
         steps, lowest = len(t) - 1, 0.5 * math.pi * self.c_s / self.height
         dt = float(t[-1] - t[0]) / steps
         count = 2 * steps + math.ceil(

@@ -1,10 +1,12 @@
-"""Expect the pressure of resting soil on a wall: at rest, and of yielding soil after Rankine and
-Coulomb.
+"""Expect the pressure of resting soil on a wall.
+
+It is that of soil at rest, and of yielding soil after Rankine and Coulomb.
 
 N is the force along the normal of a metre of wall. phi: friction angle of the soil; delta: between
 soil and wall; slope: of the ground, rising from the wall; batter: of its back from the vertical,
 positive where soil rests on it. An elastic soil does not yield: its pressure is that at rest, and
-active and passive ones are bounds beside it."""
+active and passive ones are bounds beside it.
+"""
 
 import math
 from dataclasses import dataclass
@@ -24,13 +26,15 @@ def wedge(
     psi: float = 0.0,
     passive: bool = False,
 ) -> float:
-    """Return K of the worst plane wedge, active or passive, under gravity turned by psi; nan where
-    none is at rest.
+    """Return K of the worst plane wedge.
+
+    The wedge is active or passive, under gravity turned by psi; K is nan where none is at rest.
 
     K = cos²(phi -+ batter - psi) / (cos psi cos² batter cos(delta +- batter + psi) (1 +- root)²),
     root² = sin(phi + delta) sin(phi -+ slope - psi) / (cos(delta +- batter + psi) cos(slope -
     batter)); upper signs active, lower ones passive. Coulomb 1776; psi: Okabe 1924, Mononobe and
-    Matsuo 1929. Angles [rad]."""
+    Matsuo 1929. Angles [rad].
+    """
     sign = -1.0 if passive else 1.0
     lean, open_ = math.cos(delta + sign * batter + psi), phi - sign * slope - psi
     if open_ < 0.0 or lean <= 0.0 or math.cos(slope - batter) <= 0.0:
@@ -46,8 +50,9 @@ def wedge(
 
 @dataclass(frozen=True, kw_only=True)
 class EarthPressure(Check):
-    """Hold what all theories of a wall need: its height [m], the soil's density [kg/m³], and what
-    is compared.
+    """Hold what all theories of a wall need.
+
+    That is its height [m], the soil's density [kg/m³], and what is compared.
 
     part: of the contact, whose ``Resultants`` with their centre at the foot of the wall record
     N_<part>, height_<part>, uplift_<part>; of: "thrust", N [N/m] per metre of wall, or "height", of
@@ -68,8 +73,10 @@ class EarthPressure(Check):
         raise NotImplementedError
 
     def numbers(self, history: History) -> Numbers:
-        """Compare N, or its height: that of rho g H²/2 at H/3 and of q H, times ``laden``, at
-        H/2."""
+        """Compare N, or its height.
+
+        The height is that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2.
+        """
         factor, why = self.coefficient()
         slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
         laden = (
@@ -93,30 +100,36 @@ class EarthPressure(Check):
 
 @dataclass(frozen=True, kw_only=True)
 class AtRest(EarthPressure):
-    """Give the thrust of an elastic layer that cannot give way sideways, with which an elastic soil
-    is compared.
+    """Give the thrust of an elastic layer that cannot give way sideways.
+
+    An elastic soil is compared with it.
 
     nu: Poisson's ratio. The wall is smooth and does not move; for sand, nu of K0 = 1 - sin(phi) is
-    K0/(1 + K0)."""
+    K0/(1 + K0).
+    """
 
     nu: float
 
     def coefficient(self) -> tuple[float, str]:
+        """Return K, and why there is none."""
         return self.nu / (1.0 - self.nu), ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rankine(EarthPressure):
-    """Expect the thrust of soil in active, or passive, failure throughout, on a vertical wall,
-    parallel to the ground.
+    """Expect the thrust of soil in active, or passive, failure throughout.
 
-    phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand."""
+    It acts on a vertical wall, parallel to the ground.
+
+    phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand.
+    """
 
     phi: float
     slope: float = 0.0
     passive: bool = False
 
     def coefficient(self) -> tuple[float, str]:
+        """Return K, and why there is none."""
         along = (
             -self.slope if self.passive else self.slope
         )  # the soil slides up: the same lines, friction turned round
@@ -128,12 +141,14 @@ class Rankine(EarthPressure):
 
 @dataclass(frozen=True, kw_only=True)
 class Coulomb(EarthPressure):
-    """Expect the thrust of a plane wedge of soil that slides on the wall and on the ground below
-    it.
+    """Expect the thrust of a plane wedge of soil.
+
+    The wedge slides on the wall and on the ground below it.
 
     phi, delta, slope, batter [rad]; N = P cos(delta). It applies for delta <= phi, passive: delta
     <= phi/2 (beyond it surfaces that are curved slide at less), ground up to phi, and phi -+ slope
-    - psi >= 0."""
+    - psi >= 0.
+    """
 
     phi: float
     delta: float = 0.0
@@ -142,6 +157,7 @@ class Coulomb(EarthPressure):
     passive: bool = False
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
+        """Return K under gravity turned by psi [rad], and why there is none."""
         most, sign = (0.5 * self.phi, "+") if self.passive else (self.phi, "-")
         k = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
         why = "the ground is steeper than phi" if abs(self.slope) > self.phi else ""

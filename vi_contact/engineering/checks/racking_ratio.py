@@ -1,5 +1,7 @@
-"""Expect how far the ground shears a buried box, a thin frame that neither slips nor opens (Wang
-1993)."""
+"""Expect how far the ground shears a buried box.
+
+The box is a thin frame that neither slips nor opens (Wang 1993).
+"""
 
 from dataclasses import dataclass
 
@@ -16,8 +18,10 @@ LARGEST, SHALLOWEST = (
 def flexibility(
     shear_modulus: float, width: float, height: float, wall: float, roof: float, invert: float
 ) -> float:
-    """Return F = G W/(S H) [-] of a box, 0 if it is rigid; S: force at its roof for a unit racking;
-    E I [N m²/m]."""
+    """Return F = G W/(S H) [-] of a box.
+
+    It is 0 if the box is rigid. S is the force at its roof for a unit racking; E I is in [N m²/m].
+    """
     a1, a2 = roof / invert, roof * height / (wall * width)
     psi = (3.0 * a2**2 + 2.0 * (1.0 + a1) * a2 + a1) / (1.0 + a1 + 6.0 * a2)
     return shear_modulus * height * width**2 / (12.0 * roof) * psi
@@ -50,6 +54,7 @@ class RackingRatio(Check):
     free: str = "free_field"
 
     def numbers(self, history: History) -> Numbers:
+        """Return both numbers, and why they cannot be compared."""
         shear = [history[f"racking_{one}"] for one in (self.box, self.free)]
         box, free = (float(np.abs(one - one[0]).max()) for one in shear)
         ratio = flexibility(

@@ -1,5 +1,8 @@
-"""Expect how far a rigid block slides on a plane that is shaken (Newmark, Géotechnique 15, 1965),
-and how it rocks on rigid ground (Housner, Bull. Seism. Soc. Am. 53, 1963)."""
+"""Expect how far a rigid block slides on a plane that is shaken and rocks on rigid ground.
+
+Sliding is after Newmark, Géotechnique 15, 1965; rocking is after Housner, Bull. Seism. Soc. Am. 53,
+1963.
+"""
 
 import math
 from dataclasses import dataclass
@@ -21,11 +24,13 @@ FINE = 2e-4
 
 
 def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -> Array:
-    """Return the displacement [m] at times t (n,) of u'' = w - r sgn(u') from rest, sticking while
-    |w| <= r.
+    """Return the displacement [m] at times t (n,) of u'' = w - r sgn(u') from rest.
+
+    It sticks while |w| <= r.
 
     drive w, resist r >= 0 [m/s²], (n,), linear between the times; one_sided: it never slides back,
-    u' >= 0."""
+    u' >= 0.
+    """
     u, slip, speed, share = np.zeros(len(t)), 0.0, 0.0, (np.arange(PARTS) + 0.5) / PARTS
     for row, length in enumerate(np.diff(t) / PARTS):
         push, hold = (length * (x[row] + share * (x[row + 1] - x[row])) for x in (drive, resist))
@@ -39,14 +44,16 @@ def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -
 
 @dataclass(frozen=True, kw_only=True)
 class NewmarkBlock(Check):
-    """Expect the displacement that is left after a motion, on a plane that falls by ``slope`` [rad]
-    towards +x.
+    """Expect the displacement that is left after a motion.
+
+    The plane falls by ``slope`` [rad] towards +x.
 
     mu: friction, or in its place the yield acceleration over g of a level plane; one_sided: it
     slides to one side only, as a wall before its fill does: to that of the sign of ``towards``
     along x; 0: down the plane, +x if it is level; slip, acceleration, vertical: columns of the
     displacement on the plane, signed, and of the ground's accelerations. It applies while the block
-    stays on the plane, and where it stands without motion."""
+    stays on the plane, and where it stands without motion.
+    """
 
     mu: float
     slope: float = 0.0
@@ -58,6 +65,7 @@ class NewmarkBlock(Check):
     vertical: str = "a_g_y"
 
     def numbers(self, history: History) -> Numbers:
+        """Return both numbers, and why they cannot be compared."""
         along, up = history[self.acceleration], history[self.vertical] + self.gravity
         sine, cosine = math.sin(self.slope), math.cos(self.slope)
         normal, drive = up * cosine + along * sine, up * sine - along * cosine
@@ -82,13 +90,15 @@ class NewmarkBlock(Check):
 
 @dataclass(frozen=True, kw_only=True)
 class Housner(Check):
-    """Expect the largest angle of a uniform block of this width and height [m], or the time of its
-    first impact.
+    """Expect the largest angle of a uniform block, or the time of its first impact.
+
+    The block has this width and height [m].
 
     of: "angle" [rad] or "impact" [s] after the first row; theta: column of the angle, anticlockwise
     positive, whose first row is the start, at rest; acceleration, vertical: of the ground. It
     applies to blocks that rock and do not overturn, slide or bounce. One history in a long motion
-    is chaotic: compare many, or the first impacts."""
+    is chaotic: compare many, or the first impacts.
+    """
 
     width: float
     height: float
@@ -99,8 +109,10 @@ class Housner(Check):
     vertical: str = "a_g_y"
 
     def rocking(self, t: Array, ground: Array, theta: float) -> Array:
-        """Return the angle [rad] at times t (n,) from rest under a_x, g + a_y (2, n); beyond alpha
-        it stays."""
+        """Return the angle [rad] at times t (n,) from rest under a_x, g + a_y (2, n).
+
+        Beyond alpha it stays.
+        """
         alpha, angles, rate = math.atan(self.width / self.height), np.full(len(t), theta), 0.0
         inertia, kept = 1.5 / math.hypot(self.width, self.height), 1.0 - 1.5 * math.sin(alpha) ** 2
         for row, length in enumerate(np.diff(t)):
@@ -122,6 +134,7 @@ class Housner(Check):
         return angles
 
     def numbers(self, history: History) -> Numbers:
+        """Return both numbers, and why they cannot be compared."""
         t, angle, alpha = history["t"], history[self.theta], math.atan(self.width / self.height)
         ground = np.array([history[self.acceleration], self.gravity + history[self.vertical]])
         start = float(angle[0]) if abs(angle[0]) > ROUNDED * alpha else 0.0
@@ -148,8 +161,10 @@ class Housner(Check):
 
 
 def landing(t: Array, theta: Array) -> float:
-    """Return the time [s] from the first row until the angle, once above 1e-3 of its largest, is
-    zero; nan if never."""
+    """Return the time [s] from the first row until the angle is zero.
+
+    That holds once it was above 1e-3 of its largest; the time is nan if it never is.
+    """
     start = int(np.argmax(np.abs(theta) > 1e-3 * np.abs(theta).max()))
     row = start + int(np.argmax(theta[start:] * theta[start] <= 0.0))
     share = theta[row] / (theta[row] - theta[row - 1]) if row > start else math.nan

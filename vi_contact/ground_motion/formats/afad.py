@@ -1,5 +1,7 @@
-"""Read text files of AFAD (Türkiye): "KEY : value" lines, then three columns N-S, E-W, U-D in
-gal."""
+"""Read text files of AFAD (Türkiye).
+
+They have "KEY : value" lines, then three columns N-S, E-W, U-D in gal.
+"""
 
 from ...core.errors import InputError
 from ..record import Record
@@ -9,8 +11,10 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the title of the national network, or its columns and their count, stand in the
-    header."""
+    """Tell whether the title of the national network, or its columns stand in the header.
+
+    Of the columns, the count counts too.
+    """
     head = [line.strip().upper() for line in text.heads[:60]]
     titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)
     columns = any(tuple(line.split()) == COMPONENTS for line in head)
@@ -18,8 +22,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D). Nothing is
-    subtracted."""
+    """Return the record of one component; channel: 1 (N-S), 2 (E-W) or 3 (U-D).
+
+    Nothing is subtracted.
+    """
     channel = text.chosen(COMPONENTS)
     start = next(
         (k + 1 for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None

@@ -1,9 +1,11 @@
 """Read PEER .AT2 files: a few header lines with NPTS and DT, then the samples row by row.
 
-Variants met in the wild and all read here: `NPTS=  1559, DT= .02000 SEC` with or without filter data
-after it, `3930 0.00500 NPTS, DT`, NPTS and DT on lines of their own, before or behind a line `*** Begin data ***`, and
-files without NPTS whose data start after such a line, the time step standing only in a sentence. Any number of values
-per row; the last row may be short and lack its line end. What the header says twice must agree."""
+Variants met in the wild and all read here: `NPTS=  1559, DT= .02000 SEC` with or without filter
+data after it, `3930 0.00500 NPTS, DT`, NPTS and DT on lines of their own, before or behind a line
+`*** Begin data ***`, and files without NPTS whose data start after such a line, the time step
+standing only in a sentence. Any number of values per row; the last row may be short and lack its
+line end. What the header says twice must agree.
+"""
 
 import re
 from itertools import pairwise
@@ -24,8 +26,10 @@ _UNITS = re.compile(r"\bunits?\s*+(?:of|are|is|in|[=:])\s*+(\([^()]*+\)|[^\s,;]+
 
 
 def begin_data(text: TextFile) -> int | None:
-    """Return the index of the first line of numbers after `*** Begin data ***`, NPTS and DT
-    skipped, or None."""
+    """Return the index of the first line of numbers after `*** Begin data ***`.
+
+    NPTS and DT are skipped; None stands for no such line.
+    """
     start = next((k + 1 for k, line in enumerate(text.heads) if _BEGIN.search(line)), None)
     while start is not None and start < len(text.lines) and _states(text.heads[start]):
         start += 1
@@ -38,8 +42,11 @@ def _states(line: str) -> bool:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first lines say NPTS, outside "#" comments, or a `*** Begin data ***` line
-    stands before rows of accelerations, and not before times and accelerations."""
+    """Tell whether the first lines say NPTS, outside "#" comments.
+
+    It is also true where a `*** Begin data ***` line stands before rows of accelerations, and not
+    before times and accelerations.
+    """
     start = begin_data(text)
     if start is not None:
         rows = list(text.rows(text.filled(start)))
@@ -54,8 +61,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an AT2 file; units and dt are needed only where the file does not state
-    them."""
+    """Return the record of an AT2 file.
+
+    Units and dt are needed only where the file does not state them.
+    """
     npts, stated_dt, start = _header(text)
     told = [index for index in range(start) if text.heads[index].strip()]
     told = [
@@ -87,8 +96,10 @@ def read(text: TextFile) -> Record:
 
 
 def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | None]:
-    """Return the line that states the units, and the units; InputError where two lines state
-    different ones."""
+    """Return the line that states the units, and the units.
+
+    It raises InputError where two lines state different ones.
+    """
     found = [(index, match[1]) for index in told for match in _UNITS.finditer(text.heads[index])]
     for index, units in found[1:]:
         if known_units(units) is not None and known_units(units) != known_units(found[0][1]):
@@ -101,8 +112,10 @@ def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | No
 
 
 def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float] | None, int]:
-    """Return the line of NPTS and NPTS, the line of DT and DT, None where they are not stated, and
-    the index of the first data line."""
+    """Return the line of NPTS and NPTS, and that of DT and DT.
+
+    They are None where they are not stated. With them comes the index of the first data line.
+    """
     counts: list[tuple[int, float]] = []
     steps: list[tuple[int, float]] = []
     begin, last = begin_data(text), 0

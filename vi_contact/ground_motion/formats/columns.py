@@ -1,11 +1,13 @@
-"""Read plain columns: times and one or more accelerations, or accelerations alone, with or without
-a heading.
+"""Read plain columns.
+
+They are times and one or more accelerations, or accelerations alone, with or without a heading.
 
 Accelerations alone are the path series of OpenSees (.th, .g3, .acc): values in one column or row by
 row. Lines before the numbers are read for units, time step, number of samples and names of columns
 (``statements``, ``headings``); what they say is believed, and what the caller says must agree.
 Lines with "#" among the numbers and empty lines are skipped; columns are separated by blanks,
-commas or semicolons. Units are never guessed."""
+commas or semicolons. Units are never guessed.
+"""
 
 import re
 from collections.abc import Sequence
@@ -49,8 +51,10 @@ _WHOLE = re.compile(r"[\s\d+,;-]++")
 
 @dataclass
 class _Found:
-    """Hold what the header says: units and their line, time step, number of samples, columns; and
-    what is doubted."""
+    """Hold what the header says.
+
+    That is units and their line, time step, number of samples, columns; and what is doubted.
+    """
 
     units: tuple[int, str] | None = None
     step: tuple[int, float] | None = None
@@ -61,14 +65,16 @@ class _Found:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of a file of columns; `units` and `dt` are needed where the file does not
-    state them.
+    """Return the record of a file of columns.
+
+    `units` and `dt` are needed where the file does not state them.
 
     Uneven times are refused unless resample_dt [s] is given: see ``time_step``. The first time of
     the file becomes t = 0. A first column that counts up evenly is a time, or the number of the
     sample. channel: which of several components, from 1, or its name in the heading. With dt and
     without channel, rows of three or more values are read one after the other, unless the first
-    column is a time."""
+    column is a time.
+    """
     header, lines = _parts(text)
     rows = list(text.rows(lines))
     header, lines, rows, found = _header(text, header, lines, rows)
@@ -126,8 +132,10 @@ def _is_words(line: str) -> bool:
 def _header(
     text: TextFile, header: list[int], lines: list[int], rows: list[list[float]]
 ) -> tuple[list[int], list[int], list[list[float]], _Found]:
-    """Return the lines of the header, those of the numbers, the numbers, and what the header
-    says."""
+    """Return the lines of the header, those of the numbers, the numbers.
+
+    With them comes what the header says.
+    """
     found = _Found()
     ours = next((index for index in header if _OURS.match(text.heads[index])), None)
     if ours is not None and (match := _OURS.match(text.heads[ours])):
@@ -162,12 +170,14 @@ def _header(
 
 
 def _count_and_step(rows: Sequence[Sequence[float]]) -> tuple[float, ...] | None:
-    """Return the number of samples, and the time step, that stand before the samples in the first
-    row or two.
+    """Return the number of samples, and the time step.
+
+    They stand before the samples in the first row or two.
 
     They are two numbers before rows of one, of which the first is whole; or one number, or two on
     two lines, before exactly as many numbers as it says. A third member tells that two rows were
-    taken."""
+    taken.
+    """
     first, others = rows[0], rows[1:]
     count = first[0]
     if count != round(count) or count < 2.0:
@@ -190,7 +200,8 @@ def _leading(
     """Return the columns that are no motion: numbers of samples and, the last of them, the time.
 
     The heading decides. Without one they are the first columns that count up evenly; of two columns
-    the first one, if it rises. Rows that follow one another rise together, and have no time."""
+    the first one, if it rises. Rows that follow one another rise together, and have no time.
+    """
     width = len(rows[0])
     if found.columns is not None and len(found.columns) == width:
         numbers = [k for k, one in enumerate(found.columns) if one.kind == "number"]
@@ -243,8 +254,10 @@ def _is_series(
     found: _Found,
     step_known: bool,
 ) -> bool:
-    """Tell whether rows are one series; InputError where columns are components, or nobody can
-    tell."""
+    """Tell whether rows are one series.
+
+    It raises InputError where columns are components, or nobody can tell.
+    """
     width, values = len(rows[0]), sum(len(row) for row in rows)
     if width == 1:
         return True
@@ -259,8 +272,8 @@ def _is_series(
         remedy = (
             "pass dt= in seconds, and channel= for one of the columns, or write one value a line"
             if width < 4
-            else "pass dt= in seconds where the rows follow one another, and channel= too where the "
-            "columns are components"
+            else "pass dt= in seconds where the rows follow one another, and channel= too where "
+            "the columns are components"
         )
         raise InputError(
             f"{text.at(lines[0])}: {width} columns instead of 2, and none is a time ({names}); "
@@ -389,8 +402,10 @@ def _timed(
     column: Column,
     leading: Sequence[int],
 ) -> tuple[Array, float | None, float]:
-    """Return the samples on even times, their step [s], None where the numbers are counts, and its
-    rounding."""
+    """Return the samples on even times, their step [s] and its rounding.
+
+    The step is None where the numbers are counts.
+    """
     unit, stated = (
         TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s")),
         found.step and found.step[1],

@@ -1,11 +1,13 @@
-"""Read COSMOS and CSMIP files (.V1, .V2, .V2c): one or more channels, each with text, numbers and
-blocks of samples.
+"""Read COSMOS and CSMIP files (.V1, .V2, .V2c).
+
+They have one or more channels, each with text, numbers and blocks of samples.
 
 A block begins with a line that states its number of points, quantity, units and Fortran format,
 such as "7500 points of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)" (CSMIP) or
 "12091 acceleration pts, approx 120 secs, units=cm/sec2(04),Format=(8F10.5)" (COSMOS), the time step
 of the latter being real number 34 of its header. Without a stated format it is (8F10.3). Samples
-are cut by column, for they may touch. Velocities and displacements are skipped."""
+are cut by column, for they may touch. Velocities and displacements are skipped.
+"""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -56,8 +58,10 @@ _UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.
 
 @dataclass(frozen=True)
 class Block:
-    """Describe samples announced on lines[line]: `count`, `per_line` a line, `width` wide; header:
-    its lines."""
+    """Describe samples announced on lines[line].
+
+    There are `count` of them, `per_line` a line, `width` wide; ``header`` has its lines.
+    """
 
     line: int
     header: range
@@ -72,14 +76,18 @@ class Block:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first line is one of a COSMOS or CSMIP file of any volume, or a line begins
-    its samples."""
+    """Tell whether the first line is one of a COSMOS or CSMIP file of any volume.
+
+    It is also true where a line begins its samples.
+    """
     return _FIRST.search(text.heads[0]) is not None or begins_blocks(text)
 
 
 def begins_blocks(text: TextFile) -> bool:
-    """Tell whether one of the first lines announces a block of samples with its format or its
-    step."""
+    """Tell whether one of the first lines announces a block of samples.
+
+    It does so with its format or its step.
+    """
     lines = [
         (index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()
     ]
@@ -90,8 +98,10 @@ def begins_blocks(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one channel; channel: 1 for the first of the file, required where it
-    holds several."""
+    """Return the record of one channel.
+
+    ``channel`` is 1 for the first of the file, required where it holds several.
+    """
     blocks = _blocks(text)
     if not blocks:
         raise InputError(
@@ -130,8 +140,10 @@ def read(text: TextFile) -> Record:
 
 
 def _blocks(text: TextFile) -> list[Block]:
-    """Return the blocks of accelerations; blocks of other quantities belong to the channel before
-    them."""
+    """Return the blocks of accelerations.
+
+    Blocks of other quantities belong to the channel before them.
+    """
     found, index, start = [], 0, 0
     while index < len(text.lines):
         announced = _announced(text, index)
@@ -155,8 +167,10 @@ def _blocks(text: TextFile) -> list[Block]:
 
 
 def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
-    """Number of points and quantity ("acc", "vel", "dis") of the line that begins a block, None for
-    another."""
+    """Return the number of points and quantity ("acc", "vel", "dis") of a line.
+
+    The line begins a block; another one gives None.
+    """
     line = text.heads[index]
     count = _COUNT.match(line)
     quantity = _QUANTITY.search(line, count.end()) if count else None
@@ -166,8 +180,10 @@ def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
 
 
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
-    """Return the text of a channel's header, which ends where numbers begin, and its comments,
-    blanks squeezed."""
+    """Return the text of a channel's header, and its comments.
+
+    The text ends where numbers begin; blanks are squeezed.
+    """
     header = [" ".join(text.heads[index].split()) for index in block.header]
     numbers = (
         k for k, entry in enumerate(header) if _NUMBERS.fullmatch(entry) or "header values" in entry
@@ -219,8 +235,10 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
 
 
 def _step(text: TextFile, block: Block) -> float | None:
-    """Return the time step stated with the samples, in the text of the header or among its real
-    numbers."""
+    """Return the time step stated with the samples.
+
+    It stands in the text of the header or among its real numbers.
+    """
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
         return 1.0 / text.number(block.line, rate[1])
@@ -239,8 +257,10 @@ def _step(text: TextFile, block: Block) -> float | None:
 
 
 def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int, str] | None:
-    """Return the line and the units of the peak that the header states, where the samples have that
-    peak."""
+    """Return the line and the units of the peak that the header states.
+
+    They are those of a header where the samples have that peak.
+    """
     for index, match in _found(text, block.header, _PEAK):
         peak, found = abs(text.number(index, match[1])), max(map(abs, samples))
         if known_units(match[2]) is not None and abs(found - peak) <= 1e-3 * peak:
@@ -249,8 +269,10 @@ def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int
 
 
 def _component(text: TextFile, block: Block) -> str:
-    """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its
-    header."""
+    """Return the direction of the channel, such as "90 Deg" or "UP".
+
+    It comes from the text of its header.
+    """
     named = (
         _FROM.split(match[2], maxsplit=1)[0].split()
         for _, match in _found(text, block.header, _CHANNEL)
@@ -260,7 +282,7 @@ def _component(text: TextFile, block: Block) -> str:
 
 
 def _station(text: TextFile, block: Block) -> str:
-    """Number or code of the station, from the text of the header."""
+    """Return the number or code of the station, from the text of the header."""
     named = next((match for _, match in _found(text, block.header, _STATION)), None)
     return next(iter((_CODE.search(named[1]) or named)[1].split()), "") if named else ""
 

@@ -1,5 +1,7 @@
-"""Read files of the Central Weather Administration of Taiwan: "#Key: value" lines, then time and
-columns."""
+"""Read files of the Central Weather Administration of Taiwan.
+
+There are "#Key: value" lines, then time and columns.
+"""
 
 import math
 import re
@@ -23,8 +25,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one column; channel: 1 for the one after the time, or its name such as
-    "U"."""
+    """Return the record of one column.
+
+    ``channel`` is 1 for the one after the time, or its name such as "U".
+    """
     header = _header(text)
     sequence_line, sequence = text.entry(header, "DATASEQUENCE")
     first, *names = [" ".join(part.split()) for part in re.split(r"[;\s]+", sequence) if part]

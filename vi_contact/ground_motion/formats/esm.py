@@ -1,8 +1,10 @@
-"""Read files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY:
-value", then samples.
+"""Read files of the Engineering Strong-Motion database.
+
+They are those of ESM and ITACA, and alike of AFAD: 64 lines "KEY: value", then samples.
 
 One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record
-on."""
+on.
+"""
 
 import re
 from itertools import takewhile
@@ -15,8 +17,10 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether line 1 is an entry "KEY: value" and one of the first 100 is NDATA or
-    SAMPLING_INTERVAL_S."""
+    """Tell whether line 1 is an entry "KEY: value" of such a file.
+
+    One of the first 100 lines has to be NDATA or SAMPLING_INTERVAL_S.
+    """
     keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
     entries = [_entry(line) for line in text.heads[:100]]
     return entries[0] is not None and any(

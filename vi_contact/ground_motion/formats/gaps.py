@@ -13,12 +13,14 @@ _HUGE = 1e20, 1e40  # between them a number is a mark (1e30, 1.7e38) and no moti
 
 
 def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], str]) -> None:
-    """Raise InputError where a sample is a mark of a missing one; place: gives file and line of
-    sample k.
+    """Raise InputError where a sample is a mark of a missing one.
+
+    ``place`` gives file and line of sample k.
 
     The mark is a number of nines only, or -12345, or a huge one, that no other sample reaches or
     that stands apart: it is farther from both its neighbours than any other two neighbours are from
-    one another. A sample may be 999.0 by chance, between 997.2 and 1001.4."""
+    one another. A sample may be 999.0 by chance, between 997.2 and 1001.4.
+    """
     values = np.asarray(samples, dtype=float)
     marks = np.array([_is_mark(value) for value in np.abs(values)], dtype=bool)
     if not np.any(marks):
@@ -43,8 +45,10 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
 
 
 def _is_mark(size: float) -> bool:
-    """Tell whether a number is made of nines only, at least three of them before the point, or is
-    huge."""
+    """Tell whether a number is made of nines only or is huge.
+
+    At least three of the nines stand before the point.
+    """
     if _HUGE[0] <= size <= _HUGE[1] or size == _SAC:
         return True
     if size < 999.0 or not math.isfinite(size):

@@ -1,10 +1,12 @@
-"""Read files of GeoNet (New Zealand), .V1A and .V2A: three components, one after the other,
-accelerations in mm/s².
+"""Read files of GeoNet (New Zealand), .V1A and .V2A.
+
+They have three components, one after the other, with accelerations in mm/s².
 
 Each component has 16 lines of text, 4 lines of 10 integers and 6 lines of 10 reals in columns of 8,
 then blocks of accelerations, velocities and displacements, ten a line in columns of 8. Integers 34
 to 36 are the numbers of accelerations, velocities and displacements. Velocities and displacements
-are skipped."""
+are skipped.
+"""
 
 import re
 from collections.abc import Iterator
@@ -34,8 +36,10 @@ _PEAK = re.compile(rf"^\s*+acceleration:\s*+peak\s*+({NUMBER})\s*+mm/s/s", re.IG
 
 @dataclass(frozen=True)
 class _Part:
-    """Describe one component: its first line, its name, and the numbers of its three blocks of
-    samples."""
+    """Describe one component.
+
+    It has its first line, its name, and the numbers of its three blocks of samples.
+    """
 
     start: int
     name: str
@@ -53,8 +57,10 @@ class _Part:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether two of three signs are there: the first line, "Accelerogram … Processed", and a
-    peak in mm/s/s."""
+    """Tell whether two of three signs are there.
+
+    They are the first line, "Accelerogram … Processed", and a peak in mm/s/s.
+    """
     head = text.heads[:TEXT_LINES]
     signs = (
         _FIRST.search(head[0]) is not None,
@@ -65,8 +71,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 for the first of the file, or its name such as
-    "S16W"."""
+    """Return the record of one component.
+
+    ``channel`` is 1 for the first of the file, or its name such as "S16W".
+    """
     parts = list(_parts(text))
     part = parts[text.chosen([part.name for part in parts])]
     values, lines = _samples(text, part)
@@ -190,8 +198,10 @@ def _first(text: TextFile, header: range, pattern: re.Pattern[str], what: str) -
 
 
 def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: float) -> None:
-    """Raise InputError unless the step agrees with the one among the reals, and with the
-    duration."""
+    """Raise InputError unless the step agrees with the one among the reals.
+
+    It has to agree with the duration too.
+    """
     index = part.start + TEXT_LINES + INTEGER_LINES + STEP // PER_LINE
     column = STEP % PER_LINE
     word = text.lines[index][WIDTH * column : WIDTH * (column + 1)].strip()

@@ -2,7 +2,8 @@
 
 A heading has a cell for each column, between commas, semicolons, tabs, wide gaps, brackets or
 blanks, and is the last line before the numbers: "Time [s],Acceleration [g],Velocity [m/s]". Names
-and units may stand on a line each."""
+and units may stand on a line each.
+"""
 
 import re
 from collections.abc import Sequence
@@ -43,9 +44,12 @@ _COUNTS = {"count", "counts", "digit", "digits", "v", "mv", "volt", "volts", "ra
 
 @dataclass(frozen=True)
 class Column:
-    """Describe a column: its name, its kind ("time", "acceleration", "velocity", "displacement",
-    "counts", "number", or "" where the heading does not tell), and its unit, or None; line: index
-    of the heading."""
+    """Describe a column.
+
+    It has its name, its kind ("time", "acceleration", "velocity", "displacement", "counts",
+    "number", or "" where the heading does not tell), and its unit, or None; ``line`` is the index
+    of the heading.
+    """
 
     name: str
     kind: str
@@ -54,8 +58,10 @@ class Column:
 
 
 def column_heading(text: TextFile, header: Sequence[int], width: int) -> list[Column] | None:
-    """Return the columns that the last line of the header names, None where it is no heading of
-    `width` columns."""
+    """Return the columns that the last line of the header names.
+
+    It is None where that is no heading of `width` columns.
+    """
     lines = [index for index in header if text.heads[index].strip(_MARKS + "-=+_")]
     if width < 2 or not lines:
         return None

@@ -1,9 +1,11 @@
-"""Read NIED K-NET and KiK-net files: 17 header lines, then integer counts, eight a row, one
-component a file.
+"""Read NIED K-NET and KiK-net files.
+
+There are 17 header lines, then integer counts, eight a row, one component a file.
 
 Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's
 offset, so their mean is removed, as the agency does before it prints "Max. Acc.". NIED forbids
-passing these files on."""
+passing these files on.
+"""
 
 import re
 
@@ -35,8 +37,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of a K-NET or KiK-net file, its mean removed; units and dt are only
-    checked."""
+    """Return the record of a K-NET or KiK-net file, its mean removed.
+
+    Units and dt are only checked.
+    """
     header = {
         key: index
         for key in KEYS

@@ -1,5 +1,7 @@
-"""Read a record file of any known format; the format is recognised by content, never by the file's
-name."""
+"""Read a record file of any known format.
+
+The format is recognised by content, never by the file's name.
+"""
 
 import math
 import os
@@ -45,8 +47,9 @@ def read_record(
     channel: int | str | None = None,
     largest: float = LARGEST_PEAK,
 ) -> Record:
-    """Read one component of ground motion from a file of any format listed in
-    docs/guide/records.md.
+    """Read one component of ground motion from a file of any known format.
+
+    The formats are listed in docs/guide/records.md.
 
     units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required where the file does not state
     them, elsewhere only checked against what the file states. dt: time step [s], for files that do
@@ -57,7 +60,8 @@ def read_record(
     InputError with one sentence that names the file and, where there is one, the line: for a
     velocity or displacement, no or another number of samples than announced, entries of the header
     or samples that are missing, unknown or no numbers, units or a step that nobody states or that
-    contradict each other."""
+    contradict each other.
+    """
     text = load_text(path, units=units, dt=dt, resample_dt=resample_dt, channel=channel)
     refuse_unread(text)
     reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)

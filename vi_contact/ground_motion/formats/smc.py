@@ -1,10 +1,12 @@
-"""Read USGS SMC files (National Strong-Motion Program), type 2 CORRECTED ACCELEROGRAM,
-accelerations in cm/s².
+"""Read USGS SMC files (National Strong-Motion Program).
+
+They are of type 2 CORRECTED ACCELEROGRAM, with accelerations in cm/s².
 
 Layout: 11 lines of text; 6 lines of 8 integers in columns of 10; 10 lines of 5 reals in columns of
 15; comment lines starting with "|"; the samples, 8 a line in columns of 10 that touch, so they are
 cut by column and not by blanks. The first integer and the first real are the marks of an undefined
-value (-32768 and 1.7E38)."""
+value (-32768 and 1.7E38).
+"""
 
 import re
 
@@ -37,8 +39,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of an SMC file; dt is needed only where the file leaves its sampling rate
-    undefined."""
+    """Return the record of an SMC file.
+
+    ``dt`` is needed only where the file leaves its sampling rate undefined.
+    """
     kind = text.heads[0].strip()
     if kind.upper().startswith("1"):
         raise InputError(

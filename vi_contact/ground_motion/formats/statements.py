@@ -1,5 +1,7 @@
-"""Find what the lines of a header say in words: units, time step, number of samples, kind of
-motion."""
+"""Find what the lines of a header say in words.
+
+They say units, time step, number of samples and kind of motion.
+"""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -126,7 +128,8 @@ def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]
     """Return the lines that state units of acceleration, and the units, as keys of UNITS.
 
     Lines about peaks and filters are left out: a peak may be given in other units than the
-    samples."""
+    samples.
+    """
     found: list[tuple[int, str]] = []
     for index in indices:
         line = text.heads[index]
@@ -147,8 +150,10 @@ def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]
 def agreed(
     text: TextFile, what: str, found: Sequence[Found], *, rounding: float = 1e-6
 ) -> Found | None:
-    """Return the first of several statements, None where there is none; InputError where they
-    contradict."""
+    """Return the first of several statements.
+
+    It is None where there is none; it raises InputError where they contradict.
+    """
     for index, value in found[1:]:
         if abs(value - found[0][1]) > rounding * abs(found[0][1]):
             raise InputError(
@@ -160,8 +165,10 @@ def agreed(
 
 
 def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int, str] | None:
-    """Return the units that all statements share, None where there are none; InputError where they
-    contradict."""
+    """Return the units that all statements share.
+
+    They are None where there are none; it raises InputError where they contradict.
+    """
     for index, units in found[1:]:
         if UNITS[units] != UNITS[found[0][1]]:
             raise InputError(
@@ -173,8 +180,10 @@ def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int,
 
 
 def unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | None:
-    """Return the line that says "units of X" or "units: X", and X, where X is no unit of
-    acceleration."""
+    """Return the line that says "units of X" or "units: X", and X.
+
+    It does so where X is no unit of acceleration.
+    """
     for index in indices:
         if match := _UNITS_OF.search(text.heads[index]):
             word = match[1].strip("()[] .:=")
@@ -188,11 +197,13 @@ def unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | N
 
 
 def refuse_other_motion(text: TextFile, indices: Sequence[int]) -> None:
-    """Raise InputError where a header says that the samples are velocities, displacements or
-    counts.
+    """Raise InputError where a header says that samples are velocities.
+
+    It does the same for displacements and for counts.
 
     The line that speaks of a history, a series, data or units decides; without one, any word of
-    motion does, and acceleration wins."""
+    motion does, and acceleration wins.
+    """
     said: dict[bool, list[tuple[int, str]]] = {True: [], False: []}
     for index in indices:
         line = _NO_MOTION.sub("", text.heads[index])

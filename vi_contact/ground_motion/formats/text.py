@@ -3,7 +3,8 @@
 What do commas mean? "0,12" is one number or two. With a decimal point anywhere in the data, with a
 blank beside a comma, or with two commas in one word, commas separate. With semicolons between the
 columns, as spreadsheets of half of Europe write them, they are decimal. Nobody can tell in any
-other case."""
+other case.
+"""
 
 import hashlib
 import math
@@ -25,8 +26,10 @@ from ..record import UNITS, Record, canonical_units
 from .gaps import refuse_fill_values
 
 NUMBER = r"[+-]?(?:(?<![\d.])\d++(?:\.\d*+)?|(?<!\d)\.\d++)(?:[EeDd][+-]?\d++)?"
-"""Regular expression of one Fortran or C number: 1, -1., .5, -.123E-02, 1.0D+3. It begins in no middle of digits, so
-that a search takes a time that grows as the line does."""
+"""Regular expression of one Fortran or C number: 1, -1., .5, -.123E-02, 1.0D+3.
+
+It begins in no middle of digits, so that a search takes a time that grows as the line does.
+"""
 
 HEAD = 1000  # characters of a line in which words of a header are looked for
 BYTES = 20 * LARGEST  # of a file: the text of the most numbers that an input may hold
@@ -46,8 +49,11 @@ Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line,
 
 @dataclass(frozen=True, kw_only=True)
 class TextFile:
-    """Hold a file as read: path as given, lines without ends, sha256 of its bytes; and what
-    ``read_record`` is told."""
+    """Hold a file as read.
+
+    There are its path as given, its lines without ends, the sha256 of its bytes; and what
+    ``read_record`` is told.
+    """
 
     path: str
     lines: tuple[str, ...]
@@ -59,8 +65,10 @@ class TextFile:
 
     @cached_property
     def heads(self) -> tuple[str, ...]:
-        """Return the beginning of every line, for patterns of headers: a line of data may be as
-        long as the file."""
+        """Return the beginning of every line, for patterns of headers.
+
+        A line of data may be as long as the file.
+        """
         return tuple(line[:HEAD] for line in self.lines)
 
     def at(self, index: int) -> str:
@@ -81,15 +89,17 @@ class TextFile:
         dt_rounding: float = SAME_STEP,
         **told: Any,
     ) -> Record:
-        """Return the record of ``scale`` times samples, with the units and time step [s] that the
-        file states.
+        """Return the record of ``scale`` times samples.
+
+        It has the units and the time step [s] that the file states.
 
         None: it does not state them. line: index of the one with the units. lines: index of the
         line of every sample, where values are looked for that stand for missing ones. counted,
         dt_from: where the number of samples and the time step come from. dt_rounding: relative
         difference to the step of the caller that is rounding. told: title, notes, format, station,
         component, doubts. Raises InputError for what the file and its caller leave open, or state
-        differently."""
+        differently.
+        """
         place = self.path if line is None else self.at(line)
         names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
         step = self.dt if dt is None else dt
@@ -134,10 +144,12 @@ class TextFile:
         )
 
     def chosen(self, components: Sequence[str]) -> int:
-        """Return which component the caller chose, from 0; InputError that lists them where none or
-        another one is.
+        """Return which component the caller chose, from 0.
 
-        channel: its number, from 1, or its name, capitals or not."""
+        It raises InputError, which lists them, where none or another one is chosen.
+
+        channel: its number, from 1, or its name, capitals or not.
+        """
         if self.channel is None and len(components) == 1:
             return 0
         wanted = self.channel
@@ -171,8 +183,10 @@ class TextFile:
             )
 
     def filled(self, start: int) -> Sequence[int]:
-        """Return the indices of the lines from `start` on that are not blank, up to a line '*** End
-        data ***'."""
+        """Return the indices of the lines from `start` on that are not blank.
+
+        They go up to a line '*** End data ***'.
+        """
         end = next(
             (
                 index
@@ -184,11 +198,13 @@ class TextFile:
         return [index for index in range(start, end) if self.lines[index].strip()]
 
     def series(self, start: int) -> tuple[list[float], list[int]]:
-        """Return all values on the lines from `start` on, row after row, and the index of the line
-        of each.
+        """Return all values on the lines from `start` on.
+
+        They come row after row, with the index of the line of each.
 
         Raises InputError where a row but the last has another length than the first, or the last
-        one is longer: a value was lost there, and those after it would be read too early."""
+        one is longer: a value was lost there, and those after it would be read too early.
+        """
         lines = self.filled(start)
         rows = list(self.rows(lines))
         self.refuse_uneven_rows(lines, rows)
@@ -199,8 +215,10 @@ class TextFile:
         ]
 
     def refuse_uneven_rows(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
-        """Raise InputError unless all rows have the length that most have; the last one may be
-        shorter."""
+        """Raise InputError unless all rows have the length that most have.
+
+        The last one may be shorter.
+        """
         lengths = [len(row) for row in rows]
         usual = max(set(lengths), key=lambda length: (lengths.count(length), length), default=0)
         for k, length in enumerate(lengths):
@@ -212,10 +230,12 @@ class TextFile:
                 )
 
     def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
-        """Raise InputError for an empty line among values that stand one a line: a value is missing
-        there.
+        """Raise InputError for an empty line among values that stand one a line.
 
-        Empty lines between all of them are line ends that were doubled."""
+        A value is missing there.
+
+        Empty lines between all of them are line ends that were doubled.
+        """
         gaps = [
             before
             for before, after in pairwise(lines)
@@ -229,9 +249,11 @@ class TextFile:
             )
 
     def refuse_misaligned(self, lines: Sequence[int]) -> None:
-        """Raise InputError for a row that is shorter than the others where nine of ten rows have
-        numbers that end at the same places: a character was lost. A longer row holds a number that
-        is too wide for its columns."""
+        """Raise InputError for a row that is shorter than others that are aligned.
+
+        Nine of ten rows then have numbers that end at the same places, and a character was lost. A
+        longer row holds a number that is too wide for its columns.
+        """
         if len(lines) < 5:
             return
         ends = [
@@ -255,12 +277,14 @@ class TextFile:
         return (self.numbers(index, decimal) for index in indices)
 
     def numbers(self, index: int, decimal_commas: bool = False) -> list[float]:
-        """Return the values on lines[index], divided by blanks, commas or semicolons, or by the
-        sign of the next.
+        """Return the values on lines[index].
+
+        They are divided by blanks, commas or semicolons, or by the sign of the next.
 
         Raises InputError naming file, line and word for anything else, "1.234.567" included: where
         two unsigned numbers touch nobody can tell where the first one ends. An empty cell between
-        two commas is refused too."""
+        two commas is refused too.
+        """
         values = []
         if _EMPTY_CELL.search(self.lines[index]):
             raise InputError(
@@ -298,12 +322,14 @@ class TextFile:
         )
 
     def fixed(self, index: int, width: int, offset: int = 0) -> list[float]:
-        """Return the values on lines[index] in columns of `width` characters from `offset` on,
-        which may touch.
+        """Return the values on lines[index] in columns of `width` characters.
+
+        They begin at `offset`, and may touch.
 
         Raises InputError naming file, line and columns for a field that is no number, or that does
         not end at the end of its columns as numbers written by column do: a character was lost or
-        added on the line."""
+        added on the line.
+        """
         line = self.lines[index].rstrip()
         values = []
         for left in range(offset, len(line), width):
@@ -319,8 +345,10 @@ class TextFile:
         return values
 
     def number(self, index: int, word: str, where: str = "") -> float:
-        """Return a finite number, also with Fortran's exponent letter D; InputError naming file,
-        line and word."""
+        """Return a finite number, also with Fortran's exponent letter D.
+
+        It raises InputError naming file, line and word.
+        """
         found = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
         if not math.isfinite(found):
             raise InputError(
@@ -330,8 +358,10 @@ class TextFile:
         return found
 
     def entry(self, header: Entries, key: str) -> tuple[int, str]:
-        """Return the line and the value of a header's key; InputError where it is missing or
-        empty."""
+        """Return the line and the value of a header's key.
+
+        It raises InputError where the key is missing or empty.
+        """
         if not header.get(key, (0, ""))[1]:
             raise InputError(f"{self.path}: the header does not give {key}; get the complete file")
         return header[key]
@@ -341,12 +371,14 @@ class TextFile:
         return self.number(*self.entry(header, key), f" of {key}")
 
     def _refuse_cut_numbers(self, indices: Sequence[int], decimal_commas: bool) -> None:
-        """Raise InputError where the end of a number was cut off, as far as the other numbers tell
-        it.
+        """Raise InputError where the end of a number was cut off.
+
+        It does so as far as the other numbers tell it.
 
         That is a number whose exponent has one digit where others have leading zeros ("1.2E-0" for
         "1.2E-02"), and a last number that has fewer decimals, or no exponent, where all the others
-        in its column have as many."""
+        in its column have as many.
+        """
         words: list[list[str]] = []
         split = _BETWEEN_DECIMALS if decimal_commas else _BETWEEN
         zeros = any(_LEADING_ZERO.search(self.lines[index]) for index in indices)
@@ -382,8 +414,10 @@ class TextFile:
             )
 
     def _decimal_commas(self, indices: Sequence[int]) -> bool:
-        """Tell whether commas in these lines are decimal, and do not separate; InputError where it
-        cannot be told."""
+        """Tell whether commas in these lines are decimal.
+
+        They then do not separate. It raises InputError where it cannot be told.
+        """
         data = [self.lines[index] for index in indices]
         inside = next(
             (
@@ -415,10 +449,12 @@ def _style(word: str) -> tuple[int, bool]:
 
 
 def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
-    """Read `path` as UTF-8 or, failing that, Latin-1, with any line ends; said: what the caller
-    says about it.
+    """Read `path` as UTF-8 or, failing that, Latin-1.
 
-    Raises InputError when the file is missing, unreadable, empty, too large or not text."""
+    Line ends may be any; ``said`` is what the caller says about it.
+
+    Raises InputError when the file is missing, unreadable, empty, too large or not text.
+    """
     name = os.fspath(path)
     if "\0" in name:
         raise InputError(f"{shown(name)}: a path cannot contain the character NUL; correct it")

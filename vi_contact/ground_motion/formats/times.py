@@ -1,5 +1,7 @@
-"""Find the time step of a column of times, which are printed with few decimals or were held in
-single precision."""
+"""Find the time step of a column of times.
+
+They are printed with few decimals or were held in single precision.
+"""
 
 import math
 from collections.abc import Sequence
@@ -17,8 +19,10 @@ COARSE = (
 
 
 def rises_evenly(times: Array, *, decimals: int | None = None) -> bool:
-    """Tell whether numbers, three or more, count up by one step, but for the rounding of their
-    digits."""
+    """Tell whether numbers, three or more, count up by one step.
+
+    The rounding of their digits is left out of account.
+    """
     if times.size < 3 or not np.all(np.diff(times) > 0.0):
         return False
     steps = np.diff(times)
@@ -36,14 +40,16 @@ def time_step(
     decimals: int | None = None,
     unit: float = 1.0,
 ) -> tuple[float, float, bool]:
-    """Return the step of times, the relative error that their rounding leaves, and whether they are
-    uneven.
+    """Return the step of times, its relative error, and whether they are uneven.
+
+    The error is the one that the rounding of the times leaves.
 
     times and the step are in s. lines: index of the line of each. decimals: of the times as they
     are printed in their unit [s]. Uneven times are allowed only where the caller wants to
     interpolate; the step is then the one to interpolate to: resample_dt, or the nearest whole part
     of it that is not longer than the usual step, so that reading does not alias. Raises InputError
-    for times that do not rise, and for uneven ones nobody asked for."""
+    for times that do not rise, and for uneven ones nobody asked for.
+    """
     steps = np.diff(times)
     usual = float(np.median(steps))
     backward = steps <= 0.0
@@ -74,8 +80,10 @@ def time_step(
 
 
 def interpolated(times: Array, samples: Array, step: float) -> Array:
-    """Return the samples on even times from the first one on, read off straight lines; the last one
-    is kept."""
+    """Return the samples on even times from the first one on.
+
+    They are read off straight lines; the last one is kept.
+    """
     last = (times[-1] - times[0]) / step
     rounding = 2.0 * float(_rounding(times, None)) / step
     count = int(last * (1.0 + 1e-12) + min(rounding, COARSE) + 1.0)
@@ -84,8 +92,10 @@ def interpolated(times: Array, samples: Array, step: float) -> Array:
 
 
 def _rounding(times: Array, decimals: int | None) -> float:
-    """Return the largest error of times that are printed to `decimals`, or were held in single
-    precision."""
+    """Return the largest error of times that are printed to `decimals`.
+
+    It is also that of times that were held in single precision.
+    """
     # held in single precision, and computed in it: a start and a multiple of the step, each rounded
     # once
     single = float(np.spacing(np.float32(np.max(np.abs(times)))))
@@ -93,10 +103,12 @@ def _rounding(times: Array, decimals: int | None) -> float:
 
 
 def _is_rounded(times: Array, rounding: float) -> bool:
-    """Tell whether times are even but for their rounding, which is too small to hide a row that was
-    lost.
+    """Tell whether times are even but for their rounding.
 
-    A lost row moves the times at least a quarter of a step from any straight line."""
+    The rounding is too small to hide a row that was lost.
+
+    A lost row moves the times at least a quarter of a step from any straight line.
+    """
     if times.size < 3:
         return False
     line = np.polynomial.Polynomial.fit(np.arange(times.size), times, 1)
@@ -106,8 +118,10 @@ def _is_rounded(times: Array, rounding: float) -> bool:
 
 
 def _roundest_step(times: Array, rounding: float) -> tuple[float, float]:
-    """Return the step with the fewest digits, or the whole sampling rate, that the rounded times
-    allow; its error."""
+    """Return the step with the fewest digits, or the whole sampling rate, and its error.
+
+    It is one that the rounded times allow.
+    """
     mean = float(times[-1] - times[0]) / (times.size - 1)
     error = 2.0 * rounding / (times.size - 1)
     rate = round(1.0 / mean)

@@ -1,5 +1,7 @@
-"""Read files of UNAM (Mexico), "ARCHIVO ESTANDAR DE ACELERACION": lines "KEY : value", then a
-column a channel, gal."""
+"""Read files of UNAM (Mexico).
+
+They are "ARCHIVO ESTANDAR DE ACELERACION": lines "KEY : value", then a column a channel, gal.
+"""
 
 import re
 
@@ -20,8 +22,10 @@ def recognises(text: TextFile) -> bool:
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one channel; channel: its number, from 1, or its direction such as
-    "N00E"."""
+    """Return the record of one channel.
+
+    ``channel`` is its number, from 1, or its direction such as "N00E".
+    """
     start = next(
         (k for k, line in enumerate(text.heads) if line.strip().upper() == "DATOS DE ACELERACION:"),
         None,
@@ -90,8 +94,10 @@ def read(text: TextFile) -> Record:
 
 
 def _entry(text: TextFile, header: dict[str, tuple[int, str]], start: str) -> tuple[int, str]:
-    """Return the line and the value of the entry whose key begins so; InputError where it is
-    missing or empty."""
+    """Return the line and the value of the entry whose key begins so.
+
+    It raises InputError where it is missing or empty.
+    """
     found = next(
         (entry for key, entry in header.items() if key.startswith(start) and entry[1]), None
     )
@@ -114,8 +120,10 @@ def _of(text: TextFile, line: int, value: str, place: int) -> float:
 def _step(
     text: TextFile, header: dict[str, tuple[int, str]], place: int, count: float
 ) -> tuple[int, float]:
-    """Return the line of the time step, and the step [s], which the sampling rate and the duration
-    must confirm."""
+    """Return the line of the time step, and the step [s].
+
+    The sampling rate and the duration must confirm it.
+    """
     line, steps = _entry(text, header, "INTERVALO DE MUESTREO, C1")
     found = [(line, _of(text, line, steps, place))]
     rate_line, rates = _entry(text, header, "VEL. DE MUESTREO, C1")

@@ -41,8 +41,10 @@ _SAC = (
 
 
 def refuse_unread(text: TextFile) -> None:
-    """Raise InputError where the first line of numbers or words is that of a format that is not
-    read."""
+    """Raise InputError where the first line is that of a format that is not read.
+
+    It is the first line of numbers or words.
+    """
     index = next((k for k, line in enumerate(text.heads) if line.strip()), 0)
     for pattern, sentence in _KNOWN:
         if pattern.search(text.heads[index]):

@@ -1,11 +1,13 @@
-"""Read uncorrected files in the layout of Volume I of Caltech: BHRC (Iran), RENADIC (Chile), USC
-and CSMIP.
+"""Read uncorrected files in the layout of Volume I of Caltech.
+
+They are those of BHRC (Iran), RENADIC (Chile), USC and CSMIP.
 
 A component has 13 lines of text, which give the number of points, the duration and "UNITS … ARE SEC
 AND G/10", then 7 lines of integers, 7 lines of reals, and the samples: pairs of time and
 acceleration in columns of 7, five pairs a line, or (BHRC) accelerations alone at equal steps in
 columns of 13, ten a line. Lines may begin with one blank for the printer. A line "/&" ends a
-component."""
+component.
+"""
 
 import re
 from collections.abc import Sequence
@@ -41,8 +43,10 @@ _INTEGERS = re.compile(r"[\s\d-]++")
 
 @dataclass(frozen=True)
 class _Part:
-    """Describe one component: lines of text, line of the first sample, and the line after the last
-    one."""
+    """Describe one component.
+
+    It has the lines of text, the line of the first sample, and the line after the last one.
+    """
 
     header: range
     data: int
@@ -51,19 +55,23 @@ class _Part:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether two of three signs of Volume I stand at the beginning: its first line, points
-    and duration, and units in seconds and g/10; and no line that announces a block of samples as in
-    later volumes."""
+    """Tell whether two of three signs of Volume I stand at the beginning.
+
+    They are its first line, points and duration, and units in seconds and g/10; and there is no
+    line that announces a block of samples as in later volumes.
+    """
     head = text.heads[:20]
     signs = [any(map(pattern.search, head)) for pattern in (_FIRST, _POINTS, _UNITS)]
     return sum(signs) >= 2 and not begins_blocks(text)
 
 
 def read(text: TextFile) -> Record:
-    """Return the record of one component; channel: 1 for the first of the file, or its name such as
-    "N00W".
+    """Return the record of one component.
 
-    Where times are uneven, as digitisers of films gave them, resample_dt is needed."""
+    ``channel`` is 1 for the first of the file, or its name such as "N00W".
+
+    Where times are uneven, as digitisers of films gave them, resample_dt is needed.
+    """
     parts = _parts(text)
     part = parts[text.chosen([part.name for part in parts])]
     line, count, seconds = _announced(text, part)
@@ -190,15 +198,19 @@ def _announced(text: TextFile, part: _Part) -> tuple[int, float, float]:
 
 
 def _width(text: TextFile, rows: Sequence[int]) -> int:
-    """Return the width of the columns: of the first row, which is full unless there is one row
-    only."""
+    """Return the width of the columns.
+
+    It is that of the first row, which is full unless there is one row only.
+    """
     row = text.lines[rows[0]].rstrip()
     return SINGLE_WIDTH if "E" in row.upper() else PAIR_WIDTH
 
 
 def _fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float], list[int]]:
-    """Return all values by column, and the index of the line of each; InputError where a row is not
-    full."""
+    """Return all values by column.
+
+    With each comes the index of its line. It raises InputError where a row is not full.
+    """
     values: list[float] = []
     lines: list[int] = []
     offset = len(text.lines[rows[0]].rstrip()) % width

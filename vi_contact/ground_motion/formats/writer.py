@@ -14,8 +14,10 @@ DIGITS = 9
 
 @checked
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time
-    step and notes."""
+    """Write time [s] and acceleration in `units`.
+
+    They stand after comment lines "#" with title, units, time step and notes.
+    """
     samples, name = _samples(record, units)
     comments = [
         record.title,
@@ -44,8 +46,10 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
 
 @checked
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and
-    units."""
+    """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads.
+
+    It needs -dt and units.
+    """
     _write(path, _samples(record, units)[0])
 
 

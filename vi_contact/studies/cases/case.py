@@ -1,12 +1,15 @@
-"""Read and run case files: a contact problem and its run in TOML, table by table the calls of the
-Python interface.
+"""Read and run case files.
+
+A case file is a contact problem and its run in TOML, table by table the calls of the Python
+interface.
 
 [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
 [material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
 [system]          fem.assemble                         [run]      the other arguments of simulate
-[[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
-[friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
-[[stage]]  what replaces these tables in stages that follow one another"""
+[[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
+[friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
+[[stage]]  what replaces these tables in stages that follow one another
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -88,7 +91,8 @@ class Case:
     path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after
     reading; nodes: the calls that its tables are; allowed: the packages whose classes it may name;
     ready: mesh and groups, when they are; stages: of [[stage]]; nodes, and what all but ``run`` and
-    ``check`` do, are those of the last one then."""
+    ``check`` do, are those of the last one then.
+    """
 
     path: Path
     tables: Mapping[str, Any]
@@ -114,8 +118,10 @@ class Case:
         return self._several("excitation", **context)
 
     def check(self) -> None:
-        """Make everything that needs no mesh, so that a wrong value or record file is told at once;
-        InputError."""
+        """Make everything that needs no mesh.
+
+        A wrong value or record file is then told at once, by InputError.
+        """
         for stage in self.stages[:-1]:
             stage.case.check()
         for table, node in self.nodes.items():
@@ -135,7 +141,9 @@ class Case:
 
     def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
         """Return the contact problem; ``parts``: those of ``parts``, when they are known.
-        Collective."""
+
+        Collective.
+        """
         return self._problem(parts or self.parts(comm))
 
     def plan(self, parts: Parts) -> StepPlan:
@@ -144,14 +152,18 @@ class Case:
         return step_plan(own["dt"], own.get("steps"), own.get("t_end"))
 
     def _timed(self, parts: Parts) -> dict[str, Any]:
-        """Return what [run] gives; without ``steps`` and ``t_end`` it lasts as long as the
-        excitation."""
+        """Return what [run] gives.
+
+        Without ``steps`` and ``t_end`` it lasts as long as the excitation.
+        """
         own: dict[str, Any] = self._made("run", system=parts.system)
         return own if "steps" in own or "t_end" in own else own | {"t_end": self._duration(parts)}
 
     def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
-        """Return the columns that a run writes into history.csv; computes no step. ``parts`` as
-        above. Collective."""
+        """Return the columns that a run writes into history.csv; computes no step.
+
+        ``parts`` as above. Collective.
+        """
         parts = parts or self.parts(comm)
         problem = self._problem(parts)
         own = self._recorders(parts)
@@ -180,13 +192,15 @@ class Case:
         wall_time: str | None = None,
         reached: Reached | None = None,
     ) -> Solution:
-        """Compute the whole run; collective. ``out``: the run folder, by default the one of [run],
-        if any.
+        """Compute the whole run; collective.
+
+        ``out``: the run folder, by default the one of [run], if any.
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight
         starts from its static equilibrium. The folder gets a copy of the case, ``case.toml``.
         Stages run one after the other, but for those that are ``reached`` already. Raises as
-        ``simulate``."""
+        ``simulate``.
+        """
         self.check()
         folder = self.out if out is None else Path(out)
         if (
@@ -231,11 +245,13 @@ class Case:
     def call(
         self, parts: Parts, folder: Path | None, state: State | None = None
     ) -> Iterator[dict[str, Any]]:
-        """Hold the run folder, with a copy of the case, and what the run gives to ``simulate``;
-        collective.
+        """Hold the run folder, with a copy of the case.
+
+        With it comes what the run gives to ``simulate``. Collective.
 
         parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it
-        is known."""
+        is known.
+        """
         if "strain_compatible" in self.nodes:
             raise InputError(
                 f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and "
@@ -342,13 +358,16 @@ class Case:
 
 
 def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
-    """Read and check a case file. ``settings`` are texts KEY=VALUE that replace values of it.
-    ``allow`` names packages that you trust: the case may name their classes as
-    "package.module:Name", which runs code of these packages.
+    """Read and check a case file.
+
+    ``settings`` are texts KEY=VALUE that replace values of it. ``allow`` names packages that you
+    trust: the case may name their classes as "package.module:Name", which runs code of these
+    packages.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a
     table, type or key that nobody knows (with the nearest known), a missing key, a value of the
-    wrong kind. Groups are looked up by ``run``."""
+    wrong kind. Groups are looked up by ``run``.
+    """
     check("read_case", "path", path, str | Path)
     path = Path(path)
     file = read_toml(path)
@@ -398,8 +417,10 @@ def _unread(case: Case) -> list[tuple[str, str]]:
 def _unread_in(
     path: Path, tables: Mapping[str, Any], allow: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return the same of a file alone; none where it is no case without the settings that complete
-    it."""
+    """Return the same of a file alone.
+
+    There are none where it is no case without the settings that complete it.
+    """
     try:
         return _unread(_read(path, tables, (), allow))
     except InputError:

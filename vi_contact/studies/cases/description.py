@@ -1,5 +1,7 @@
-"""Describe the model that a case file makes, before any step: what ``run --check`` tells and
-model.json holds."""
+"""Describe the model that a case file makes, before any step.
+
+This is what ``run --check`` tells and model.json holds.
+"""
 
 import json
 import tomllib
@@ -59,7 +61,8 @@ def describe(
     defects and warnings: sentences.
 
     parts: those of the case, when they are known; most: unknowns beyond which periods are left out.
-    The same on any number of ranks. InputError as of a run. Collective."""
+    The same on any number of ranks. InputError as of a run. Collective.
+    """
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
     space = space_of("describe", problem.system)
@@ -130,7 +133,7 @@ def in_words(model: Mapping[str, Any]) -> str:
 
 
 def _word(value: Any) -> Any:
-    """Lists and materials as texts, all else as it is."""
+    """Return lists and materials as texts, all else as it is."""
     if isinstance(value, Mapping) and "type" in value:
         value = [f"{key} {one:.4g}" for key, one in value.items() if key != "type"]
     return (
@@ -143,8 +146,10 @@ def _word(value: Any) -> Any:
 def _body(
     space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, material: Any
 ) -> dict[str, Any]:
-    """What is made of one material, by the name of its cell group, with its slowest waves and
-    longest edge."""
+    """Return what is made of one material.
+
+    It is known by the name of its cell group, and has its slowest waves and longest edge.
+    """
     names = [
         name
         for name, one in tags.items()
@@ -171,8 +176,10 @@ def _body(
 
 
 def _supports(space: Any) -> Iterator[dict[str, Any]]:
-    """Yield what holds the bodies, moves them, absorbs or lets in waves, or ties sides to each
-    other."""
+    """Yield what holds the bodies, moves them, absorbs or lets in waves.
+
+    Ties of sides to each other are among it.
+    """
     held = [
         (
             "moved" if one.moves else "clamped" if one.components is None else "held",
@@ -191,8 +198,10 @@ def _supports(space: Any) -> Iterator[dict[str, Any]]:
 def _contact(
     case: Any, problem: ContactProblem, tags: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the parts of the contact, one for each table: by its name, or by those of its
-    groups."""
+    """Yield the parts of the contact, one for each table.
+
+    Each goes by its name, or by those of its groups.
+    """
     surface, tables = problem.surface, case.nodes.get("contact", ())
     nodes = tables if isinstance(tables, tuple) else (tables,)
     grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]
@@ -223,9 +232,11 @@ def _contact(
 def _sides(
     space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array
 ) -> list[dict[str, Any]]:
-    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair, of their facets
-    that are no further from the box of the contact points than an edge; none where a table has no
-    two groups of facets."""
+    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair.
+
+    They are those of their facets that are no further from the box of the contact points than an
+    edge; there are none where a table has no two groups of facets.
+    """
     sides = [tags[name] for name in names if isinstance(tags.get(name), Facets)]
     if len(sides) != 2 or len(names) != 2 or not len(points):
         return []
@@ -244,8 +255,10 @@ def _sides(
 
 
 def _records(case: Any, system: Any) -> list[dict[str, Any]]:
-    """Return the records of the excitations, and of motions that come up through the base alone,
-    each once."""
+    """Return the records of the excitations, each once.
+
+    Those of motions that come up through the base alone are among them.
+    """
     calls = (
         one
         for one in nodes_in(case.nodes["system"])
@@ -262,8 +275,10 @@ def _records(case: Any, system: Any) -> list[dict[str, Any]]:
 
 
 def _record(motion: GroundMotion) -> dict[str, Any]:
-    """A record and the frequency [Hz] below which ENERGY of its energy is; a synthetic one is named
-    by its seed."""
+    """Return a record and the frequency [Hz] below which ENERGY of its energy is.
+
+    A synthetic one is named by its seed.
+    """
     record = motion.record
     power = np.cumsum(np.abs(np.fft.rfft(record.acceleration)) ** 2)
     highest = np.fft.rfftfreq(record.acceleration.size, record.dt)[
@@ -280,8 +295,10 @@ def _record(motion: GroundMotion) -> dict[str, Any]:
 
 
 def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
-    """Return natural periods [s] of a problem of up to ``most`` unknowns, and the damping that it
-    has. Collective."""
+    """Return natural periods [s] and the damping of a problem.
+
+    It may have up to ``most`` unknowns. Collective.
+    """
     few = problem.system.space.unknowns <= most
     found: dict[str, Any] = {}
     if few:

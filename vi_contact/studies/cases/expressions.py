@@ -1,10 +1,12 @@
-"""Read arithmetic of numbers and of x, y, z, t, which becomes a program for a stack of numbers;
-nothing is run as code.
+"""Read arithmetic of numbers and of x, y, z, t.
+
+It becomes a program for a stack of numbers; nothing is run as code.
 
 There are numbers, pi, brackets, + - * / ^, sqrt sin cos tan exp log abs step min max. A text is cut
 into these words; Python's parser, which runs nothing, then tells which belongs to which. Texts have
 at most 500 characters, brackets in each other 20 deep and exponents that are numbers up to 100, so
-that an evaluation is at most 500 products of arrays."""
+that an evaluation is at most 500 products of arrays.
+"""
 
 import ast
 import re
@@ -43,11 +45,13 @@ _OF_MORE: _Functions = {"min": np.minimum, "max": np.maximum}
 
 @dataclass(frozen=True)
 class Expression:
-    """Hold arithmetic of these variables; step(a) is 1 from a = 0 on and 0 before. InputError says
-    what is wrong.
+    """Hold arithmetic of these variables; step(a) is 1 from a = 0 on and 0 before.
+
+    InputError says what is wrong.
 
     Called with the time and values of the other variables, which may be arrays, it returns its own;
-    NaN where there is none, as of the root of a negative number."""
+    NaN where there is none, as of the root of a negative number.
+    """
 
     text: str
     variables: str = ""
@@ -77,17 +81,15 @@ class Expression:
         return frozenset(one for one in self.program if isinstance(one, str))
 
     def __call__(self, t: float = 0.0, **places: Any) -> Any:
+        """Return the value at time t [s] and these values of the other variables."""
         return _run(self.program, {"t": t, **places})
 
     def _program(self, node: Any, depth: int) -> Iterator[Any]:
+        """Yield numbers, variables and functions in the order in which they are worked off."""
         if depth > DEPTH:
             raise InputError(f"brackets, signs or powers in it are nested more than {DEPTH} deep")
         name = getattr(getattr(node, "func", node), "id", "")
-        if (
-            isinstance(node, ast.Constant)
-            and isinstance(node.value, int | float)
-            and not isinstance(node.value, bool)
-        ):
+        if _is_number(node):
             yield float(str(node.value))  # of a whole number with too many digits: infinite
         elif isinstance(node, ast.Name) and name == "pi":
             yield np.pi
@@ -97,29 +99,46 @@ class Expression:
             yield from self._program(node.operand, depth + 1)
             yield from [(np.negative, 1)] if isinstance(node.op, ast.USub) else []
         elif isinstance(node, ast.BinOp):
-            chain = isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
-            yield from self._program(node.left, depth + (not chain))
-            right = list(self._program(node.right, depth + 1))
-            if isinstance(node.op, ast.Pow):
-                if any(isinstance(one, str) for one in right):
-                    raise InputError("an exponent has a variable: write a^x as exp(x*log(a))")
-                if not abs(_run(right, {})) <= POWER:
-                    raise InputError(f"an exponent is larger than {POWER}")
-            yield from (*right, (_OF_TWO[type(node.op).__name__], 2))
+            yield from self._program_of_two(node, depth)
         elif isinstance(node, ast.Call) and (
             name in _OF_MORE if len(node.args) > 1 else node.args and name in _OF_ONE
         ):
-            yield from self._program(node.args[0], depth + 1)
-            for one in node.args[1:]:
-                yield from self._program(one, depth + 1)
-                yield _OF_MORE[name], 2
-            yield from [(_OF_ONE[name], 1)] if name in _OF_ONE else []
+            yield from self._program_of_call(node, name, depth)
         else:
             there = "".join(f", {one}" for one in self.variables)
             raise InputError(
                 f"'{name or ast.unparse(node)[:20]}' in it is not a number{there}, pi or one of "
                 f"{', '.join((*_OF_ONE, *_OF_MORE))} with its values in brackets"
             )
+
+    def _program_of_two(self, node: ast.BinOp, depth: int) -> Iterator[Any]:
+        """Yield the program of an operation with two operands."""
+        chain = isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
+        yield from self._program(node.left, depth + (not chain))
+        right = list(self._program(node.right, depth + 1))
+        if isinstance(node.op, ast.Pow):
+            if any(isinstance(one, str) for one in right):
+                raise InputError("an exponent has a variable: write a^x as exp(x*log(a))")
+            if not abs(_run(right, {})) <= POWER:
+                raise InputError(f"an exponent is larger than {POWER}")
+        yield from (*right, (_OF_TWO[type(node.op).__name__], 2))
+
+    def _program_of_call(self, node: ast.Call, name: str, depth: int) -> Iterator[Any]:
+        """Yield the program of the call of a function."""
+        yield from self._program(node.args[0], depth + 1)
+        for one in node.args[1:]:
+            yield from self._program(one, depth + 1)
+            yield _OF_MORE[name], 2
+        yield from [(_OF_ONE[name], 1)] if name in _OF_ONE else []
+
+
+def _is_number(node: ast.AST) -> bool:
+    """Tell whether a node of the syntax tree is a number."""
+    return (
+        isinstance(node, ast.Constant)
+        and isinstance(node.value, int | float)
+        and not isinstance(node.value, bool)
+    )
 
 
 @dataclass(frozen=True)
@@ -133,6 +152,7 @@ class Places:
     of: Expression | tuple[Expression, ...]
 
     def __call__(self, points: Array, t: float = 0.0) -> Array:
+        """Return the values (k,) or (k, n) at points (k, d) [m] and time t [s]."""
         check_axes(self, points.shape[1], "the expression")
         places = dict(zip("xyz", points.T, strict=False))
         if isinstance(self.of, tuple):
@@ -143,8 +163,10 @@ class Places:
 
 
 def check_axes(node: Any, d: int, source: str) -> None:
-    """Raise InputError where what a case holds is an expression, or some, of a coordinate beyond d
-    dimensions."""
+    """Raise InputError where an expression has a coordinate beyond d dimensions.
+
+    What a case holds may be one expression or several.
+    """
     of = node.of if isinstance(node, Places) else node
     for one in of if isinstance(of, tuple) else (of,):
         if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):

@@ -1,5 +1,7 @@
-"""Find the case files that ship with the package, and keep in a run folder the copy of the case
-that made it."""
+"""Find the case files that ship with the package.
+
+Keep in a run folder the copy of the case that made it.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -33,9 +35,11 @@ def starters() -> list[str]:
 
 
 def copy_starter(name: str, folder: Path) -> list[Path]:
-    """Copy the files of a case to begin with into a folder, made if need be, and return them;
-    InputError for a name that nobody knows, and for files that are there: they may have been
-    changed."""
+    """Copy the files of a case to begin with into a folder, and return them.
+
+    The folder is made if need be. It raises InputError for a name that nobody knows, and for files
+    that are there: they may have been changed.
+    """
     if name not in starters():
         raise InputError(f"there is no starter case {shown(name)}: {nearest(name, starters())}")
     copies = {
@@ -55,8 +59,10 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
 
 
 def located(case: str) -> Path:
-    """Return the file of a case: what ends in ".toml" is a file, all else the name of one that
-    ships."""
+    """Return the file of a case.
+
+    What ends in ".toml" is a file, all else the name of one that ships.
+    """
     if case.endswith(".toml"):
         return Path(case)
     if case not in builtin_cases():
@@ -80,22 +86,27 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
 
 
 def base_folder(path: Path) -> Path:
-    """Return the folder to which relative paths of a case belong: its own, where one is for those
-    that ship, of a copy in a run folder that of the case it was made from."""
+    """Return the folder to which relative paths of a case belong.
+
+    It is its own, where one is for those that ship, of a copy in a run folder that of the case it
+    was made from.
+    """
     own = Path() if path.parent == FOLDER else path.parent
     told = _marked(path.read_bytes(), _FROM) if path.name == COPY else []
     return Path(told[0]) if told else own
 
 
 def _marked(data: bytes, mark: str) -> list[str]:
-    """What follows a mark at the beginnings of lines."""
+    """Return what follows a mark at the beginnings of lines."""
     lines = data.decode("utf-8", "surrogateescape").splitlines()
     return [line.removeprefix(mark) for line in lines if line.startswith(mark)]
 
 
 def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> None:
     """Write a copy of the case file into the run folder, with the settings as comments.
-    Collective."""
+
+    Collective.
+    """
     made = "".join(f"{_SET}{' '.join(setting.split(chr(10)))}\n" for setting in settings)
     made += f"{_FROM}{base_folder(path).resolve()}\n"
 
@@ -110,8 +121,10 @@ def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> 
 
 
 def refuse_case_of_others(path: Path, folder: Path) -> None:
-    """Raise InputError for a case file in a run folder that no run has written, and that this run
-    would replace."""
+    """Raise InputError for a case file in a run folder.
+
+    No run has written it, and this run would replace it.
+    """
     if (
         is_own(folder / COPY)
         and not _is_the_copy(path, folder)
@@ -130,8 +143,10 @@ def _is_the_copy(path: Path, folder: Path) -> bool:
 
 
 def read_copy(folder: Path) -> dict[str, Any]:
-    """Return the tables of the case that made a run folder, settings included; empty where no case
-    file did."""
+    """Return the tables of the case that made a run folder.
+
+    Settings are included; it is empty where no case file made the folder.
+    """
     path = folder / COPY
     if not is_own(path):
         return {}

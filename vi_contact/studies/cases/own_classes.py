@@ -1,5 +1,6 @@
-"""Find the classes of others that a case file names as "package.module:Name", and ask whether they
-fit.
+"""Find the classes of others that a case file names as "package.module:Name".
+
+Ask too whether they fit.
 
 Importing a module runs it, and a case file may come from anybody: alone it imports nothing. Whoever
 starts the run names the packages (``--allow PACKAGE``, ``read_case(path, allow=("package",))``), or
@@ -8,7 +9,8 @@ package or lies below one, by whole names: "pack" allows "pack.sub", not "packet
 defined in one, too: "pack.tools:Popen" would start programs wherever pack.tools uses
 ``subprocess``. And it has all methods of the protocol that the table asks for. Python searches its
 own path without the folder of the case file, whose author could have put a module of a trusted name
-there."""
+there.
+"""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -39,8 +41,10 @@ def packages(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spot) -> Callee:
-    """Return how to call the class "package.module:Name"; InputError unless it is allowed and of
-    one of the kinds."""
+    """Return how to call the class "package.module:Name".
+
+    It raises InputError unless it is allowed and of one of the kinds.
+    """
     found = _CLASS.fullmatch(text)
     if found is None:
         raise spot.inside(
@@ -106,8 +110,10 @@ def _line(error: BaseException) -> str:
 
 
 def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
-    """Return the call, which looks up what only objects show, and tells errors of the
-    constructor."""
+    """Return the call, which looks up what only objects show.
+
+    It tells errors of the constructor.
+    """
 
     def made(**given: Any) -> Any:
         try:
@@ -139,8 +145,10 @@ def is_protocol(kind: Any) -> bool:
 
 
 def defect(cls: type, kind: Any) -> str:
-    """Return what a class lacks to be of this kind, "has no method …"; empty when it lacks
-    nothing."""
+    """Return what a class lacks to be of this kind, "has no method …".
+
+    It is empty when it lacks nothing.
+    """
     if not is_protocol(kind):
         return "" if issubclass(cls, kind) else f"is no {kind.__name__}"
     methods = dict(_asked(kind, isfunction))
@@ -154,8 +162,10 @@ def defect(cls: type, kind: Any) -> str:
 
 
 def lacks(value: object, kind: Any) -> str:
-    """Return the attributes of a protocol that an object of a fitting class lacks, "has no …";
-    empty when none."""
+    """Return the attributes of a protocol that an object of a fitting class lacks.
+
+    It reads "has no …", and is empty when it lacks none.
+    """
     missing = [
         name
         for name, _ in _asked(kind, lambda one: isinstance(one, property))

@@ -24,7 +24,8 @@ class Words:
     choices: of every type that tables can make, by the word after ``type``; default: where it may
     be left out; groups: types that are named groups of the mesh; short: the one key that a plain
     text stands for; allowed: the packages whose classes may be named; named: nodes by type and
-    name; by "contact" the groups of contact tables."""
+    name; by "contact" the groups of contact tables.
+    """
 
     folder: Path
     choices: Mapping[Any, Mapping[str, Callee]]
@@ -36,8 +37,10 @@ class Words:
 
 
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
-    """Return the node of a value for a parameter with this hint. InputError when it does not
-    fit."""
+    """Return the node of a value for a parameter with this hint.
+
+    InputError when it does not fit.
+    """
     members = members_of(hint)
     if any(
         is_path(member) for member in members
@@ -108,8 +111,11 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
         return float(value)
     if isinstance(value, int) and member is int:
         return value
-    if not isinstance(value, str):
-        return None
+    return _read_text(value, member, spot, words) if isinstance(value, str) else None
+
+
+def _read_text(value: str, member: Any, spot: Spot, words: Words) -> Node | None:
+    """Return the node of a text, or None where it is nothing of this type."""
     if member in words.groups:
         return Group(value, member, spot)
     if member in words.named:
@@ -189,8 +195,10 @@ def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) 
 def _chosen(
     word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot: Spot, words: Words
 ) -> Callee:
-    """Return what the ``type`` of a table calls: one of the choices, or a class of others of these
-    kinds."""
+    """Return what the ``type`` of a table calls.
+
+    It is one of the choices, or a class of others of these kinds.
+    """
     if isinstance(word, str) and ":" in word:
         return own_class(word, kinds, words.allowed, spot)
     if word is None:
@@ -201,8 +209,10 @@ def _chosen(
 
 
 def choices_of(member: Any, words: Words) -> Mapping[str, Callee]:
-    """Return what a table may make for this type: as listed, or an object of the value class
-    itself."""
+    """Return what a table may make for this type.
+
+    It is as listed, or an object of the value class itself.
+    """
     if member in words.choices:
         return words.choices[member]
     if isinstance(member, type) and is_dataclass(member) and member not in words.groups:
@@ -222,36 +232,43 @@ _EXPECTED = {float: "a number", int: "a whole number", bool: "true or false", st
 
 def _expected(members: Sequence[Any], words: Words) -> str:
     """Return what would fit."""
-    found = []
-    for member in members:
-        if member in _EXPECTED:
-            found.append(_EXPECTED[member])
-        elif member in words.groups:
-            found.append(f"the name of {GROUP[member.__name__]}")
-        elif is_path(member):
-            found.append("the path of a file")
-        elif choices_of(member, words):
-            found.append(f"a table with type = one of {', '.join(choices_of(member, words))}")
-            if words.named.get(member):
-                found.append(f"one of the names {', '.join(words.named[member])}")
-        elif is_list(member):
-            inner = [one for one in get_args(member) if one is not Ellipsis]
-            found.append(
-                f"a list of {_expected(inner[:1], words).removeprefix('a ')}s"
-                if _EXPECTED.get(inner[0])
-                else "a list"
-            )
-        elif get_origin(member) in (Mapping, dict):
-            found.append("a table of names")
-        elif member in (FIELD, HISTORY, Expression):
-            vector = "expressions of x, y, z, t, one per dimension"
-            found.append(
-                "an expression of t"
-                if member == HISTORY
-                else "an expression"
-                if float in members
-                else vector
-            )
+    found = [one for member in members for one in _describe(member, members, words)]
     if not found or any(get_origin(member) is Callable or member is Callable for member in members):
         found.append("a function, which only the Python interface takes")
     return " or ".join(dict.fromkeys(found))
+
+
+def _describe(member: Any, members: Sequence[Any], words: Words) -> list[str]:
+    """Return what would fit one type of these."""
+    if member in _EXPECTED:
+        return [_EXPECTED[member]]
+    if member in words.groups:
+        return [f"the name of {GROUP[member.__name__]}"]
+    if is_path(member):
+        return ["the path of a file"]
+    if choices := choices_of(member, words):
+        table = f"a table with type = one of {', '.join(choices)}"
+        named = words.named.get(member)
+        return [table, f"one of the names {', '.join(named)}"] if named else [table]
+    if is_list(member):
+        return [_describe_list(member, words)]
+    if get_origin(member) in (Mapping, dict):
+        return ["a table of names"]
+    if member in (FIELD, HISTORY, Expression):
+        return [_describe_expression(member, members)]
+    return []
+
+
+def _describe_list(member: Any, words: Words) -> str:
+    """Return the kind of list, with that of its entries where they are numbers or texts."""
+    inner = [one for one in get_args(member) if one is not Ellipsis]
+    if not _EXPECTED.get(inner[0]):
+        return "a list"
+    return f"a list of {_expected(inner[:1], words).removeprefix('a ')}s"
+
+
+def _describe_expression(member: Any, members: Sequence[Any]) -> str:
+    """Return of what an expression may be."""
+    if member == HISTORY:
+        return "an expression of t"
+    return "an expression" if float in members else "expressions of x, y, z, t, one per dimension"

@@ -1,7 +1,8 @@
 """Read texts where numbers or functions are asked for: "30 MPa", "2*9.81", "9810*max(0, 35 - y)".
 
 A unit is a product of powers, as "kN/m3", "kg/m^3", "Pa*s", "1/s"; its dimension must be that of
-the key, whose unit one table here tells."""
+the key, whose unit one table here tells.
+"""
 
 import math
 import re
@@ -42,11 +43,13 @@ def unit_of(name: str, key: str) -> str | None:
 
 
 def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
-    """Return the number or function that a text stands for; None where a key of these types takes
-    neither.
+    """Return the number or function that a text stands for.
+
+    It is None where a key of these types takes neither.
 
     InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not
-    finite or whole."""
+    finite or whole.
+    """
     one_value = float in members or not any(
         get_origin(member) in (tuple, list, Sequence) for member in members
     )
@@ -66,8 +69,10 @@ def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
 
 
 def list_node(values: list[Any], members: Sequence[Any], spot: Spot) -> Places | None:
-    """Return the vector field that a list stands for; None where none is asked for or nothing in it
-    has variables."""
+    """Return the vector field that a list stands for.
+
+    It is None where none is asked for or nothing in it has variables.
+    """
     letters = (
         "xyzt"
         if FIELD in members
@@ -89,8 +94,10 @@ def list_node(values: list[Any], members: Sequence[Any], spot: Spot) -> Places |
 
 
 def _expression(text: str, letters: str, spot: Spot) -> Expression:
-    """Return the arithmetic of a text, or the number with a unit that it is, in the unit of the
-    key."""
+    """Return the arithmetic of a text, or the number with a unit that it is.
+
+    The number is in the unit of the key.
+    """
     found = _VALUE.fullmatch(text.rstrip()) if len(text) <= LENGTH else None
     try:
         if found is None or found[2] in tuple(letters):
@@ -113,8 +120,10 @@ def _expression(text: str, letters: str, spot: Spot) -> Expression:
 
 
 def _unit(text: str) -> tuple[float, Dimension]:
-    """Return the factor to SI units and the dimension of a product; after a "/" all divides up to
-    the next "*"."""
+    """Return the factor to SI units and the dimension of a product.
+
+    After a "/" all divides up to the next "*".
+    """
     size, place, below = 1.0, 0, False
     total: Dimension = (0, 0, 0, 0)
     while place < len(text):

@@ -1,5 +1,7 @@
-"""Turn the short options of ``vi-contact run`` into settings KEY=VALUE of a case; refuse those it
-has no use for."""
+"""Turn the short options of ``vi-contact run`` into settings KEY=VALUE of a case.
+
+Those it has no use for are refused.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,9 +33,11 @@ IMPULSIVE = (
 
 @dataclass(frozen=True)
 class ShortOptions:
-    """Hold what people change most. motion: record files joined by commas, the first one
-    horizontal, the last one of two vertical; scale: a factor on what shakes; solver, scheme: names
-    of case files; None: as the case says."""
+    """Hold what people change most.
+
+    motion: record files joined by commas, the first one horizontal, the last one of two vertical;
+    scale: a factor on what shakes; solver, scheme: names of case files; None: as the case says.
+    """
 
     motion: str | None = None
     scale: float | None = None
@@ -44,10 +48,12 @@ class ShortOptions:
     cross_check: bool = False
 
     def settings(self, tables: Mapping[str, Any], given: Sequence[str] = ()) -> list[str]:
-        """Return all settings of a case: those that replace, then those ``given``, then those that
-        change the result.
+        """Return all settings of a case.
 
-        InputError for an option that the case has no use for."""
+        They are those that replace, then those ``given``, then those that change the result.
+
+        InputError for an option that the case has no use for.
+        """
         first = [*self._motion(tables), *self._step(), *self._methods(tables)]
         after = with_settings(dict(tables), [*first, *given])
         last = [*self._scale(after), *self._cross_check(after)]
@@ -100,8 +106,10 @@ class ShortOptions:
         return found if self.steps is None else [*found, f"run.steps={self.steps}", "run.t_end="]
 
     def _methods(self, tables: Mapping[str, Any]) -> list[str]:
-        """Replace scheme and solver; schemes that need no impact law run without the one of the
-        case."""
+        """Replace scheme and solver.
+
+        Schemes that need no impact law run without the one of the case.
+        """
         if self.scheme is None and self.solver is None:
             return []
         from ...core.step import Scheme
@@ -154,8 +162,10 @@ class ShortOptions:
         return found
 
     def _cross_check(self, tables: Mapping[str, Any]) -> list[str]:
-        """Let the other route accompany every step: the one to which the case escalates first, or
-        the condensed one."""
+        """Let the other route accompany every step.
+
+        It is the one to which the case escalates first, or the condensed one.
+        """
         if not self.cross_check:
             return []
         solver = tables.get("solver", {"type": "Condensed"})
@@ -176,8 +186,10 @@ def _tables(value: Any) -> list[dict[str, Any]]:
 
 
 def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
-    """Return the table of one of the keys, or of a method's own, as TOML; a class of others has a
-    colon."""
+    """Return the table of one of the keys, or of a method's own, as TOML.
+
+    A class of others has a colon.
+    """
     for owner, names in methods.items():
         if name in names:
             return toml_value({"type": owner, "method": {"type": name}})

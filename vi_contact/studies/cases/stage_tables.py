@@ -1,5 +1,7 @@
-"""Read [[stage]] tables: what each stage replaces in the tables of the case, single keys of
-[system] and [run]."""
+"""Read [[stage]] tables.
+
+They say what each stage replaces in the tables of the case, and single keys of [system] and [run].
+"""
 
 import re
 from collections.abc import Mapping
@@ -40,11 +42,13 @@ _NAME = re.compile(r"\w{1,40}", re.ASCII)
 
 @dataclass(frozen=True)
 class Stage:
-    """Hold what a stage is: its tables, with those of the case, and the ``Case`` that is made of
-    them.
+    """Hold what a stage is.
+
+    It has its tables, with those of the case, and the ``Case`` that is made of them.
 
     label: how sentences name it; release: reactions of supports that it does without go on as
-    forces."""
+    forces.
+    """
 
     label: str
     name: str
@@ -125,8 +129,10 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
 
 
 def refuse_own(tables: Mapping[str, Any], key: str, asked: str) -> None:
-    """Raise InputError where something asks for another table of the case, and the last stage has
-    one of its own."""
+    """Raise InputError where something asks for another table of the case.
+
+    That is where the last stage has one of its own.
+    """
     stages = tables.get("stage")
     table = key.partition(".")[0].partition("=")[0]
     if isinstance(stages, list) and stages and isinstance(stages[-1], dict) and table in stages[-1]:

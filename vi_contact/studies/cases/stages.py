@@ -6,7 +6,8 @@ and the points where friction has brought the body, and the reactions of release
 forces. Every stage begins at t = 0 with its own excitations. Each has a run folder,
 DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row. FOLLOWS in it has
 the checksums of what the stages before it left, so that a restart finds out which stages still
-follow from one another."""
+follow from one another.
+"""
 
 import os
 from dataclasses import dataclass, replace
@@ -44,9 +45,11 @@ from .vocabulary import Parts
 
 @dataclass(frozen=True)
 class Reached:
-    """Hold what so many stages leave: mesh and groups, problem and state of the last one, which is
-    at rest or not, the force of all supports released so far [N], and the problems of the stages
-    before it."""
+    """Hold what so many stages leave.
+
+    They leave mesh and groups, problem and state of the last one, which is at rest or not, the
+    force of all supports released so far [N], and the problems of the stages before it.
+    """
 
     number: int
     meshed: tuple[Any, Any]
@@ -58,9 +61,11 @@ class Reached:
 
 
 def leading(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
-    """Return what runs of a case share that differ in their excitations: (what the static stages
-    leave that come before all others but the last; parts of the next stage; its first state, None
-    to be found). Collective."""
+    """Return what runs of a case share that differ in their excitations.
+
+    It is (what the static stages leave that come before all others but the last; parts of the next
+    stage; its first state, None to be found). Collective.
+    """
     if not case.stages:
         return None, case.parts(comm), None
     reached = Reached(0, case.meshed(comm))
@@ -81,7 +86,9 @@ def run_stages(
     **options: Any,
 ) -> Solution:
     """Run those stages of a case that are not reached yet; the solution of the last one.
-    Collective."""
+
+    Collective.
+    """
     ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
     inner = [
         Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)
@@ -108,8 +115,11 @@ def run_stages(
 
 
 def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
-    """Clear the folders of a new run, and remove the runs in those of stages that are none any
-    more; to ``keep``, refuse these. Folders and files that no run has made are left alone."""
+    """Clear the folders of a new run.
+
+    Runs in the folders of stages that are none any more are removed; with ``keep``, they are
+    refused. Folders and files that no run has made are left alone.
+    """
     place = inner_folder(out, STAGES)
     names = sorted(os.listdir(place)) if place.is_dir() else []
     found = [Path(STAGES) / name for name in names if name[0].isdecimal() and "_" in name]
@@ -127,8 +137,10 @@ def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
 
 
 def _follows(folder: Path | None, before: str) -> bool:
-    """Return whether there is a checkpoint to continue from, of a stage that began where those
-    before it now end."""
+    """Return whether there is a checkpoint to continue from.
+
+    Its stage has to have begun where those before it now end.
+    """
     if folder is None or not is_own(folder / CHECKPOINT):
         return False
     return not before or is_own(folder / FOLLOWS) and read_text(folder / FOLLOWS) == before
@@ -164,8 +176,11 @@ def _made(
 
 
 def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, State | None]:
-    """(reached, with the force of all released supports; parts that begin where the stages before
-    have left the body; its first state, None to be found)."""
+    """Return (reached, parts, first state) of a stage.
+
+    ``reached`` has the force of all released supports; the parts begin where the stages before have
+    left the body; the first state is None if it has to be found.
+    """
     before, state = reached.problem, reached.state
     parts: Parts = replace(stage.case, ready=reached.meshed).parts(comm)
     parts = replace(parts, weighted=True, moved=True) if stage.static else parts

@@ -1,12 +1,14 @@
-"""Run a case until its soil is strain-compatible: [strain_compatible] has the arguments of
-``soil.strain_compatible``.
+"""Run a case until its soil is strain-compatible.
+
+The table [strain_compatible] has the arguments of ``soil.strain_compatible``.
 
     [strain_compatible]
     curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
 
 Every run is a whole one, in DIR, all stages with the same soil; those before the last one, or all
 where none ends it, are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest
-relative change of G or xi after each."""
+relative change of G or xi after each.
+"""
 
 import os
 from dataclasses import replace
@@ -98,18 +100,22 @@ def iterate(
 
 
 def with_known_damping(system: Call) -> Call:
-    """Return the call of [system] without its damping where no material has a ratio: curves give
-    them, run by run."""
+    """Return the call of [system] without its damping if ratios are unknown.
+
+    That is where no material has a ratio, as curves give them, run by run.
+    """
     ratios = [one for one in nodes_in(system) if isinstance(one, Call) and one.arguments.get("xi")]
     known = {name: node for name, node in system.arguments.items() if name != "damping" or ratios}
     return replace(system, arguments=known)
 
 
 def _set_aside(folder: Path, number: int) -> None:
-    """Move the run in this folder into one inside of it; before the first run, remove runs of an
-    earlier time there.
+    """Move the run in this folder into one inside of it.
 
-    Files of others stay where they are."""
+    Before the first run, runs of an earlier time there are removed.
+
+    Files of others stay where they are.
+    """
     if number == 0:
         _remove_earlier(inner_folder(folder, PLACE))
     else:

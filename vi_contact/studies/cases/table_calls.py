@@ -1,5 +1,6 @@
-"""Take a table as a call: read it against the signature of the function it names, before anything
-is computed.
+"""Take a table as a call.
+
+It is read against the signature of the function it names, before anything is computed.
 
     [friction]
     type = "Coulomb"       Coulomb(mu=0.3)
@@ -8,7 +9,8 @@ is computed.
 ``read`` turns a value of the file into a node by the type hint of the parameter it is for, and
 refuses what does not fit in one sentence with file, table and key. ``build(node, context)`` makes
 the calls; the context supplies what no file holds: communicator, mesh, its groups, system;
-excitations for what must know them. Nothing of the file is ever evaluated as code."""
+excitations for what must know them. Nothing of the file is ever evaluated as code.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
@@ -66,6 +68,7 @@ class Group:
     alias: str = ""
 
     def build(self, context: Context) -> Any:
+        """Return the group of the mesh."""
         try:
             found = context["tags"][self.name]
         except InputError as error:
@@ -77,8 +80,10 @@ class Group:
         return replace(context["tags"][self.name], name=self.alias) if self.alias else found
 
     def _remedy(self, found: Any) -> str:
-        """Give the other kind; or, where a boundary was saved without the body it bounds, save the
-        body too."""
+        """Give the other kind.
+
+        Where a boundary was saved without the body it bounds, the remedy is to save the body too.
+        """
         way = f"give the name of {GROUP[self.kind.__name__]}"
         dim = found.mesh.topology.dim
         if self.kind.__name__ == "Cells" or dim > 2:
@@ -95,8 +100,10 @@ GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
 
 @dataclass(frozen=True)
 class Callee:
-    """Describe a function that tables may call: hints of its parameters, which it needs, which are
-    supplied."""
+    """Describe a function that tables may call.
+
+    It has the hints of its parameters, those it needs, and those that are supplied.
+    """
 
     name: str
     function: Callable[..., Any]
@@ -112,8 +119,10 @@ def callee(
     only: Sequence[str] = (),
     given: Sequence[str] = GIVEN,
 ) -> Callee:
-    """Return how to call a function or class; ``only``: what a file may give; parameters ``given``
-    are supplied."""
+    """Return how to call a function or class.
+
+    ``only`` is what a file may give; parameters ``given`` are supplied.
+    """
     plain_class = isinstance(function, type) and not is_dataclass(function)
     hints = get_type_hints(function.__init__ if plain_class else function)  # type: ignore[misc]
     found = signature(function).parameters
@@ -141,6 +150,7 @@ class Call:
     spot: Spot = field(compare=False)
 
     def build(self, context: Context) -> Any:
+        """Return what the call makes."""
         lacking = [name for name in self.callee.given if name not in context]
         if lacking:
             raise self.spot.inside(

@@ -1,5 +1,7 @@
-"""Read TOML files, and set single values of what was read; every mistake is one sentence with the
-file."""
+"""Read TOML files, and set single values of what was read.
+
+Every mistake is one sentence with the file.
+"""
 
 import json
 import math
@@ -21,8 +23,10 @@ _CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEPTH}}}")  # a key of many parts
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """Return the tables of a file. InputError with file, line and reason when it cannot be read or
-    is no TOML."""
+    """Return the tables of a file.
+
+    InputError with file, line and reason when it cannot be read or is no TOML.
+    """
     try:
         with open(path, "rb") as file:
             data = file.read(BYTES + 1)
@@ -54,7 +58,8 @@ def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
     """Return the tables; InputError naming the key for what no table of a case can hold.
 
     These are NaN, whole numbers beyond 64 bits, the character NUL, and tables in tables in tables
-    without end."""
+    without end.
+    """
     left: list[tuple[str, Any, int]] = [("", tables, 0)]
     while left:
         key, value, depth = left.pop()
@@ -91,8 +96,9 @@ def _defect(value: Any, depth: int) -> str:
 
 
 def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
-    """Return a copy of the tables with KEY=VALUE settings made; what is missing on the way to a key
-    is added.
+    """Return a copy of the tables with KEY=VALUE settings made.
+
+    What is missing on the way to a key is added.
 
     KEY: names joined by dots; entries of lists are counted from 1 ("excitation.1.scale"). VALUE: as
     in TOML; what is no TOML is text; none takes the key away. InputError for a setting without "=",
@@ -123,8 +129,10 @@ def _value(text: str) -> Any:
 
 
 def _value_error(error: ValueError) -> str:
-    """What Python says of a value that is TOML; of a number of more digits than it reads, what
-    helps."""
+    """Return what Python says of a value that is TOML.
+
+    For a number of more digits than it reads, it says what helps.
+    """
     return (
         _TOO_LONG
         if "digits" in str(error)

@@ -1,10 +1,13 @@
-"""Refuse choices of a case that nothing reads: a law without what it acts on, a material of no
-cells, a table that every stage replaces.
+"""Refuse choices of a case that nothing reads.
+
+Such are a law without what it acts on, a material of no cells, or a table that every stage
+replaces.
 
 A choice in vain is a misunderstanding: the author believes in a model that is not the one computed.
 Each finding is a sentence with the table, what makes the choice vain, and the remedy. What
 ``--set`` and short options make vain is let be, as ``--set contact=`` does with the impact law of a
-file: this was asked for, and the file is in order."""
+file: this was asked for, and the file is in order.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +39,8 @@ Finding = tuple[str, str]  # the key that is in vain, and the sentence
 class Part:
     """Hold a stage, or the whole of a case without stages.
 
-    label: how sentences begin; tables and nodes: its tables, and the calls that they are."""
+    label: how sentences begin; tables and nodes: its tables, and the calls that they are.
+    """
 
     label: str
     tables: Mapping[str, Any]
@@ -60,7 +64,8 @@ def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> It
     """Yield all choices without effect.
 
     tables: of the file, with its stages; parts: the stages in their order, or the one whole
-    case."""
+    case.
+    """
     yield from _materials(path, tables, parts)
     for part in parts:
         yield from _ratios(part)
@@ -79,7 +84,8 @@ def left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
     """Yield a sentence for each table that waits for a motion in a case of static stages.
 
     These are no mistake, as one looks at the weight alone before the motion is added: they are
-    told."""
+    told.
+    """
     stages = tables.get("stage", ())
     if stages and all(one.get("type") == "static" for one in stages):
         for key in (one for one in OF_MOTION if one in tables):
@@ -91,7 +97,8 @@ def refuse_unread(
 ) -> None:
     """Raise InputError with the first finding that settings of other tables have not made.
 
-    before: findings in the file without its settings; none where the file alone is no case."""
+    before: findings in the file without its settings; none where the file alone is no case.
+    """
     already = {key for key, _ in before}
     asked = {setting.partition("=")[0].strip().partition(".")[0] for setting in settings}
     for key, sentence in found:
@@ -100,8 +107,10 @@ def refuse_unread(
 
 
 def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
-    """Yield materials that no stage's [system] names, for cells or for what is behind a
-    boundary."""
+    """Yield materials that no stage's [system] names.
+
+    They are for cells or for what is behind a boundary.
+    """
     named = tables.get("material")
     for name in named if isinstance(named, Mapping) else ():
         users = [
@@ -150,8 +159,10 @@ def _ratios(part: Part) -> Iterator[Finding]:
 
 
 def _without_contact(part: Part) -> Iterator[Finding]:
-    """Yield laws of contact where there is none, or none that they act on, or another before
-    them."""
+    """Yield laws of contact where there is none.
+
+    It yields them too where there is none that they act on, or another before them.
+    """
     surfaces = part.calls("contact")
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
@@ -217,8 +228,10 @@ def _of_solvers(part: Part) -> Iterator[Finding]:
 
 
 def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -> Iterator[Finding]:
-    """Yield keys of the condensed solver without effect; ``rubs``: the law of friction, or
-    empty."""
+    """Yield keys of the condensed solver without effect.
+
+    ``rubs`` is the law of friction, or empty.
+    """
     if rubs and "method" in keys:
         yield (
             table,

@@ -2,7 +2,8 @@
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the
 kind that is asked for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What
-takes functions has no word, or one of a function here that takes none."""
+takes functions has no word, or one of a function here that takes none.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -123,8 +124,12 @@ def surface(
     hinges: bool = False,
     name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in
-    corners; hinges: of bodies that share nodes; name: of it as ``part`` of recorders."""
+    """Make a ``contact_surface``.
+
+    ``held`` makes it bilateral everywhere; it rests on ``springs``; there is no friction in
+    corners; ``hinges`` are those of bodies that share nodes; ``name`` is that of it as ``part`` of
+    recorders.
+    """
     found = fem.contact_surface(
         system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle, hinges=hinges
     )
@@ -167,8 +172,10 @@ def weight(
     direction: tuple[float, ...] | None = None,
     cells: Cells | None = None,
 ) -> SemiDiscreteSystem:
-    """Return the system ``with_weight``; cells: a group of whole bodies, which alone have
-    weight."""
+    """Return the system ``with_weight``.
+
+    ``cells`` is a group of whole bodies, which alone have weight.
+    """
     bodies = None if cells is None else fem.bodies_of(system, cells)
     return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
 
@@ -199,6 +206,8 @@ def heterogeneous(
     rho: float | Expression,
     xi: float | Expression = 0.0,
 ) -> Heterogeneous:
+    """Make a heterogeneous material."""
+
     def of(value: float | Expression) -> Any:
         return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
 
@@ -206,6 +215,7 @@ def heterogeneous(
 
 
 def analytic_gap(function: Expression) -> core.AnalyticGap:
+    """Make a ``core.AnalyticGap``."""
     return core.AnalyticGap(Places(function))
 
 
@@ -227,8 +237,10 @@ def upgoing(
     dt: float | None = None,
     outcrop: bool = True,
 ) -> Any:
-    """Return ``soil.upgoing`` of a motion, or of the run's excitations, which then come up through
-    the base alone."""
+    """Return ``soil.upgoing`` of a motion, or of the run's excitations.
+
+    These then come up through the base alone.
+    """
     return soil.upgoing(
         excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop
     )
@@ -242,6 +254,7 @@ def compliant_base(
     normal: float = 1.0,
     tangential: float = 1.0,
 ) -> CompliantBase:
+    """Make a ``fem.CompliantBase``."""
     return CompliantBase(facets, material, normal, tangential, motion=motion)
 
 
@@ -264,7 +277,8 @@ class Parts:
     """Hold what a problem is made of.
 
     tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium;
-    moved: the excitations come up through its base, and are no inertia load."""
+    moved: the excitations come up through its base, and are no inertia load.
+    """
 
     system: SemiDiscreteSystem
     surface: ContactSurface
@@ -309,14 +323,16 @@ def _choices() -> Mapping[Any, Mapping[str, Callee]]:
 
 
 class _Listed(Mapping[str, Callee]):
-    """Find the words for a kind, each when it is asked for: most are of modules that a case does
-    not need."""
+    """Find the words for a kind, each when it is asked for.
+
+    Most are of modules that a case does not need.
+    """
 
     def __init__(self, kind: Any) -> None:
         self._kind, self._rooms = kind, [room for room, kinds in _KINDS.items() if kind in kinds]
 
     def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
-        """What words with these names before the dot call; None: all."""
+        """Return what words with these names before the dot call; of all if it is None."""
         found: dict[str, Callee] = {}
         for room in self._rooms:
             own = (
@@ -348,8 +364,10 @@ class _Listed(Mapping[str, Callee]):
 
 
 def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
-    """Yield the classes of these names that are of this kind, and named constructors; none that
-    needs functions."""
+    """Yield the classes of these names that are of this kind.
+
+    Named constructors are among them; none needs functions.
+    """
     for cls in (getattr(room, name) for name in names):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
@@ -368,8 +386,10 @@ def _constructors(cls: type) -> Iterator[Any]:
 
 
 def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
-    """Return the words of a case file in this folder, where its relative paths begin; ``allowed``:
-    others' packages."""
+    """Return the words of a case file in this folder.
+
+    Its relative paths begin there; ``allowed`` are others' packages.
+    """
     default = {
         LinearElastic: "LinearElastic",
         Record: "read_record",

@@ -1,16 +1,19 @@
-"""Fit fragility curves: the probability that a demand passes its limit, over the intensity of the
-motion.
+"""Fit fragility curves.
+
+They give the probability that a demand passes its limit, over the intensity of the motion.
 
 The capacity of a record is the intensity at which its demand first passes the limit (Vamvatsikos
 and Cornell, Earthquake Engng Struct. Dyn. 31, 2002). Its runs tell between which two levels a < b
 it lies: a = 0 where already the lowest passes, b infinite where none does. Capacities are taken as
 lognormal with median theta and dispersion beta, and records as independent:
 
-    P(passed | x) = Phi(ln(x/theta)/beta),   L(theta, beta) = prod_i [Phi(ln(b_i/theta)/beta) - Phi(ln(a_i/theta)/beta)]
+    P(passed | x) = Phi(ln(x/theta)/beta),
+    L(theta, beta) = prod_i [Phi(ln(b_i/theta)/beta) - Phi(ln(a_i/theta)/beta)]
 
 theta and beta make L largest; ln L is concave in 1/beta and ln(theta)/beta (Burridge, J. R. Stat.
 Soc. B 43, 1981), so there is one such place. Intervals come from the second derivatives of ln L
-there: 95 % for many records, too narrow for fewer than ten."""
+there: 95 % for many records, too narrow for fewer than ten.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -34,9 +37,11 @@ LEAST = 0.01
 
 def limit(text: str) -> tuple[Demand, float]:
     """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column.
+
     InputError for others.
 
-    It is passed by a demand at the value or above, for the way "min" at it or below."""
+    It is passed by a demand at the value or above, for the way "min" at it or below.
+    """
     name, _, value = text.partition("=")
     try:
         found = float(value)
@@ -52,10 +57,12 @@ def limit(text: str) -> tuple[Demand, float]:
 
 
 def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
-    """Return (records, 2) values of the column ``level`` between which each record first passes a
-    limit.
+    """Return (records, 2) values of the column ``level`` at which limits are passed.
 
-    Of a record count the runs below its first failed one; one without any is left out."""
+    Between these two each record first passes a limit.
+
+    Of a record count the runs below its first failed one; one without any is left out.
+    """
     (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
     for row in sorted(
         (row for row in rows if row[level] is not None), key=lambda row: float(row[level])
@@ -73,8 +80,11 @@ def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
 
 @dataclass(frozen=True)
 class Fragility:
-    """Hold a fitted curve: median theta (unit of the intensity), dispersion beta [-], covariance
-    (2, 2) of their logarithms, and the brackets (records, 2) that it was fitted to."""
+    """Hold a fitted curve.
+
+    It has the median theta (unit of the intensity), dispersion beta [-], covariance (2, 2) of their
+    logarithms, and the brackets (records, 2) that it was fitted to.
+    """
 
     theta: float
     beta: float
@@ -97,8 +107,10 @@ class Fragility:
 
 @checked
 def fragility_curve(brackets: Array) -> Fragility:
-    """Return the fragility of brackets (records, 2). InputError where they do not tell median and
-    dispersion."""
+    """Return the fragility of brackets (records, 2).
+
+    InputError where they do not tell median and dispersion.
+    """
     brackets = np.asarray(brackets, dtype=float)
     if brackets.ndim != 2 or brackets.shape[1] != 2:
         raise InputError(
@@ -140,8 +152,10 @@ def fragility_curve(brackets: Array) -> Fragility:
 
 
 def _likelihood(p: Array, x: Array) -> tuple[float, Array, Array]:
-    """Return ln L at p = (1/beta, ln(theta)/beta), and its first and second derivatives; x:
-    brackets of ln capacity."""
+    """Return ln L at p = (1/beta, ln(theta)/beta), and its derivatives.
+
+    These are the first and second ones; x are brackets of ln capacity.
+    """
     known = np.isfinite(x)
     sides = np.stack([np.where(known, x, 0.0), -np.ones_like(x)], axis=-1)
     z = np.where(known, sides @ p, x)

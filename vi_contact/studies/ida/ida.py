@@ -1,10 +1,12 @@
-"""Incremental dynamic analysis: one structure under many motions, each at many intensities, in one
-tidy table.
+"""Make incremental dynamic analyses.
+
+One structure is put under many motions, each at many intensities; the result is one tidy table.
 
 Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside
 ``ida.csv``, ``columns.json`` and ``ida.png``: ``fragility.csv`` and ``fragility.png``, where there
 are limits; ``ida.json``, the case and the records, so that no other study is mixed in, and
-``runs/NAME_xSCALE``, the folder of every run, with its row."""
+``runs/NAME_xSCALE``, the folder of every run, with its row.
+"""
 
 import hashlib
 import math
@@ -57,7 +59,8 @@ class IDA:
     "arias", "cav", "housner", of the first motion. demands: "COLUMN" or "COLUMN:max", ":min",
     ":absmax", ":last" of history.csv. limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
     Raises InputError for other words, no motions, two of one name, not exactly one of scales and
-    levels."""
+    levels.
+    """
 
     case: Case
     motions: Sequence[str | Path | Sequence[str | Path]]
@@ -135,8 +138,9 @@ def run_ida(
     say: Callable[[str], None] = print,
     wall_time: str | None = None,
 ) -> list[Row]:
-    """Make the runs that have not finished yet, and the table and figure of all that are in
-    ``out``. Return its rows.
+    """Make the runs that have not finished yet, and table and figure of all.
+
+    The table and figure are of all that are in ``out``. Return its rows.
 
     Eight runs share a process and, where the body serves all excitations, its assembly and every
     pass over its matrices (``simulate_many``). What a run cannot do is told in its row, and the
@@ -207,8 +211,10 @@ def run_ida(
 
 
 def _check_demands(study: IDA) -> None:
-    """InputError before the first run for a demand on a column that no run will write; it assembles
-    the case once."""
+    """Raise InputError before the first run for a demand without a column.
+
+    No run will write that column. It assembles the case once.
+    """
     try:
         written = study.case.columns(alone())
     except InputError:
@@ -222,7 +228,10 @@ def _check_demands(study: IDA) -> None:
 
 
 def _claim(study: IDA, out: Path) -> None:
-    """Notes in the folder whose it is; InputError when it is another study's."""
+    """Note in the folder whose it is.
+
+    It raises InputError when the folder is another study's.
+    """
     case = _digest(to_json(study.case.tables).encode())
     records = {
         one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()]
@@ -271,7 +280,7 @@ def _digest(data: bytes) -> str:
 
 
 def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
-    """Writes table and units of all runs in the folder, and draws the figure."""
+    """Write table and units of all runs in the folder, and draw the figure."""
     rows, units = _tabulated(study.case, inner_folder(out, RUNS), study.measure, study.wanted)
     described = {
         name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()
@@ -289,9 +298,11 @@ def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
 def _tabulated(
     case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]
 ) -> tuple[list[Row], Units]:
-    """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that
-    have ended, None for what a run has not measured. InputError when a finished run has no such
-    column."""
+    """Return (rows by record and scale, column -> (unit, meaning)) of ended runs.
+
+    They are all runs in the folder that have ended; it is None for what a run has not measured.
+    InputError when a finished run has no such column.
+    """
     folders = [out / name for name in sorted(os.listdir(out))] if out.is_dir() else []
     own = [one for one in folders if one.is_dir() and not one.is_symlink()]
     found = [(one, row) for one in own if (row := read_row(one / ROW)) is not None]
@@ -325,8 +336,10 @@ def _tabulated(
 
 @cache
 def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], Units]:
-    """Columns of a finished run, read once: the wanted ones; all names where one of them is
-    missing."""
+    """Return the wanted columns of a finished run, read once.
+
+    Where one of them is missing, it returns all names.
+    """
     run = read_run(folder)
     numbers = {name: values for name, values in run.history.items() if np.ndim(values) == 1}
     kept = {name: numbers[name] for name in wanted if name in numbers}
@@ -334,8 +347,10 @@ def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], U
 
 
 def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str], None]) -> None:
-    """Fits, writes and draws the curves of the limits, and says each; where none can be fitted,
-    why."""
+    """Fit, write and draw the curves of the limits, and say each.
+
+    Where none can be fitted, it says why.
+    """
     found, table, measure = {}, [], study.measure
     for text in study.limits:
         try:
@@ -372,7 +387,7 @@ def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str]
 
 
 def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> DemandPanel:
-    """What one demand shows."""
+    """Return what one demand shows."""
     curves: dict[str, tuple[Array, Array]] = {}
     failed: list[float] = []
     known = sorted(

@@ -1,5 +1,7 @@
-"""What an incremental dynamic analysis plots: intensity measures of motions, demands on the
-structure."""
+"""Measure what an incremental dynamic analysis plots.
+
+These are intensity measures of motions, and demands on the structure.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -31,8 +33,10 @@ class Intensity:
     of: Callable[[Record], float]
 
     def scale(self, record: Record, level: float) -> float:
-        """Return the factor that brings the record to this level; InputError unless both are
-        positive."""
+        """Return the factor that brings the record to this level.
+
+        It raises InputError unless both are positive.
+        """
         value = self.of(record)
         if not (level > 0.0 and value > 0.0):
             raise InputError(
@@ -57,7 +61,7 @@ _MEASURES = {
 
 
 def _seconds(text: str) -> float:
-    """The number in a text; zero where there is none."""
+    """Return the number in a text; zero where there is none."""
     try:
         return float(text)
     except ValueError:
@@ -65,8 +69,11 @@ def _seconds(text: str) -> float:
 
 
 def intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
-    """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T
-    (pseudo-acceleration at T s, 5 %), "sa:T1" at the period that ``first_period`` finds [s]."""
+    """Return the measure of a word.
+
+    Words are pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %), and
+    "sa:T1" at the period that ``first_period`` finds [s].
+    """
     word, _, period = text.partition(":")
     if word == "sa":
         seconds = (
@@ -90,8 +97,10 @@ def intensity(text: str, first_period: Callable[[], float] | None = None) -> Int
 
 @dataclass(frozen=True)
 class Demand:
-    """Define a demand parameter: a column of history.csv and what of it counts; values that are not
-    a number do not."""
+    """Define a demand parameter: a column of history.csv and what of it counts.
+
+    Values that are not a number do not.
+    """
 
     column: str
     way: str = "absmax"
@@ -117,8 +126,10 @@ class Demand:
 
 
 def demand(text: str) -> Demand:
-    """Return the demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax",
-    ":last"."""
+    """Return the demand of a word.
+
+    It is "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last".
+    """
     column, _, way = text.partition(":")
     if not column or (way or "absmax") not in _WAYS:
         raise InputError(
@@ -130,13 +141,15 @@ def demand(text: str) -> Demand:
 def fractiles(
     curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]
 ) -> tuple[Array, Array]:
-    """Return (levels (n,), demands (n, shares)): fractiles over the records of the demand at equal
-    intensity.
+    """Return (levels (n,), demands (n, shares)).
+
+    They are fractiles over the records of the demand at equal intensity.
 
     curves: record -> (intensities, demands), straight lines between them; the levels are those of
     all records in the range that every record covers (Vamvatsikos and Cornell, Earthquake Engng
     Struct. Dyn. 31, 2002, section 5). Empty for fewer than two records and where ranges do not
-    overlap."""
+    overlap.
+    """
     full = [(im[np.argsort(im)], edp[np.argsort(im)]) for im, edp in curves.values() if len(im)]
     if len(full) < 2:
         return np.zeros(0), np.zeros((0, len(shares)))

@@ -1,5 +1,7 @@
-"""The processes of an incremental dynamic analysis: a few runs in each, so many at a time, until
-told to stop."""
+"""Run the processes of an incremental dynamic analysis.
+
+There are a few runs in each, so many at a time, until they are told to stop.
+"""
 
 import json
 import os
@@ -8,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -35,8 +37,10 @@ _MPI = (
 
 
 def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
-    """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without
-    wall time left."""
+    """Return the command of these runs.
+
+    Each begins from its checkpoint if there is one; it raises OutOfTime without wall time left.
+    """
     case, folders = runs[0].case, [one.folder for one in runs]
     asked = {
         "case": str(case.path),
@@ -90,8 +94,10 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
 
 
 class Processes:
-    """Keep the processes that go on, until they are all told to stop. ``shares``: runs that each
-    has made."""
+    """Keep the processes that go on, until they are all told to stop.
+
+    ``shares``: runs that each has made.
+    """
 
     def __init__(self, launch: Sequence[str], end: WallTime) -> None:
         self._launch, self._end = launch, end
@@ -100,27 +106,14 @@ class Processes:
         self.shares: dict[subprocess.Popen[str], float] = {}
 
     def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
-        """Yield the row of each run as it ends, None when more is done; run what a dead process has
-        left one by one."""
+        """Yield the row of each run as it ends, None when more is done.
+
+        What a dead process has left is run one by one.
+        """
         for _ in range(ATTEMPTS):
-            left, said = list(runs), []
-            process = self._started(runs)
-            for line in process.stdout or ():
-                found = _read(line)
-                if "ended" in found:
-                    one = runs[found["ended"]]
-                    left.remove(one)
-                    yield one.keep(found["said"], found["status"])
-                elif "share" in found:
-                    self.shares[process] = found["share"] * len(runs)
-                    yield None
-                else:
-                    said.append(line)
-            process.wait()
-            with self._lock:
-                self._going.discard(process)
-                if self._stopped.is_set():
-                    raise KeyboardInterrupt
+            process, left = self._started(runs), list(runs)
+            said = yield from self._follow(process, runs, left)
+            self._forget(process)
             self.shares[process] = len(runs) - len(left)
             if process.returncode == os.EX_TEMPFAIL:
                 raise OutOfTime(f"{self._end.words} {AGAIN}")
@@ -132,6 +125,32 @@ class Processes:
                 yield from self.rows([one])
         elif runs:
             yield runs[0].keep("".join(said), process.returncode)
+
+    def _follow(
+        self, process: subprocess.Popen[str], runs: Sequence[OneRun], left: list[OneRun]
+    ) -> Generator[Row | None, None, list[str]]:
+        """Yield what a process tells, take runs that end from those left, return other lines."""
+        said = []
+        for line in process.stdout or ():
+            found = _read(line)
+            if "ended" in found:
+                one = runs[found["ended"]]
+                left.remove(one)
+                yield one.keep(found["said"], found["status"])
+            elif "share" in found:
+                self.shares[process] = found["share"] * len(runs)
+                yield None
+            else:
+                said.append(line)
+        return said
+
+    def _forget(self, process: subprocess.Popen[str]) -> None:
+        """Wait for the end of a process; KeyboardInterrupt where all were told to stop."""
+        process.wait()
+        with self._lock:
+            self._going.discard(process)
+            if self._stopped.is_set():
+                raise KeyboardInterrupt
 
     def _started(self, runs: Sequence[OneRun]) -> subprocess.Popen[str]:
         with self._lock:
@@ -152,9 +171,10 @@ class Processes:
 def executed(
     runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime
 ) -> Iterator[Row | float]:
-    """Run them, in so many processes at a time, and yield the row of each when it ends, and between
-    rows how many have been made, with parts of runs. Left early, it stops those that go on;
-    OutOfTime when one has ended with its status.
+    """Run them in so many processes at a time, and yield the row of each when it ends.
+
+    Between rows it yields how many have been made, with parts of runs. Left early, it stops those
+    that go on; OutOfTime when one has ended with its status.
     """
     processes, told = Processes(launch, end), SimpleQueue[Row | BaseException | float]()
 
@@ -195,7 +215,7 @@ def executed(
 
 
 def _read(line: str) -> dict[str, Any]:
-    """What the process of ``command`` tells in a line of JSON; empty for other lines."""
+    """Return what the process of ``command`` tells in a line of JSON; empty for other lines."""
     with suppress(ValueError):
         found = json.loads(line)
         return found if isinstance(found, dict) else {}
@@ -203,8 +223,10 @@ def _read(line: str) -> dict[str, Any]:
 
 
 def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
-    """Ends them with all they have started: as by Ctrl-C, on which a run saves its state; else by
-    SIGTERM."""
+    """End processes with all they have started.
+
+    It does so as by Ctrl-C, on which a run saves its state; else by SIGTERM.
+    """
     for signum in (signal.SIGINT, signal.SIGTERM):
         for process in processes:
             with suppress(ProcessLookupError):
@@ -216,8 +238,10 @@ def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
 
 
 def refuse_mpirun() -> None:
-    """Raise InputError in a process that mpirun has started: those it starts would take themselves
-    for it."""
+    """Raise InputError in a process of mpirun.
+
+    It has started this one, and those it starts would take themselves for it.
+    """
     if any(name in os.environ for name in _MPI):
         raise InputError(
             "ida starts processes and must not be one of MPI's: start it without mpirun, and give "

@@ -27,15 +27,19 @@ SAID = "failure.txt"
 
 @dataclass(frozen=True)
 class Shaking:
-    """Name the record files of one run, one for each ground motion of the case: "h" of (h.at2,
-    v.at2)."""
+    """Name the record files of one run.
+
+    There is one for each ground motion of the case, as "h" of (h.at2, v.at2).
+    """
 
     name: str
     files: tuple[Path, ...]
 
     def settings(self, case: Case, factor: float = 1.0) -> tuple[str, ...]:
-        """Return KEY=VALUE that put these records into the case, times its own scales and the
-        factor."""
+        """Return KEY=VALUE that put these records into the case.
+
+        Its own scales are multiplied by the factor.
+        """
         found = []
         for (place, table), path in zip(ground_motions(case), self.files, strict=True):
             record = table.get("record")
@@ -51,8 +55,10 @@ class Shaking:
         return tuple(found)
 
     def record(self, case: Case) -> Record:
-        """Return the first motion as the case prepares it, factor 1; InputError when a file is
-        wrong."""
+        """Return the first motion as the case prepares it.
+
+        The factor is 1; it raises InputError when a file is wrong.
+        """
         return _record(case.path, (*case.settings, *self.settings(case)), case.allowed)
 
 
@@ -64,8 +70,10 @@ def _record(path: Path, settings: tuple[str, ...], allowed: tuple[str, ...]) -> 
 
 
 def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
-    """Return (key, table) of the ground motions of a case; InputError unless it is shaken by
-    records alone."""
+    """Return (key, table) of the ground motions of a case.
+
+    It raises InputError unless it is shaken by records alone.
+    """
     refuse_own(case.tables, "excitation", f"{case.path}: ida")
     tables = case.tables.get("excitation", [])
     found: list[tuple[str, Mapping[str, Any]]] = [("excitation", tables)]
@@ -87,9 +95,11 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
 
 @checked
 def record_set(word: str) -> list[list[str]]:
-    """Return the files of each record of "H", "H,V", a folder (its AT2 files, if it has any, else
-    all) or "@LIST". A LIST is a file with "H" or "H,V" in each line, relative to its folder.
-    InputError for others."""
+    """Return the files of each record of a text.
+
+    It is "H", "H,V", a folder (its AT2 files, if it has any, else all) or "@LIST". A LIST is a file
+    with "H" or "H,V" in each line, relative to its folder. InputError for others.
+    """
     folder, names, path = Path(), [word], Path(word.removeprefix("@"))
     try:
         if word.startswith("@"):
@@ -114,8 +124,10 @@ def record_set(word: str) -> list[list[str]]:
 
 
 def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -> list[Shaking]:
-    """Return the records by name; a motion is a file, or one file for each ground motion of the
-    case."""
+    """Return the records by name.
+
+    A motion is a file, or one file for each ground motion of the case.
+    """
     count = len(ground_motions(case))
     found: dict[str, Shaking] = {}
     for motion in motions:
@@ -160,8 +172,10 @@ class OneRun:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Return all KEY=VALUE that make the run of the case file; it writes fields only if the
-        study sets them."""
+        """Return all KEY=VALUE that make the run of the case file.
+
+        It writes fields only if the study sets them.
+        """
         asked = "fields" not in self.case.tables or any(
             one.startswith("fields") for one in self.case.settings
         )
@@ -172,8 +186,10 @@ class OneRun:
         )
 
     def keep(self, said: str, code: int) -> Row:
-        """Write the row of a run that ended with this status, having said this; failed ones leave
-        that in a file."""
+        """Write the row of a run that ended with this status.
+
+        It has said this; failed ones leave that in a file.
+        """
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
         row = {
@@ -202,8 +218,10 @@ def read_json(path: Path) -> dict[str, Any] | None:
 
 
 def read_row(path: Path) -> dict[str, Any] | None:
-    """Return the row of a run; None when there is none, or the file is not as ``OneRun.keep``
-    leaves it."""
+    """Return the row of a run.
+
+    It is None when there is none, or the file is not as ``OneRun.keep`` leaves it.
+    """
     row = read_json(path) or {}
     files, scale = row.get("files"), row.get("scale")
     whole = all(isinstance(row.get(name), str) for name in ("record", "status", "reason"))
