@@ -129,8 +129,9 @@ class ChannelModel:
             friction: Coulomb(mu) for instance.
             bilateral: soil and channel cannot part, but slide as before: the linear comparison run
                 of Fig. 9.
-            impact, mass: schemes with massless contact nodes take no impact law: give impact=None,
-                and leave mass to them. An impact law runs on consistent mass unless another is
+            excitation: what shakes both; None for the harmonic motion of the source.
+            impact: schemes with massless contact nodes take no impact law: give None.
+            mass: leave it to these schemes. An impact law runs on consistent mass unless another is
                 given.
         """
         return ContactProblem(
@@ -235,6 +236,8 @@ def build(
     """Mesh and assemble channel and soil; collective.
 
     Args:
+        channel: the dimensions and materials of both.
+        comm: the MPI communicator of the mesh.
         sides: the ends of the soil layer; by default Rollers(), which hold them vertically
             (CHOSEN).
         weighing: the bodies, of BODIES, that have weight. CHOSEN: the channel only, so that the

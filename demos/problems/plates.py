@@ -78,9 +78,11 @@ def plate_system(
     ``system.space.points``.
 
     Args:
-        on: mesh in the plane. clamped: whether its boundary may not turn either.
-        pressure: uniform load downwards [Pa]. speed: x (n, 3) -> upward velocities (n,) at the
-            start [m/s].
+        on: mesh in the plane.
+        plate: its stiffness and its mass.
+        clamped: whether its boundary may not turn either.
+        pressure: uniform load downwards [Pa].
+        speed: x (n, 3) -> upward velocities (n,) at the start [m/s].
     """
     V = compat.lagrange(on, 2)
     w, v = ufl.TrialFunction(V), ufl.TestFunction(V)

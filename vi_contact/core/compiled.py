@@ -138,8 +138,11 @@ def cholmod_of_petsc() -> Path:
 
 @lru_cache(maxsize=1)
 def _loaded_cholmod(maps: Path) -> Path:
-    """Return the file of the one CHOLMOD in this process; OSError, which is asked anew, unless there
-    is one. A library stays once it is there, and to read this list takes longer than small steps."""
+    """Return the file of the one CHOLMOD in this process.
+
+    A library stays once it is there, and to read this list takes longer than small steps. OSError,
+    which is asked anew, unless there is exactly one.
+    """
     lines = maps.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
     files = {line.split(maxsplit=5)[5] for line in lines if "libcholmod" in line}
     found = sorted(file for file in files if Path(file).name.startswith("libcholmod"))

@@ -1,14 +1,15 @@
-"""Assemble bodies with finite elements on DOLFINx: meshes, systems, contact surfaces, output of
-fields.
+"""Assemble bodies with finite elements on DOLFINx.
 
-In this order: ``build_mesh`` or ``read_mesh``, ``assemble``, ``contact_surface`` or ``contact_pair``: README.md.
+There are meshes, systems, contact surfaces and output of fields, in this order: ``build_mesh`` or
+``read_mesh``, ``assemble``, ``contact_surface`` or ``contact_pair``: README.md.
 
 >>> from mpi4py import MPI
 >>> from vi_contact import core, fem, laws, meshes
 >>> mesh, tags = fem.build_mesh(meshes.WallMesh(divisions=(2, 3)), MPI.COMM_WORLD)
 >>> system = fem.assemble(mesh, laws.LinearElastic(2.0e10, 0.0, 2400.0), clamped=tags["base"])
->>> fem.contact_surface(system, tags["face"], obstacle=core.Touching()).total  # conditions of all ranks
-3"""
+>>> fem.contact_surface(system, tags["face"], obstacle=core.Touching()).total  # of all ranks
+3
+"""
 
 from importlib.util import find_spec
 

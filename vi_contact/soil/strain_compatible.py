@@ -54,14 +54,16 @@ def strain_compatible(
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
     Args:
+        mesh: the mesh of the body.
         material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the
             middle.
         curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their material.
         run: run(material, strain): assemble the body of this material with
             ``damping=DampingRatio(…)``, march with ``strain`` among the recorders, and return
             anything. All else is yours: contact, gravity first, free fields.
-        ratio: of the effective to the largest strain. tolerance: of the largest relative change of
-            G or xi in a cell.
+        ratio: of the effective to the largest strain.
+        tolerance: of the largest relative change of G or xi in a cell.
+        most: runs at most.
 
     Poisson's ratio is kept.
 

@@ -65,8 +65,8 @@ class Iterative:
             Courant number of 0.5 in A, the second up to 30, and the third beyond. PETSc's options
             may name another.
         petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold":
-            0.02}; those of ICC begin with ``sub_pc_``. Options of the command line override them. One
-            that nothing reads is refused.
+            0.02}; those of ICC begin with ``sub_pc_``. Options of the command line override them.
+            One that nothing reads is refused.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: it stops when the residual, measured as the certificate, and the estimated error
             are below this.

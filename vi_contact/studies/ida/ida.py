@@ -149,6 +149,8 @@ def run_ida(
     the figure at the end.
 
     Args:
+        study: the case, its records and the levels of their intensity.
+        out: the folder of the runs, the table and the figure.
         jobs: processes at the same time.
         part: (i, n): only every n-th run from the i-th on, for job arrays that share the folder.
         launch: words in front of the command of a run, ("mpirun", "-n", "4"); each has a process of
