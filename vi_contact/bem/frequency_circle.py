@@ -39,7 +39,7 @@ def on_circle(
 ) -> tuple[Array, Array, Array, Array]:
     """Return W (steps, m, m), the displacements of m unknowns after unit forces in step 0.
 
-    The unit nodal forces act on these unknowns.. With them come, as from ``marched``, displacements
+    The unit nodal forces act on these unknowns. With them come, as from ``marched``, displacements
     (steps, 2n), tractions (steps, 4n), nodal forces (steps, 2n) of one right-hand side: forces and
     prescribed, of fixed unknowns (2n,), both (steps, 2n). Raises InputError for more steps than the
     blocks are for and where rounding of D moves a free body, StepFailure where much wraps around,

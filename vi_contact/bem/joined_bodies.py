@@ -209,7 +209,7 @@ class TwoBodies:
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
         """Return the motions of both bodies under loads.
 
-        Contact forces (steps, 2m_c) act on body 1; the welds act too.
+        Contact forces (steps, 2m_c) act on body 1, and the forces of the welds on both.
         """
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])

@@ -175,7 +175,8 @@ def _checks(options: argparse.Namespace) -> str:
 def _table_path(options: argparse.Namespace) -> Path:
     """Return the table that a command is about to write.
 
-    There is a picture of the same name beside it. It raises InputError if it may not.
+    A picture of the same name is written beside it. It raises InputError where a file may not be
+    written.
     """
     folder = Path(options.folder)
     out = output_file(

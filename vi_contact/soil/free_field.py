@@ -67,7 +67,7 @@ class FreeField(Dashpots):
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
         """Return the stress of the free field on the side.
 
-        It is joined by D v_ff, and by the column that both are taken from.
+        With it come D v_ff, and the column that both are taken from.
         """
         side = FreeFieldSide(matrix, self, forms)
         return BoundaryLoads(

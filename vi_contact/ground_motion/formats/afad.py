@@ -11,9 +11,9 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the title of the national network, or its columns stand in the header.
+    """Tell whether the title of the national network stands in the header, or its columns.
 
-    Of the columns, the count counts too.
+    With the columns their count has to stand there.
     """
     head = [line.strip().upper() for line in text.heads[:60]]
     titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)

@@ -126,9 +126,9 @@ def surface(
 ) -> ContactSurface:
     """Make a ``contact_surface``.
 
-    ``held`` makes it bilateral everywhere; it rests on ``springs``; there is no friction in
-    corners; ``hinges`` are those of bodies that share nodes; ``name`` is that of it as ``part`` of
-    recorders.
+    ``held`` makes it bilateral everywhere; it rests on ``springs`` if given; with
+    ``frictionless_corners`` there is no friction in corners; ``hinges`` are those of bodies that
+    share nodes; ``name`` is that of it as ``part`` of recorders.
     """
     found = fem.contact_surface(
         system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle, hinges=hinges
