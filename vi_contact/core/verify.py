@@ -254,11 +254,10 @@ def energy_balance(
         contact = r_n·B_n du    (work lost to the support, stored or dissipated there)
         friction = r_t·B_t du
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
-                      (0 for the midpoint rule)
 
-    and change is the difference of the energies themselves, so the defect measures the equation of
-    motion. ``before``, ``after``: the energies of both states, when known; one product (two with
-    damping) is left then.
+    algorithmic is 0 for the midpoint rule, and change is the difference of the energies themselves,
+    so the defect measures the equation of motion. ``before``, ``after``: the energies of both
+    states, when known; one product (two with damping) is left then.
     """
     system, surface = problem.equations, problem.surface
     before = before or energies(system, old.u, old.v)
