@@ -19,13 +19,9 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from step_cost import (
-    SCHEME,
-    Factors,
-    Linear,
-    StepsWithContact,
-    wall_cells,
-)  # first: it sets the number of threads
+
+# first: it sets the number of threads
+from step_cost import SCHEME, Factors, Linear, StepsWithContact, wall_cells
 
 import vi_contact as vc
 from demos.problems.wall import Wall, build

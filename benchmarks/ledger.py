@@ -52,15 +52,8 @@ SOLVERS: dict[str, Any] = {
     "Iterative()": vc.Iterative(),
     "Automatic()": vc.Automatic(),
 }
-KEEPING = (
-    "Trapezoidal",
-    "Midpoint",
-    "Contact",
-    "Zienkiewicz",
-    "Moreau",
-    "SS22",
-    "Newmark",
-)  # energy, in free flight
+# energy, in free flight
+KEEPING = ("Trapezoidal", "Midpoint", "Contact", "Zienkiewicz", "Moreau", "SS22", "Newmark")
 SOFT = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
 COURANT, DIVISIONS, HEIGHT = 0.02, (16, 8), 1.0
 
@@ -112,9 +105,8 @@ def main() -> None:
     )
     parser.add_argument("--json", action="store_true", help="print the numbers for programs")
     options = parser.parse_args()
-    logging.getLogger("vi_contact").setLevel(
-        logging.ERROR
-    )  # of schemes that gain energy where a contact opens
+    # of schemes that gain energy where a contact opens
+    logging.getLogger("vi_contact").setLevel(logging.ERROR)
     rows = []
     if not options.json and MPI.COMM_WORLD.rank == 0:
         print("| scheme | solver | drift | defect, free | defect, thrown |\n|---|---|---|---|---|")

@@ -257,9 +257,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, help="file for the rows")
     given = parser.parse_args(arguments)
     rows = []
-    vi.solve(
-        (first := block(COMM, 2)).F, first.u, lower=first.floor, bcs=[first.bc]
-    )  # the forms are compiled here
+    # the forms are compiled here
+    vi.solve((first := block(COMM, 2)).F, first.u, lower=first.floor, bcs=[first.bc])
     if COMM.rank == 0:
         print(
             "cells  step | vi.solve: solved, Newton, linear, certificate | SNES: solved, factors | "

@@ -98,9 +98,8 @@ def bar(case: Any) -> vc.ContactProblem:
     return build(Bar(case, elements=100, dimension=1), MPI.COMM_WORLD).problem()
 
 
-OTHERS: dict[
-    str, tuple[Any, float, float]
-] = {  # name -> problem, time of a wave through an element [s], duration [s]
+# name -> problem, time of a wave through an element [s], duration [s]
+OTHERS: dict[str, tuple[Any, float, float]] = {
     "wall of README": (readme_wall, 0.75 / 2887.0, 2.0),
     "free block": (block, 1.0 / 16.0 / 36.69, 3.0),
     "clamped bar, ten bounces": (lambda: bar(PeriodicBar()), 0.01, 30.0),

@@ -30,9 +30,8 @@ from typing import Any
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
@@ -44,14 +43,8 @@ from vi_contact.core.state_checks import initial_state  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 ROCKING = np.array([0.03, -0.04, 0.0])  # rad/s
-HALVED = [
-    (1.4, 5e-3),
-    (0.7, 5e-3),
-    (0.35, 5e-3),
-    (0.7, 1e-2),
-    (0.7, 2.5e-3),
-    (0.7, 1.25e-3),
-]  # of CELLS, dt [s]
+# of CELLS, dt [s]
+HALVED = [(1.4, 5e-3), (0.7, 5e-3), (0.35, 5e-3), (0.7, 1e-2), (0.7, 2.5e-3), (0.7, 1.25e-3)]
 
 
 class Timer:

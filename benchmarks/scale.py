@@ -50,9 +50,8 @@ from vi_contact.fem.communicators import give_back, kept  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
-SPEED = float(
-    np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU)))
-)  # of P waves in the upper layer
+# of P waves in the upper layer
+SPEED = float(np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))))
 COURANTS, FAR = (1.0, 10.0), 100.0
 PUSH = 5e-4  # of the top in a step at C = 100 and in a static one
 # unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries

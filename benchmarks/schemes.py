@@ -138,9 +138,8 @@ def block(
         begin = time.perf_counter()
         state, report = next(loop)
         spent = time.perf_counter() - begin
-        flight = (
-            flight or report
-        )  # linear steps start from it: no scheme has anything to do for contact there
+        # linear steps start from it: no scheme has anything to do for contact there
+        flight = flight or report
         largest, worst = max(largest, force(state)), max(worst, report.certificate.worst)
         if problem.surface.some(state.active):
             seconds.append(spent)

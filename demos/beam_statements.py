@@ -20,9 +20,8 @@ import json
 import sys
 from pathlib import Path
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from demos.pictures.beam_statements import plot_statements
 from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, row

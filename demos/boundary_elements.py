@@ -21,9 +21,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from matplotlib.path import Path as Outline
@@ -47,12 +46,8 @@ from vi_contact.cli import status_of
 # ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
 QUICK = {"square": 6, "steel": 5, "concrete": 4, "ball": 24}
-CELLS = {
-    "square": 160,
-    "steel": 20,
-    "concrete": 10,
-    "ball": 0.04,
-}  # of the finite elements; size of those of the ball
+# of the finite elements; size of those of the ball
+CELLS = {"square": 160, "steel": 20, "concrete": 10, "ball": 0.04}
 QUICK_CELLS = {"square": 10, "steel": 5, "concrete": 4, "ball": 0.15}
 LAWS = {
     "square": {

@@ -22,9 +22,8 @@ from argparse import ArgumentParser
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from mpi4py import MPI
@@ -45,9 +44,10 @@ from vi_contact.run.static import static_equilibrium
 
 # Parameters
 # ----------------------------------------------------------------------------------------------------------
+# [m]
 CHANNEL = Channel(
     ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5)
-)  # [m]
+)
 AMPLITUDE = 2.0  # of the bedrock's acceleration [m/s²], at 2 Hz
 MU = 0.5
 STEPS = 400
@@ -73,9 +73,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     dt, histories, numbers = CHANNEL.time_step(), {}, {}
     for name, options in RUNS.items():
         problem = model.problem(excitation=CHANNEL.harmonic(AMPLITUDE), **options)
-        weighing = static_equilibrium(
-            problem, solver=vc.Condensed()
-        )  # the channel's weight, contact active
+        # the channel's weight, contact active
+        weighing = static_equilibrium(problem, solver=vc.Condensed())
         scheme = vc.ZienkiewiczWoodTaylor(phi=0.5)
         solution = vc.simulate(
             problem,

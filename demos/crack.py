@@ -19,9 +19,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import dolfinx
 import numpy as np
@@ -40,18 +39,8 @@ from vi_contact.solvers import ReducedNewton
 WIDTH = 0.05  # l
 HEIGHT = 0.1
 ACROSS = 8  # cells; the strip has ten times as many along it
-STRAINS = (
-    0.4,
-    0.8,
-    1.0,
-    1.3,
-    1.6,
-    1.0,
-    0.4,
-    1.2,
-    1.6,
-    2.0,
-)  # of the homogeneous bar, over the critical one
+# of the homogeneous bar, over the critical one
+STRAINS = (0.4, 0.8, 1.0, 1.3, 1.6, 1.0, 0.4, 1.2, 1.6, 2.0)
 PULLS = (0.5, 0.8, 0.95, 1.02, 1.1, 1.2)  # of the bar that breaks
 LEFT = 1e-8  # of the stiffness where d = 1
 SETTLED, ROUNDS = 1e-5, 1500  # of d, between two rounds; and how many, at most

@@ -25,9 +25,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from mpi4py import MPI
@@ -46,24 +45,22 @@ from vi_contact.plots.faces import plot_faces
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 CONCRETE = vc.LinearElastic(E=2.5e10, nu=0.2, rho=2500.0)
+# [m]
 RAFT, CORE, STOREYS, LAYER = (
     (12.0, 9.0, 1.5),
     (0.75, 0.0, 8.0, 6.0),
     (4.0, 4.0, 4.0),
     (42.0, 36.0, 12.0),
-)  # [m]
-CELLS = np.array(
-    [1.2, 0.8, 4.0]
-)  # [m] of the building, of the soil under the raft (finer: it is softer) and far off
+)
+# [m] of the building, of the soil under the raft (finer: it is softer) and far off
+CELLS = np.array([1.2, 0.8, 4.0])
 SIZES = {"2e4": 0.7, "1e5": 0.34, "3e5": 0.235, "1e6": 0.16}  # unknowns, about -> factor of CELLS
-SOLVERS = {
-    size: vc.Iterative() if size == "1e6" else vc.Condensed() for size in SIZES
-}  # a factor of 1e6: 30 GB
+# a factor of 1e6: 30 GB
+SOLVERS = {size: vc.Iterative() if size == "1e6" else vc.Condensed() for size in SIZES}
 MU = 0.5
 PEAKS, SEEDS = (2.0, 1.6, 1.0), (1, 2, 3)  # of an outcrop of the rock along x, y, z [m/s²]
-DAMPING = vc.Rayleigh(
-    alpha=0.0, beta=0.03 / (np.pi * 4.0)
-)  # 3 % at 4 Hz; alpha would brake the rocking
+# 3 % at 4 Hz; alpha would brake the rocking
+DAMPING = vc.Rayleigh(alpha=0.0, beta=0.03 / (np.pi * 4.0))
 DT, T_END = 5e-3, 5.0
 FRAMES = 200  # for ParaView and the film
 MAGNIFIED = 100.0  # displacements in the pictures

@@ -19,9 +19,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from mpi4py import MPI
@@ -57,9 +56,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     """
     comm = MPI.COMM_WORLD
     model = rocking.build(BLOCK, comm)
-    dt = (
-        model.time_steps(dt=4e-3) if quick else model.time_steps()
-    )  # steps halved where a corner lands
+    # steps halved where a corner lands
+    dt = model.time_steps(dt=4e-3) if quick else model.time_steps()
     numbers = free_rocking(model, dt, 1.5 if quick else DURATION, out, progress)
     numbers |= pulses(model, dt, out, progress)
     if comm.rank == 0:

@@ -20,9 +20,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 
@@ -52,9 +51,8 @@ SPANS = ((0.0, 0.6), (0.6, 1.5), (1.5, 2.0))  # of Figs. 8.4 to 8.9 [s]
 ELEMENTS, DT, T_END = 1000, 0.002, 2.0
 MU, FORCE = 0.3, 100.0  # [-], [N] of the comparison of friction laws
 EPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # [m]
-ROD = beam.Rod(
-    viscosity=0.002, gap=0.05, body_force=lambda t: 20.0 * (t < 1.5)
-)  # pulled to the wall for 1.5 s
+# pulled to the wall for 1.5 s
+ROD = beam.Rod(viscosity=0.002, gap=0.05, body_force=lambda t: 20.0 * (t < 1.5))
 OUT = Path("results/timoshenko_beam")
 
 

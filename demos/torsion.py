@@ -18,9 +18,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import dolfinx
 import numpy as np

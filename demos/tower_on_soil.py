@@ -19,9 +19,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from mpi4py import MPI
@@ -41,9 +40,8 @@ TOWER = vc.LinearElastic(E=1.5e9, nu=0.2, rho=500.0)  # a building seen as one b
 LAYER, HOUSE = (48.0, 16.0), (6.0, 18.0)  # width and height [m]
 MU = 0.6
 OUTCROP = vc.Ricker(amplitude=3.0, frequency=2.0)  # what a station on the rock would record [m/s²]
-DAMPING = vc.Rayleigh(
-    alpha=0.0, beta=0.03 / (np.pi * 4.0)
-)  # 3 % at 4 Hz; alpha would brake the rocking
+# 3 % at 4 Hz; alpha would brake the rocking
+DAMPING = vc.Rayleigh(alpha=0.0, beta=0.03 / (np.pi * 4.0))
 DT, T_END = 2.5e-3, 3.0
 OUT = Path("results/tower_on_soil")
 

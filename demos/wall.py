@@ -22,9 +22,8 @@ from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[1])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from mpi4py import MPI
 
@@ -51,10 +50,8 @@ AMPLITUDE = 1.0  # of the ground acceleration [m/s²]
 STEPS = 400
 REFINED = 16  # the comparison of schemes divides the seed's dt by this
 FRAMES_EVERY = 10  # steps between ParaView frames
-INSTANTS = (
-    10,
-    30,
-)  # steps of case b at which the wall is drawn: away from the ground, and against it
+# steps of case b at which the wall is drawn: away from the ground, and against it
+INSTANTS = (10, 30)
 OUT = Path("results/wall")
 BUILT_IN = {  # case -> settings of the case that ships with the package, which is case b
     "a": ["contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]"],
@@ -68,9 +65,8 @@ BUILT_IN = {  # case -> settings of the case that ships with the package, which 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
     """Run all cases (``quick``: 40 steps); return the key numbers, displacements in metres."""
     comm = MPI.COMM_WORLD
-    model = wall_model.build(
-        WALL, comm, base_inertia="catalogue"
-    )  # as the reference numbers of the figures
+    # as the reference numbers of the figures
+    model = wall_model.build(WALL, comm, base_inertia="catalogue")
     shaking = model.harmonic(AMPLITUDE)
     dt = model.time_step()
     steps = 40 if quick else STEPS
@@ -89,9 +85,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
     for case, title in CASES.items():
         problem = model.problem(case, excitation=shaking, impact=vc.Inelastic())
-        routes = vc.CrossChecked(
-            vc.Condensed(), [Volume(method=ReducedNewton())]
-        )  # two routes to every step
+        # two routes to every step
+        routes = vc.CrossChecked(vc.Condensed(), [Volume(method=ReducedNewton())])
         solution = vc.simulate(
             problem,
             scheme=vc.ZienkiewiczWoodTaylor(phi=0.5),
@@ -169,11 +164,8 @@ def compare_schemes(
     for name, impact, finer in (
         ("source's rule, its dt", vc.Inelastic(), 1),
         (f"source's rule, dt/{refined}", vc.Inelastic(), refined),
-        (
-            f"default scheme, dt/{refined}",
-            None,
-            refined,
-        ),  # no impact law, no scheme: trapezoidal, massless
+        # no impact law, no scheme: trapezoidal, massless
+        (f"default scheme, dt/{refined}", None, refined),
     ):
         problem = model.problem(case, excitation=model.harmonic(AMPLITUDE), impact=impact)
         runs[name] = vc.simulate(

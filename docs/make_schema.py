@@ -103,9 +103,8 @@ class _Schema:
     def of(self, hint: Any) -> dict[str, Any]:
         """Return the schema of values for a parameter with this hint."""
         members = members_of(hint)
-        members = [
-            one for one in members if one != FIELD or float not in members
-        ]  # a text, as that of a number
+        # a text, as that of a number
+        members = [one for one in members if one != FIELD or float not in members]
         found = [one for member in members for one in self._one(member)] + self._tables(members)
         return {} if {} in found or not found else found[0] if len(found) == 1 else {"anyOf": found}
 

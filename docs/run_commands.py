@@ -36,13 +36,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = ROOT / "docs" / "commands_run.txt"
 LIMIT = 900  # s
-ABOVE = (
-    "README",
-    "CONTRIBUTING",
-    "CHANGELOG",
-    "SUPPORT",
-    "SECURITY",
-)  # pages of the site that stand above docs/
+# pages of the site that stand above docs/
+ABOVE = ("README", "CONTRIBUTING", "CHANGELOG", "SUPPORT", "SECURITY")
 NAME, BEGINNING = "the name of a command", "the beginning of a command"
 PROGRAM = (
     r"(?:[A-Z_]+=\S+ "
@@ -194,9 +189,8 @@ CHECKED = [
     "mv pier checked",
     "vi-contact run checked/pier.toml --quiet --out results/checks",
 ]
-FILES: dict[
-    str, dict[str, tuple[Any, ...]]
-] = {  # page -> name -> (language, number of the block, page if another)
+# page -> name -> (language, number of the block, page if another)
+FILES: dict[str, dict[str, tuple[Any, ...]]] = {
     "README.md": {"first.py": ("python", 0)},
     "docs/start/install.md": {"script.py": ("python", 0, "README.md")},
     "docs/guide/checks.md": {"layer.toml": ("toml", 0)},
@@ -405,9 +399,8 @@ def missing(page: Path, printed: Sequence[str]) -> list[str]:
     said = [line for block in blocks(text, "text") for line in block.splitlines() if line.strip()]
     if page.relative_to(ROOT).as_posix() not in COMPARED:
         said = []
-    if any(
-        line.startswith("| `Trapezoidal` |") for line in printed
-    ):  # benchmarks/wall_schemes.py has run
+    # benchmarks/wall_schemes.py has run
+    if any(line.startswith("| `Trapezoidal` |") for line in printed):
         said += re.findall(
             r"^\| `[^|]*\| -[\d.]+ to [^|]*\| -[\d.]+ to .* %.*\|$", text, re.MULTILINE
         )

@@ -97,9 +97,8 @@ def _add_ball(model: Any, radius: float, eighth: bool) -> int:
     ball: int = model.occ.addSphere(
         0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn
     )
-    model.occ.rotate(
-        [(3, ball)], 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0 * math.pi / 3.0
-    )  # x to y to z to x
+    # x to y to z to x
+    model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0 * math.pi / 3.0)
     if eighth:
         model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, turn)
     model.occ.translate([(3, ball)], 0.0, radius, 0.0)
@@ -114,9 +113,8 @@ def _name_sides(model: Any, volume: int, radius: float) -> int:
     for _, surface in model.getEntities(2):
         centre = np.array(model.occ.getCenterOfMass(2, surface)) - (0.0, radius, 0.0)
         flat = np.abs(centre) < 1e-6 * radius
-        flat[1] &= (
-            model.getType(2, surface) == "Plane"
-        )  # the sphere of the quarter is centred there as well
+        # the sphere of the quarter is centred there as well
+        flat[1] &= model.getType(2, surface) == "Plane"
         names = [name for name, here in zip(("side_x", "cut", "side_z"), flat, strict=True) if here]
         groups.setdefault(names[0] if names else "surface", []).append(surface)
     for name, surfaces in groups.items():

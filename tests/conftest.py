@@ -33,22 +33,14 @@ import pytest
 
 # What programs print is compared with texts: it must not depend on the terminal or the language of
 # who runs the tests.
-os.environ |= {
-    "COLUMNS": "100",
-    "PYTHON_COLORS": "0",
-    "LANGUAGE": "C",
-}  # Gmsh sets a locale that obeys LANGUAGE
+# Gmsh sets a locale that obeys LANGUAGE
+os.environ |= {"COLUMNS": "100", "PYTHON_COLORS": "0", "LANGUAGE": "C"}
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
 LEFT_OUT = ("serial", "slow", "two_ranks") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
-ABOVE = (
-    "validation",
-    "models",
-    "soil",
-    "studies",
-    "house",
-)  # what they are made of runs on three ranks, they on two
+# what they are made of runs on three ranks, they on two
+ABOVE = ("validation", "models", "soil", "studies", "house")
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
 # how long one watch over the tests stands: a new one for each would wait for a thread to end
 WATCH_SECONDS = 30
@@ -100,15 +92,13 @@ def _abort(config: pytest.Config, message: str) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    config.stash[_stderr] = os.fdopen(
-        os.dup(2), "w"
-    )  # the real one: pytest captures fd 2 during tests
+    # the real one: pytest captures fd 2 during tests
+    config.stash[_stderr] = os.fdopen(os.dup(2), "w")
     if RANK:  # rank 0 speaks for all
         config.pluginmanager.unregister(name="terminalreporter")
     if _second_half(config) and config.args == ["tests"]:
-        ignored = [
-            Path(one).resolve() for one in config.getoption("ignore") or ()
-        ]  # pytest obeys a name all the same
+        # pytest obeys a name all the same
+        ignored = [Path(one).resolve() for one in config.getoption("ignore") or ()]
         folders = {path.parent for path in Path("tests").resolve().rglob("test_*.py")}
         named = [
             str(one) for one in folders if not any(one.is_relative_to(other) for other in ignored)
@@ -182,9 +172,8 @@ def _paired(items: list[pytest.Item]) -> set[pytest.Item]:
         pairs = {item: set(itertools.combinations(_parametrised(item, lists), 2)) for item in ones}
         kept -= set(ones)
         while any(pairs.values()):
-            best = max(
-                ones, key=lambda item: len(pairs[item])
-            )  # the first of the best: alike in every process
+            # the first of the best: alike in every process
+            best = max(ones, key=lambda item: len(pairs[item]))
             new = set(pairs[best])
             kept.add(best)
             for rest in pairs.values():
@@ -219,9 +208,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out := [item for item in items if item not in kept]:
         items[:] = [item for item in items if item in kept]
         config.hook.pytest_deselected(items=left_out)
-    if (
-        SIZE == 1
-    ):  # files of validation and those with many slow tests are long: not last on one core
+    # files of validation and those with many slow tests are long: not last on one core
+    if SIZE == 1:
         slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
         items.sort(key=lambda item: -slow[item.path] - 10 * ("validation" in item.path.parts))
 
@@ -298,9 +286,8 @@ def pytest_runtest_protocol(
     item: pytest.Item, nextitem: pytest.Item | None
 ) -> Generator[None, Any, None]:
     _watch(item.config)
-    if (
-        SIZE > 1
-    ):  # what all ranks own is freed by all at one place: one that frees alone lets the others wait
+    # what all ranks own is freed by all at one place: one that frees alone lets the others wait
+    if SIZE > 1:
         gc.disable()
     yield
     if SIZE > 1 and (nextitem is None or nextitem.path != item.path):
@@ -359,9 +346,8 @@ def _seconds_by_file(stats: dict[str, list[Any]]) -> list[tuple[float, str]]:
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Tell the slowest files, and leave the counts where tests/run.sh sums them."""
-    if hasattr(
-        terminalreporter.config, "workerinput"
-    ):  # the process that started the workers tells it of all
+    # the process that started the workers tells it of all
+    if hasattr(terminalreporter.config, "workerinput"):
         return
     stats = terminalreporter.stats
     times = [f"{total:8.1f} s  {file}" for total, file in _seconds_by_file(stats)]

@@ -66,9 +66,8 @@ def signorini(n: int, way: str) -> dict[str, Any]:
         dirichlet="block_bottom|block_top" if way == "default" else "",
     )
     u = ng.GridFunction(space)
-    u.components[1].Set(
-        -1e-9, definedon=mesh.Materials("body")
-    )  # a little contact, without which the first matrix is singular
+    # a little contact, without which the first matrix is singular
+    u.components[1].Set(-1e-9, definedon=mesh.Materials("body"))
     form = ng.BilinearForm(space, symmetric=True)
     d = space.TrialFunction()
     form += ng.Variation(strain_energy(d, **SIGNORINI) * ng.dx("body"))

@@ -98,9 +98,10 @@ def thrown(way: str) -> dict[str, Any]:
     )
     springs(mesh, ground)
     u, v, force = march(way, (1, count), (1, 2), (ground, ground + THROWN["n"]), 2, THROWN)
+    # tri31 lumps it
     mass = np.repeat(
         np.bincount(mesh.triangles.ravel()) * THROWN["rho"] / (6.0 * THROWN["n"] ** 2), 2
-    )  # tri31 lumps it
+    )
     strain = 0.5 * np.einsum("ti,ti->t", u, u @ stiffness(mesh, THROWN["E"], THROWN["nu"]))
     return {
         "t": THROWN["dt"] * np.arange(1, len(u) + 1),

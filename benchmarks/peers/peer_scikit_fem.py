@@ -113,9 +113,8 @@ def without_mass(M: Any, ground: Any, above: Any) -> Any:
     """Return the mass matrix with the mass of the ground's unknowns moved to those above them."""
     moved, mine = M.tolil(), np.asarray(M.sum(axis=1)).ravel()
     moved[ground], moved[:, ground] = 0.0, 0.0
-    lost = (
-        mine - np.asarray(moved.sum(axis=1)).ravel()
-    )  # of the ground, and of what it shared with its neighbours
+    # of the ground, and of what it shared with its neighbours
+    lost = mine - np.asarray(moved.sum(axis=1)).ravel()
     shared = np.setdiff1d(np.flatnonzero(lost), ground)
     moved[shared, shared] += lost[shared]
     moved[above, above] += lost[ground]

@@ -271,9 +271,8 @@ def _bar(answer: dict[str, Any], n: int) -> dict[str, float]:
     """Compare with the exact solution; force errors count wrong forces in flight too."""
     exact = bar_reference()
     t, force = (np.asarray(answer[key], dtype=float) for key in ("t", "force"))
-    truth = np.asarray(
-        exact.force(t - 0.5 * BAR["dt"])
-    )  # a step's force is compared with that of its middle
+    # a step's force is compared with that of its middle
+    truth = np.asarray(exact.force(t - 0.5 * BAR["dt"]))
     first = t < exact.period / 2.0
     x = np.linspace(0.0, BAR["length"], BAR["elements"] + 1)
     away = np.asarray(answer["u"], dtype=float) - np.asarray(exact.displacement(x, float(t[-1])))
@@ -377,6 +376,5 @@ def lines_of(path: Path, *wanted_names: str) -> int:
     borrowed = {"stiffness", "mass", "traction_load"} & taken if "problems" in wanted else set()
     if not borrowed or path == Path(__file__).resolve():
         return own
-    return (
-        own + lines_of(Path(__file__).resolve(), *(borrowed | {"_assemble"})) - 1
-    )  # np is imported once
+    # np is imported once
+    return own + lines_of(Path(__file__).resolve(), *(borrowed | {"_assemble"})) - 1

@@ -273,9 +273,8 @@ def _problem(
     nodes = np.append(0.0, x)[:, None] * np.eye(1, d)  # the first one is clamped
     last = np.arange(1, m + 1)
     meaning = [np.column_stack([last[m - sizes[0] :], np.zeros(sizes[0])])]
-    meaning += (
-        [] if across is None else [np.column_stack([last, np.full(m, c)]) for c in (-1, 1)]
-    )  # rotations, across
+    # rotations, across
+    meaning += [] if across is None else [np.column_stack([last, np.full(m, c)]) for c in (-1, 1)]
     system = system_from_arrays(
         sp.block_diag([part.M for part in parts]),
         sp.block_diag([part.viscosity * part.K for part in parts]) if damped else None,
@@ -290,9 +289,8 @@ def _problem(
     system = system.changed(
         base_mass=inertia - np.column_stack([system.M @ rigid for rigid in system.influence.T])
     )
-    tip = contact_points(
-        system, [m], np.eye(1, d), gap0=gap
-    )  # one point, its weight 1: pressures are forces
+    # one point, its weight 1: pressures are forces
+    tip = contact_points(system, [m], np.eye(1, d), gap0=gap)
     return ContactProblem(
         system, tip, friction=friction, mass=None if across is None else ConsistentMass()
     )

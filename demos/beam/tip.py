@@ -83,10 +83,8 @@ class RegularisedFriction:
 
         StepFailure when max_iterations updates do not reach the tolerance.
         """
-        s, low, high = (
-            0.0,
-            *sorted((0.0, g / c * (1.0 + 1e-9))),
-        )  # a little wider: the zero may be its end
+        # a little wider: the zero may be its end
+        s, low, high = (0.0, *sorted((0.0, g / c * (1.0 + 1e-9))))
         for updates in range(self.max_iterations + 1):
             root = math.hypot(s, self.eps)
             F = root * (c * s - g) + limit * s

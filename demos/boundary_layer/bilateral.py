@@ -137,9 +137,8 @@ def _solved(
     phi = np.array([system.rho(q) for system in systems])
     rate = np.asarray(a @ v)
     turning = np.array([system.turning(q, v) for system in systems])
-    wanted = (
-        -(_slope(systems, q, v) * rate + damping * rate + stiffness * phi) / masses
-    )  # φ̈ of (34)
+    # φ̈ of (34)
+    wanted = -(_slope(systems, q, v) * rate + damping * rate + stiffness * phi) / masses
     reaction = np.linalg.solve(a @ along, wanted - a @ free - turning)
     multiplier_rate = momentum / masses
     force = reaction - damping * multiplier_rate - stiffness * multiplier + pull

@@ -87,9 +87,8 @@ class ContactLayer:
         delta = self.layer.cut_off(np.exp(y))
         middle = self.layer.cut_off(np.exp(0.5 * (y[1:] + y[:-1])))
         trapezia = cumulative_trapezoid(delta, y, initial=0.0)
-        Y = (
-            np.append(0.0, np.cumsum(4.0 * middle)) * (y[1] - y[0]) / 6.0 + trapezia / 3.0
-        )  # Simpson's rule
+        # Simpson's rule
+        Y = np.append(0.0, np.cumsum(4.0 * middle)) * (y[1] - y[0]) / 6.0 + trapezia / 3.0
         return CubicHermiteSpline(y, Y - Y[-1], delta)
 
     def set_back(self, surface: ContactSurface) -> ContactSurface:
@@ -120,9 +119,8 @@ class ContactLayer:
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
         step, middle, cut = rho - old, 0.5 * (rho + old), layer.cut_off
         near = np.abs(step) < SHORT_STEP * middle
-        step = np.where(
-            near, middle, step
-        )  # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
+        # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
+        step = np.where(near, middle, step)
         quotient = np.where(
             near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step
         )

@@ -19,10 +19,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import number, optional
 from vi_contact.core.errors import InputError
 
-LARGEST, LARGEST_FORCE = (
-    1e60,
-    1e150,
-)  # of lengths, speeds and masses; of k and c: products of their squares are finite
+# of lengths, speeds and masses; of k and c: products of their squares are finite
+LARGEST, LARGEST_FORCE = (1e60, 1e150)
 
 
 @dataclass(frozen=True)

@@ -114,10 +114,8 @@ class ConstrainedSystem:
         f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
         if not callable(self.mass):
             return f
-        h, slopes = (
-            self.difference(q),
-            np.empty((len(q), len(v), len(v))),
-        )  # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
+        # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
+        h, slopes = (self.difference(q), np.empty((len(q), len(v), len(v))))
         for K in range(len(q)):
             side = np.zeros_like(q)
             side[K] = h

@@ -30,10 +30,8 @@ from vi_contact.solvers.condensed import Condensed
 
 NEWTON_STEPS, HALVINGS = 60, 30
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
-GAP_TOLERANCE, ROUNDING = (
-    1e-11,
-    1e-15,
-)  # change of the gaps relative to the gaps, and to what they are a difference of
+# change of the gaps relative to the gaps, and to what they are a difference of
+GAP_TOLERANCE, ROUNDING = (1e-11, 1e-15)
 
 
 @dataclass(frozen=True)
@@ -195,9 +193,8 @@ class BoundaryLayer(Midpoint):
             for t, u in ((step.t, new.u), (state.t, state.u))
         )
         rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
-        memory = {
-            RATE: surface.reaction_load(rate, len(new.u))
-        }  # vectors of unknowns pass through checkpoints
+        # vectors of unknowns pass through checkpoints
+        memory = {RATE: surface.reaction_load(rate, len(new.u))}
         return replace(
             new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory=memory
         )

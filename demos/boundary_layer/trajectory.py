@@ -204,9 +204,8 @@ class _Passages:
                 "system's functions return there"
             )
         most = float(np.max(np.abs(self._acceleration(start, q, v, layer, inside)[0])))
-        reached = (
-            float(np.sqrt(most * layer.width)) or 1.0
-        )  # the speed over the width; 1 where nothing moves
+        # the speed over the width; 1 where nothing moves
+        reached = float(np.sqrt(most * layer.width)) or 1.0
         pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, reached)
         atol = self._rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
         found = solve_ivp(

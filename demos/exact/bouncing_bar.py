@@ -156,10 +156,8 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
         value, slope, curvature = wave[delayed]
         after = t - trip - start[delayed]
         value, slope = value + (slope + 0.5 * curvature * after) * after, slope + curvature * after
-        a, a1 = (
-            2.0 * slope - g * t,
-            2.0 * curvature - g,
-        )  # the free foot's velocity and acceleration
+        # the free foot's velocity and acceleration
+        a, a1 = (2.0 * slope - g * t, 2.0 * curvature - g)
         y, a = (0.0 if y <= near else y), (0.0 if abs(a) <= slow else a)
         touching = y == 0.0 and (a < 0.0 or (a == 0.0 and a1 < 0.0))
         fall = bar.height - 0.5 * g * t**2  # where the foot would be without F

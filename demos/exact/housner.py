@@ -104,9 +104,8 @@ class HousnerBlock:
         rest time.
         """
         t = np.asarray(t, dtype=float)
-        impacts = math.ceil(
-            math.log(REST) / math.log(self.energy_ratio)
-        )  # then phi is below REST, from any angle
+        # then phi is below REST, from any angle
+        impacts = math.ceil(math.log(REST) / math.log(self.energy_ratio))
         phi = self._amplitudes(theta0, impacts)
         ends = self.impact_times(theta0, len(phi) - 1)
         peaks = np.append(0.0, 0.5 * (ends[1:] + ends[:-1]))

@@ -30,9 +30,8 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
 
 
 def _panel(axis: Any, case: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    finest = rows[0][
-        "finest"
-    ]  # a row of the unsymmetric form there is no error, but a difference of the forms
+    # a row of the unsymmetric form there is no error, but a difference of the forms
+    finest = rows[0]["finest"]
     reference = rows[0]["reference_error"]
     for form, style in STYLES.items():
         chosen = [row for row in rows if row["form"] == form and row["k"] < finest]

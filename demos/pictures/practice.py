@@ -18,9 +18,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-sys.path.insert(
-    0, str(Path(__file__).resolve().parents[2])
-)  # run from the source tree without installing
+# run from the source tree without installing
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import vi_contact as vc
 from vi_contact.core.units import STANDARD_GRAVITY as G

@@ -25,11 +25,8 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, Solid
 from vi_contact.meshes.block import BlockMesh
 
-SIDES = {
-    1: ("left", "right"),
-    2: ("bottom", "top"),
-    3: ("bottom", "top"),
-}  # foot and top of a BlockMesh
+# foot and top of a BlockMesh
+SIDES = {1: ("left", "right"), 2: ("bottom", "top"), 3: ("bottom", "top")}
 UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis
 
 

@@ -57,9 +57,8 @@ class Tractions:
         weights = shares(self.x, place) * self.lengths[:, None]
         lengths, chosen = weights.sum(axis=0), slice(None) if nodes is None else nodes
         inside = (self.times > between[0] * (1 + 1e-9)) & (self.times <= between[1] * (1 + 1e-9))
-        covered = np.where(
-            lengths > 0.0, lengths, 1.0
-        )  # a hat between the nodes of a coarse mesh has none of them
+        # a hat between the nodes of a coarse mesh has none of them
+        covered = np.where(lengths > 0.0, lengths, 1.0)
         mine, theirs = (
             (_means(values[inside], count) @ weights / covered)[:, chosen]
             for values in (self.mine, self.theirs)

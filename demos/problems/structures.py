@@ -115,9 +115,8 @@ def disk_above_ground(comm: Any, cells: int, share: float) -> tuple[ContactProbl
     on = disk_mesh(comm, radius, cells)
     system = plate_system(on, PLATE, clamped=True, pressure=PRESSURE)
     own = on.geometry.x[np.hypot(*on.geometry.x[:, :2].T) < 0.99 * radius]
-    vertices = np.unique(
-        np.round(np.concatenate(comm.allgather(own)), 12), axis=0
-    )  # those on two ranks once
+    # those on two ranks once
+    vertices = np.unique(np.round(np.concatenate(comm.allgather(own)), 12), axis=0)
     gap = known.gap * PRESSURE * radius**4 / PLATE.D
     return vc.ContactProblem(
         system,

@@ -81,9 +81,8 @@ class RunComparison:
         """Add one more step. Collective."""
         surface, system, mean = report.problem.surface, report.problem.system, report.balance
         load = surface.reaction_load(mean.r_n, system.rows, mean.r_t)
-        force = 0.0 - surface.comm.sum(
-            system.influence.T @ surface.along_axes(load)
-        )  # on the body [N]
+        # on the body [N]
+        force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
         if not self.times:
             self._note(surface, report.old, np.zeros_like(force))
         self._note(surface, report.new, self.impulse[-1] + (report.new.t - report.old.t) * force)

@@ -158,9 +158,8 @@ def make(name: str, entry: Entry) -> dict[str, Any]:
         started = subprocess.Popen(
             ["bash", "-c", script], cwd=place / "run", stdout=printed, stderr=complaints
         )
-        _, status, used = os.wait4(
-            started.pid, 0
-        )  # the times of this entry, not of those beside it
+        # the times of this entry, not of those beside it
+        _, status, used = os.wait4(started.pid, 0)
         started.returncode = os.waitstatus_to_exitcode(status)
     if started.returncode:
         said = (place / "complaints.txt").read_text(encoding="utf-8", errors="replace")
@@ -287,9 +286,8 @@ def main(words: Sequence[str]) -> int:
             total += 0.0 if told["cached"] else told["processor"]
             before = ", made before" if told["cached"] else ""
             print(f"{name:<22} {told['processor']:7.1f} s of a processor{before}", flush=True)
-            lines = (
-                compare(name, every[name]) if name in gallery else []
-            )  # tests compare those of other pages
+            # tests compare those of other pages
+            lines = compare(name, every[name]) if name in gallery else []
             for complaint in (*lines, *keep(name, every[name], given.into, given.store)):
                 wrong += 1
                 print(f"gallery: {complaint}", file=sys.stderr, flush=True)

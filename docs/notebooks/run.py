@@ -25,6 +25,7 @@ NAMES = (
     "own_scheme",
     "bad_mesh",
 )
+# number of the picture in docs/figures
 SHOWN = {
     "bouncing_bar": 3,
     "obstacle_membrane": 1,
@@ -32,7 +33,7 @@ SHOWN = {
     "shaken_wall": 2,
     "own_scheme": 1,
     "bad_mesh": 1,
-}  # number of the picture in docs/figures
+}
 
 
 def cells(name: str) -> list[str]:
@@ -60,9 +61,8 @@ def run(name: str, out: Path) -> None:
     pyplot.show = show
     here, began = Path.cwd(), time.process_time()
     try:
-        exec(
-            compile("\n".join(cells(name)), name, "exec"), {"__name__": "__main__"}
-        )  # programs of this clone
+        # programs of this clone
+        exec(compile("\n".join(cells(name)), name, "exec"), {"__name__": "__main__"})
     finally:
         os.chdir(here)
     show()

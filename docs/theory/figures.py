@@ -241,9 +241,8 @@ def blow_up(path: Path) -> list[str]:
         schemes.items(), axes, (RED, BLUE, GREEN, "black"), strict=False
     ):
         h, _ = simulated(bar(case, n, mass=mass), scheme, dt, case.period)
-        change = (
-            h["energy_kinetic"] + h["energy_strain"] - h["work_input"]
-        )  # weight is in the input
+        # weight is in the input
+        change = h["energy_kinetic"] + h["energy_strain"] - h["work_input"]
         energy = 1.0 + (change - change[0]) / case.energy
         force = h["contact_resultant"]
         axis.plot(fine, exact(fine), color=GREY, lw=3, label="exact")
@@ -252,11 +251,12 @@ def blow_up(path: Path) -> list[str]:
         axis.set_title(name, fontsize=10, loc="left")
         axis.set_ylabel("force [N]")
         axes[-1].plot(h["t"], energy, color=look, lw=1.2, label=name.split(",")[0])
+        # chaotic: other digits elsewhere
         phrases.append(
             f"{force.max() / top:.2f} | {energy[-1]:.3f}"
             if energy[-1] < 10.0
             else f"more than 10 | more than {10 * int(energy[-1] / 10.0)}"
-        )  # chaotic: other digits elsewhere
+        )
         if force.max() > 2.0 * top:
             axis.text(
                 0.33,
@@ -340,9 +340,8 @@ def certificate(path: Path) -> list[str]:
     save(figure, path)
     assert worst.max() < 1e-13 and max(tops) < 1e-13
     told = spoiled[[report.new.active.any() for report in reports]]
-    largest = (
-        1e-5 * 1e-9 / np.median(told)
-    )  # the largest fault of the reaction that the tolerance accepts
+    # the largest fault of the reaction that the tolerance accepts
+    largest = 1e-5 * 1e-9 / np.median(told)
     tolerated = f"${1e6 * largest:.0f} \\cdot 10^{{-6}}$"
     slope = np.log(errors[-1] / errors[0]) / np.log(counts[-1] / counts[0])
     return [
@@ -642,9 +641,8 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help=f"of {', '.join(PAGES)}; all when none is given")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "figures")
     options = parser.parse_args()
-    logging.getLogger("vi_contact").setLevel(
-        logging.ERROR
-    )  # some schemes are here because they gain energy
+    # some schemes are here because they gain energy
+    logging.getLogger("vi_contact").setLevel(logging.ERROR)
     options.out.mkdir(parents=True, exist_ok=True)
     status = 0
     for name in options.names or PAGES:

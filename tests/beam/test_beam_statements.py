@@ -15,10 +15,8 @@ from demos.pictures import beam_statements as pictures
 from demos.problems.beam_statements import FACTORS, HEAD, Row, row, turning_points
 
 pytestmark = pytest.mark.serial
-WHOLE = (
-    ("A", 0.001),
-    ("C", 2.0),
-)  # with all forces, as in the table; the others with the whole force alone
+# with all forces, as in the table; the others with the whole force alone
+WHOLE = (("A", 0.001), ("C", 2.0))
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +61,8 @@ def test_no_reading_has_both(printed: dict[tuple[str, float], list[str]]) -> Non
 def test_turning_points() -> None:
     """Of a wave, of one with a small one on top, with and without a least swing."""
     t = np.linspace(0.0, 10.0 * np.pi, 5001)
-    assert (
-        turning_points(np.sin(t)) == 10 and turning_points(np.sin(t), 1.9) == 8
-    )  # 1 to the first, 1 after the last
+    # 1 to the first, 1 after the last
+    assert turning_points(np.sin(t)) == 10 and turning_points(np.sin(t), 1.9) == 8
     assert turning_points(np.sin(t), 2.1) == turning_points(t) == turning_points(np.zeros(9)) == 0
     rough = np.sin(t) + 0.01 * np.sin(200.0 * t)
     assert turning_points(rough) > 500 and turning_points(rough, 0.05) == 10

@@ -140,9 +140,8 @@ def test_rod_comes_to_rest() -> None:
     rod = Rod(viscosity=0.05, gap=0.05, body_force=lambda t: 20.0, end_force=lambda t: 3.0)
     _, ringing, _, _ = histories(rod_problem(rod, Elements(40)), 0.01, 1500, scheme=vc.Midpoint())
     assert 0.5 * (ringing[-1] + ringing[-2]) == pytest.approx(52.0, abs=1e-3)
-    _, quiet, _, _ = histories(
-        rod_problem(rod, Elements(40)), 0.01, 1500
-    )  # default scheme: no mass at the tip
+    # default scheme: no mass at the tip
+    _, quiet, _, _ = histories(rod_problem(rod, Elements(40)), 0.01, 1500)
     assert quiet[-2:] == pytest.approx(52.0, abs=1e-3)
 
 

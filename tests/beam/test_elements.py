@@ -78,9 +78,8 @@ def frequencies(beam: TimoshenkoBeam, *, end: str, count: int = 3) -> Array:
     """Angular frequencies [rad/s] of the clamped beam whose tip is free, or "guided": free to
     slide, not to turn."""
     KAG, EI, rho = beam.shear_stiffness, beam.bending_stiffness, beam.rho
-    free = {"free": (2, 3), "guided": (2, 1)}[
-        end
-    ]  # what vanishes at the tip, of (u, theta, shear force, moment)
+    # what vanishes at the tip, of (u, theta, shear force, moment)
+    free = {"free": (2, 3), "guided": (2, 1)}[end]
 
     def condition(omega: float) -> float:
         squared = rho * omega**2
@@ -115,9 +114,8 @@ def test_frequencies() -> None:
     M, S, load = beam_matrices(SEED, Elements(10))
     for matrix in (M.toarray(), S.toarray()):
         assert np.array_equal(matrix, matrix.T) and np.linalg.eigvalsh(matrix)[0] > 0.0
-    assert load.sum() == pytest.approx(
-        SEED.length * 19.0 / 20.0
-    )  # half an element's share is on the clamp
+    # half an element's share is on the clamp
+    assert load.sum() == pytest.approx(SEED.length * 19.0 / 20.0)
 
 
 def test_the_published_end_clamps_the_rotation() -> None:

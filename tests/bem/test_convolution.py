@@ -156,9 +156,8 @@ def test_rod_under_a_step(operators):
         axis=1
     )
     assert np.abs(by_traction - base).max() < 0.225
-    assert (
-        motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02
-    )  # exactly 2; numerical damping takes up to 7 %
+    # exactly 2; numerical damping takes up to 7 %
+    assert motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02
 
 
 def test_small_steps_stay_bounded():

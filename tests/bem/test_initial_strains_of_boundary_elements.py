@@ -29,9 +29,8 @@ from vi_contact.solvers.condensed import Condensed
 
 pytestmark = pytest.mark.serial
 WARM = 1e-3
-STRESS = (
-    3.0 * MATERIAL.lame_lambda + 2.0 * MATERIAL.shear_modulus
-) * WARM  # C eps_0 of all directions: a pressure
+# C eps_0 of all directions: a pressure
+STRESS = (3.0 * MATERIAL.lame_lambda + 2.0 * MATERIAL.shear_modulus) * WARM
 
 
 def warmed(blocks: EnergeticBlocks, history: Callable[[float], float], *, rollers: bool) -> Array:

@@ -150,9 +150,8 @@ def test_jumps_where_bodies_only_touch():
         run = march_contact(bodies.contact())
         found, weld = faces(bodies, run.forces), faces(joined(**more))
         away = np.abs(found[0] - weld[0]).mean(axis=1)
-        assert (
-            run.r_n.min() >= 0.0 and away.max() < bound * weld[0].max()
-        )  # where a pulse rings, it opens for a while
+        # where a pulse rings, it opens for a while
+        assert run.r_n.min() >= 0.0 and away.max() < bound * weld[0].max()
     bodies = joined(welded=False, jump=along(1, -JUMP))
     run = march_contact(bodies.contact())
     assert (

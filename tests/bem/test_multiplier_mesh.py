@@ -216,9 +216,8 @@ def test_the_weight():
         and patches.weights[1].tolist() == [1.0] * 4
     )
     start = own(patch=2, interval=4, testing="mean", sigma=1e4).weights[0]
-    assert start[0] > 0.999 and start.sum() == pytest.approx(
-        1.0, abs=1e-15
-    )  # a great one tests the start of intervals
+    # a great one tests the start of intervals
+    assert start[0] > 0.999 and start.sum() == pytest.approx(1.0, abs=1e-15)
     means = march_contact(BoundaryContact(patches.condensed())).r_n
     moved = []
     for sigma in (0.04, 0.02, 0.01):  # DT = 2/3
@@ -286,9 +285,8 @@ def test_the_benchmark(tmp_path):
     both; H = h takes Uzawa's method more iterations; its picture."""
     spec = spec_from_file_location("bem_multiplier", ROOT / "benchmarks" / "bem_multiplier.py")
     assert spec and spec.loader
-    benchmark = sys.modules["bem_multiplier"] = module_from_spec(
-        spec
-    )  # its dataclasses look for their module
+    # its dataclasses look for their module
+    benchmark = sys.modules["bem_multiplier"] = module_from_spec(spec)
     spec.loader.exec_module(benchmark)
     square, fine = benchmark.Square(6), benchmark.Square(8).finest("none")
     end, mean, thin, both = (
@@ -329,6 +327,5 @@ def test_bad_input():
     with pytest.raises(InputError, match="all their nodes in the compliance"):
         MultiplierMesh(mesh, mesh.labels == 1, condensed())
     with pytest.raises(InputError, match="not positive definite"):
-        march_contact(
-            BoundaryContact(own(patch=1, degree=1).condensed())
-        )  # more multipliers than nodes
+        # more multipliers than nodes
+        march_contact(BoundaryContact(own(patch=1, degree=1).condensed()))

@@ -155,9 +155,8 @@ def test_page_says_what_was_measured(compare: Any) -> None:
     peer has its rows."""
     page = (PEERS.parents[1] / "docs" / "reference" / "comparison.md").read_text(encoding="utf-8")
     stored = json.loads((PEERS / "results.json").read_text(encoding="utf-8"))
-    assert (
-        compare.renewed(page, compare.parts_of(stored)) == page
-    )  # else: compare.py --page with the page's path
+    # else: compare.py --page with the page's path
+    assert compare.renewed(page, compare.parts_of(stored)) == page
     rows = stored["rows"]
     assert {(row["name"], row["problem"]) for row in rows} == set(
         product(compare.names(), compare.PROBLEMS)

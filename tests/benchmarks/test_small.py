@@ -43,9 +43,8 @@ def at_most(measured: Any, size: float) -> Any:
     )
 
 
-SMALL: Mapping[
-    str, tuple[str, str, Mapping[str, Any]]
-] = {  # name -> its words, what it prints, smaller parts of it
+# name -> its words, what it prints, smaller parts of it
+SMALL: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
     "beam_steps": ("--elements 20 --repeat 1", r"^ +20( +\d\.\d{3}){4}$", {"STEPS": 20}),
     "bem": ("--one 3 18 1", r'"pulse P": 0\.1.*"step": 0\.0.*"march": ', {}),
     "bem_convolution": ("--one convolution 3", r'"pulse P": 0\.0.*"Uzawa": \d', {}),

@@ -19,9 +19,8 @@ from demos.boundary_layer.trajectory import LayerContact, Trajectory, layer_moti
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
-PLANE = ConstrainedSystem(
-    np.eye(2), lambda q: q[0], lambda q: np.array([1.0, 0.0])
-)  # a unit mass before x = 0
+# a unit mass before x = 0
+PLANE = ConstrainedSystem(np.eye(2), lambda q: q[0], lambda q: np.array([1.0, 0.0]))
 
 
 def normal_mass(M: np.ndarray, A: np.ndarray) -> float:
@@ -129,9 +128,8 @@ def test_events_flight_and_several_contacts():
     assert motion.contacts[1].start - first.end == pytest.approx(2.0 * first.rate_out / g, abs=1e-8)
     again = layer_motion(ball, Layer(b, k=layer.k, c=layer.c), q0=[1.0 + b], v0=[0.0], t_end=1.2)
     second = [one.contacts[1].restitution for one in (motion, again)]
-    slower = restitution(
-        0.5 * damping_ratio(0.5)
-    )  # c/V fixed: half the speed halves s; V of each impact: s stays
+    # c/V fixed: half the speed halves s; V of each impact: s stays
+    slower = restitution(0.5 * damping_ratio(0.5))
     assert second == pytest.approx([slower, 0.5], abs=1e-5)
     assert (
         np.all(motion.rho > 0.0)
@@ -199,9 +197,8 @@ def test_an_ellipsoid_turns_and_bounces():
     rate = system.velocity(q0, v0)
     ahead, behind = body.rho(q0 + h * rate), body.rho(q0 - h * rate)
     assert (ahead - behind) / (2.0 * h) == pytest.approx(body.gradient(q0) @ v0, abs=1e-9)
-    curvature = (
-        ahead + behind - 2.0 * body.rho(q0)
-    ) / h**2  # p moves along a straight line: the same turn to O(h³)
+    # p moves along a straight line: the same turn to O(h³)
+    curvature = (ahead + behind - 2.0 * body.rho(q0)) / h**2
     assert curvature == pytest.approx(system.turning(q0, v0), abs=1e-4 * abs(curvature))
     layer = layer_for(0.6, mass=1.0, speed=5.0, width=1e-4)
     motion = layer_motion(system, Layer(1e-4, k=layer.k, c=layer.c), q0=q0, v0=v0, t_end=0.9)
@@ -233,9 +230,8 @@ def test_metric_and_affinities():
     assert np.einsum("k,kij,i,j->", A, turned, v, v) == pytest.approx(
         -((A @ v) ** 2) / rho, rel=1e-12
     )
-    orthogonal = (
-        M @ np.linalg.svd(A[None, :])[2][1:].T
-    )  # momenta of directions with A v = 0 get nothing
+    # momenta of directions with A v = 0 get nothing
+    orthogonal = M @ np.linalg.svd(A[None, :])[2][1:].T
     assert np.einsum("ks,kij->sij", orthogonal, turned) == pytest.approx(0.0, abs=1e-10)
 
 
@@ -294,9 +290,8 @@ def test_a_string_in_the_layer_tends_to_the_rod():
     errors = []
     for b in (1e-2, 1e-3):
         layer = Layer(b, k=4.0 * m * g / b, c=4.0 * m * g, speed=np.sqrt(g * b), start=0.5 * b)
-        q0 = (1.0 - 0.8548632868746187 * b) * np.array(
-            [np.sin(angle), -np.cos(angle)]
-        )  # in equilibrium along it
+        # in equilibrium along it
+        q0 = (1.0 - 0.8548632868746187 * b) * np.array([np.sin(angle), -np.cos(angle)])
         motion = layer_motion(
             string, layer, q0=q0, v0=np.zeros(2), t_end=quarter, metric=Metric.FULL, rtol=1e-9
         )
@@ -313,9 +308,8 @@ def test_starts_and_systems_that_cannot_be():
         layer_motion(PLANE, layer, q0=[-0.1, 0.0], v0=[-1.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="t_end is 0.0"):
         layer_motion(PLANE, layer, q0=[1.0, 0.0], v0=[-1.0, 0.0], t_end=0.0)
-    with pytest.raises(
-        InputError, match="layer speed V is 0.0"
-    ):  # in the layer, at rest, V unknown
+    # in the layer, at rest, V unknown
+    with pytest.raises(InputError, match="layer speed V is 0.0"):
         layer_motion(PLANE, layer, q0=[0.5, 0.0], v0=[0.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="mass matrix is not symmetric positive definite"):
         ConstrainedSystem(np.diag([1.0, -1.0]), PLANE.rho, PLANE.gradient)

@@ -45,9 +45,8 @@ def stiff(e: float, metric: Metric, *, dt: float, elements: int = 1, E: float = 
     problem = bar(elements, E=E, gap=0.2, v0=lambda x: np.full_like(x, -10.0))
     for report in run(problem, BoundaryLayer(law=law_of(e, metric)), dt=dt, steps=round(0.12 / dt)):
         assert report.certificate.worst < 1e-9
-    assert (
-        problem.surface.gap0[0] - problem.surface.normal_values(report.new.u)[0] > 0.1
-    )  # it has left
+    # it has left
+    assert problem.surface.gap0[0] - problem.surface.normal_values(report.new.u)[0] > 0.1
     momentum = float(np.sum(problem.system.M @ problem.cartesian(report.new.v)))
     return momentum / (10.0 * 10.0 * e)
 

@@ -91,9 +91,8 @@ def test_no_memory_is_no_damage(
     """Wherever a report has no memory, it says so, and not that a file is damaged."""
     (folder / "run" / "model.json").write_text(json.dumps(MODEL))
     module, _, name = place.rpartition(".")
-    owner = sys.modules.get(module) or pkgutil.resolve_name(
-        module
-    )  # the room has a function of the module's name
+    # the room has a function of the module's name
+    owner = sys.modules.get(module) or pkgutil.resolve_name(module)
     monkeypatch.setattr(owner, name, raising(error))
     assert main(["report", str(folder / "run")]) == 1
     assert capsys.readouterr().err.startswith(NO_MEMORY)

@@ -85,9 +85,8 @@ STEP = {
     ],
 }
 SET = [value for value in POSITIVE if value]  # an empty one takes the key away
-WRONG: dict[
-    str, dict[str, list[str]]
-] = {  # command -> option -> values; an option "" stands for more words
+# command -> option -> values; an option "" stands for more words
+WRONG: dict[str, dict[str, list[str]]] = {
     "motion info FILE": READING | {"": ["x.at2", "--nosuch", "FOLDER"]},
     "motion plot FILE": {
         "--out": ["x.nosuch", "nowhere/x.png", "", "FILE"],
@@ -352,10 +351,8 @@ def words(command: str, option: str, value: str) -> list[str]:
         return [*command.split(), *f"{option}{value}".split(" ")]
     given = value.split(" ") if value else [""]
     if option and len(given) == 1 and " " not in option:
-        return [
-            *command.split(),
-            f"{option}={value}",
-        ]  # a value that begins with a dash is one, too
+        # a value that begins with a dash is one, too
+        return [*command.split(), f"{option}={value}"]
     return [*command.split(), *option.split(), *given]
 
 

@@ -45,9 +45,8 @@ def test_numbers_of_no_facet_are_refused_on_all_ranks() -> None:
                 match=f"{kind.__name__}: 'a' has numbers from .* give numbers of this mesh",
             ):
                 kind("a", mine, mesh)
-    here = (
-        np.array([0]) if COMM.rank == 0 else np.zeros(0)
-    )  # a rank may have none, whatever their type
+    # a rank may have none, whatever their type
+    here = np.array([0]) if COMM.rank == 0 else np.zeros(0)
     assert fem.Facets("a", np.tile(here, 2), mesh).indices.dtype == np.int32
 
 

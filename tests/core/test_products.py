@@ -107,9 +107,8 @@ def test_only_vectors_that_nobody_writes_to_are_remembered():
     assert remembered(x) is not first  # only so many are kept
     told = remembered.know(np.array([7.0]), lambda: np.array([0.5]))
     assert remembered(told).tolist() == [0.5]
-    assert remembered(told.copy()).tolist() == [
-        14.0
-    ]  # equal numbers in another place are another vector
+    # equal numbers in another place are another vector
+    assert remembered(told.copy()).tolist() == [14.0]
 
 
 def test_the_load_of_a_time_is_made_once():

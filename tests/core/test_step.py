@@ -22,9 +22,8 @@ def test_equations_are_in_the_contact_direction():
     np.testing.assert_array_equal(problem.equations.u0[:2], [-1.0, 3.5])
     np.testing.assert_array_equal(problem.cartesian(problem.equations.u0), problem.system.u0)
     np.testing.assert_array_equal(problem.surface.normal_values(problem.equations.u0), [-1.0])
-    assert problem.equations.load(0.0)[0] == pytest.approx(
-        2.0 * 2.5 / 2
-    )  # weight of half an element, towards the wall
+    # weight of half an element, towards the wall
+    assert problem.equations.load(0.0)[0] == pytest.approx(2.0 * 2.5 / 2)
 
 
 def test_base_motion_loads_the_body_with_its_inertia():

@@ -109,9 +109,8 @@ def test_selection_and_its_transpose():
 def test_held_and_on_springs():
     surface = chain_surface(4, weight=0.25)
     assert surface.bilateral_everywhere().bilateral.all() and not surface.bilateral.any()
-    np.testing.assert_array_equal(
-        surface.on_springs(8.0).compliance, [0.5]
-    )  # k = 8 Pa/m times 0.25 m²
+    # k = 8 Pa/m times 0.25 m²
+    np.testing.assert_array_equal(surface.on_springs(8.0).compliance, [0.5])
     for stiffness in (0.0, -1.0, np.inf, np.nan):
         with pytest.raises(InputError, match="the foundation modulus is"):
             surface.on_springs(stiffness)

@@ -36,9 +36,8 @@ def load() -> Load:
 def test_load_is_the_sum_of_its_parts():
     f = load()
     np.testing.assert_allclose(f(0.5), [1.0 + np.cos(0.5), 7.0, 3.25], rtol=1e-15)
-    np.testing.assert_allclose(
-        f(0.0), [2.0, 2.0, 3.0], rtol=1e-15
-    )  # f(0.5) has left the constant part alone
+    # f(0.5) has left the constant part alone
+    np.testing.assert_allclose(f(0.0), [2.0, 2.0, 3.0], rtol=1e-15)
 
 
 def test_load_turns_with_the_basis():

@@ -146,9 +146,8 @@ def test_units_do_not_matter():
     """x in units of a millionth, r in units of a thousand: A, b and bounds follow, the certificate
     stays."""
     step, result = pressed()
-    step = replace(
-        step, A=EffectiveMatrix(step.A.matrix, step.A.algebra)
-    )  # A x by one product on both sides
+    # A x by one product on both sides
+    step = replace(step, A=EffectiveMatrix(step.A.matrix, step.A.algebra))
     length, force = 2.0**20, 2.0**-10  # powers of two: bit-equal
     A = EffectiveMatrix(step.A.algebra.combine([(force / length, step.A.matrix)]), step.A.algebra)
     wrong = replace(result, x=result.x + 1e-7, r_n=result.r_n - 0.5)
@@ -220,9 +219,8 @@ def test_V97_ledger_closes(scheme, damping, impact):
     assert (totals["damping"] > 1e-3 * biggest) == (damping > 0.0)
     assert (totals["impact"] != 0.0) == (impact is not None)
     if scheme is HALF:
-        assert (
-            abs(totals["algorithmic"]) <= 1e-12 * biggest
-        )  # the midpoint rule has no algorithmic loss
+        # the midpoint rule has no algorithmic loss
+        assert abs(totals["algorithmic"]) <= 1e-12 * biggest
     if isinstance(impact, Inelastic) and isinstance(impact.update, ImpulseUpdate):
         assert totals["impact"] > 0.0
 

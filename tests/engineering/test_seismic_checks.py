@@ -128,9 +128,8 @@ def test_smooth_wall_is_the_published_one() -> None:
         assert smooth_wall(nu, 20.0) == pytest.approx((thrust, height), rel=4e-3)
     exact = smooth_wall(0.3, 20.0, 32000)
     assert smooth_wall(0.3, 20.0) == pytest.approx(exact, rel=2e-6)
-    assert smooth_wall(0.3, 40.0, 8000) == pytest.approx(
-        smooth_wall(0.3, 20.0, 4000), rel=1e-5
-    )  # far is far
+    # far is far
+    assert smooth_wall(0.3, 40.0, 8000) == pytest.approx(smooth_wall(0.3, 20.0, 4000), rel=1e-5)
     narrow = smooth_wall(0.3, 0.02)[0]  # a column between two walls that hold all of it
     assert narrow == pytest.approx(0.01, rel=0.02)
 
@@ -210,9 +209,8 @@ def test_newmark_of_a_pulse_and_of_a_record() -> None:
     a = 0.4 * 9.81 * (t < 0.6) * np.array([1, 1, 0, 0])
     history = {"t": t, "a_g_x": a, "a_g_y": 0 * t, "sliding_base": 3.0 + t}
     pulse = NewmarkBlock(mu=0.2, gravity=9.81).compare(history)
-    assert (
-        pulse.expected == pytest.approx(0.4905, rel=1e-3) and pulse.found == 2.0
-    )  # parts of 16 and 47 ms
+    # parts of 16 and 47 ms
+    assert pulse.expected == pytest.approx(0.4905, rel=1e-3) and pulse.found == 2.0
     noise = 8.0 * np.convolve(
         np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same"
     )
@@ -226,9 +224,8 @@ def test_newmark_to_one_side_is_that_of_an_independent_program() -> None:
     motion = 0.4 * np.sin(2 * np.pi * T) * np.sin(np.pi * T / 10) ** 2
     motion = G * (motion + 0.1 * np.sin(4.6 * np.pi * T) * np.sin(np.pi * T / 10))
     for sign, slid in ((-1.0, 1.1838483), (1.0, 1.1390758)):
-        assert block(sign * motion, mu=0.1, one_sided=True) == pytest.approx(
-            slid, rel=6e-4
-        )  # the step of 5 ms: 2e-4
+        # the step of 5 ms: 2e-4
+        assert block(sign * motion, mu=0.1, one_sided=True) == pytest.approx(slid, rel=6e-4)
 
 
 def test_newmark_on_a_slope() -> None:
@@ -262,9 +259,8 @@ def test_newmark_slides_to_the_side_that_is_named() -> None:
         )
     pulse = np.where(T < 0.5, 0.4 * 9.81, 0.0)
     away = {"mu": 0.2, "gravity": 9.81, "one_sided": True, "towards": -1.0}
-    assert block(pulse, **away) == pytest.approx(
-        0.4905, rel=0.02
-    )  # the pulse ends within a step of 5 ms
+    # the pulse ends within a step of 5 ms
+    assert block(pulse, **away) == pytest.approx(0.4905, rel=0.02)
     assert (
         block(pulse, **(away | {"towards": 1.0}))
         == block(pulse, **(away | {"towards": 0.0}))
@@ -278,9 +274,8 @@ def test_newmark_slides_to_the_side_that_is_named() -> None:
     history = run(pulse, sliding_base=-0.002 + 1e-3 * T)
     assert "slides under its weight" in NewmarkBlock(mu=0.2, slope=-0.5).compare(history).applies
     assert NewmarkBlock(**away).compare(history).name == "NewmarkBlock, one sided"
-    assert NewmarkBlock(**away).compare(history).found == pytest.approx(
-        0.01, rel=1e-12
-    )  # through zero
+    # through zero
+    assert NewmarkBlock(**away).compare(history).found == pytest.approx(0.01, rel=1e-12)
     silent = NewmarkBlock(mu=0.2).compare(run(0.0 * T, sliding_base=0.0 * T))
     assert silent.applies.startswith("the column a_g_x is zero: name acceleration=") and math.isnan(
         silent.expected

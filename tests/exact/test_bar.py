@@ -31,9 +31,8 @@ def test_thrown_steel_bar_numbers():
     """V1.1, the published second data set."""
     assert STEEL.wave_speed == pytest.approx(5000.0)
     assert (STEEL.contact_start, STEEL.contact_end) == (pytest.approx(2e-5), pytest.approx(1e-4))
-    assert STEEL.displacement([0.0, 0.2], 6e-5) == pytest.approx(
-        [-2e-3, -6e-3]
-    )  # the top: -4 mm since touch-down
+    # the top: -4 mm since touch-down
+    assert STEEL.displacement([0.0, 0.2], 6e-5) == pytest.approx([-2e-3, -6e-3])
     assert STEEL.energy == pytest.approx(8e6) and STEEL.pressure == pytest.approx(4e9)
     assert STEEL.velocity(0.2, [1e-5, 9e-5]) == pytest.approx([-100.0, 100.0])
 

@@ -77,9 +77,8 @@ def test_bar_obeys_its_equations(height):
     bar = BouncingBar(height=height)
     until = 6.0
     x, t = LENGTH * (0.1 + 0.8 * RANDOM.random(2000)), until * (0.1 + 0.8 * RANDOM.random(2000))
-    round_off = (
-        16 * np.finfo(float).eps * G * until**2
-    )  # the largest of the terms that cancel, five of them
+    # the largest of the terms that cancel, five of them
+    round_off = 16 * np.finfo(float).eps * G * until**2
     assert wave_defect(bar.displacement, length=LENGTH, c=C, until=until, force=-G) < round_off
     assert derivative_defect(bar.displacement, bar.velocity, x=x, t=t, h=(0.0, 1e-5)) < 1e-8
     assert derivative_defect(bar.displacement, bar.strain, x=x, t=t, h=(1e-4, 0.0)) < 1e-8
@@ -93,9 +92,8 @@ def test_bar_obeys_its_equations(height):
         bar.displacement, bar.velocity, bar.strain, length=LENGTH, E=900.0, rho=1.0, t=t[:20], g=G
     )
     scale = 500.0  # kinetic energies at the impact of the bar of V1.2
-    assert energy == pytest.approx(
-        np.zeros(20), abs=2e-4 * scale
-    )  # zero level: where it is released
+    # zero level: where it is released
+    assert energy == pytest.approx(np.zeros(20), abs=2e-4 * scale)
 
 
 def test_impulse_is_the_change_of_momentum():

@@ -53,9 +53,8 @@ def test_line_pressure_bends_the_half_plane_to_the_cylinder():
     line = HertzLine(0.02, RIGID_PLANE, 1.0)
     a = line.half_width
     assert quad(line.pressure, -a, a, epsabs=0.0)[0] == pytest.approx(line.force, rel=1e-6)
-    s = -a * np.cos(
-        (np.arange(20000) + 0.5) * math.pi / 20000
-    )  # Gauss-Chebyshev of the second kind, nearly
+    # Gauss-Chebyshev of the second kind, nearly
+    s = -a * np.cos((np.arange(20000) + 0.5) * math.pi / 20000)
     weight = math.pi / 20000 * np.sqrt(a * a - s * s) * line.pressure(s)
     for x in (0.3 * a, 0.8 * a):
         sunk = -2.0 / (math.pi * RIGID_PLANE) * (weight * np.log(np.abs((x - s) / s))).sum()

@@ -72,9 +72,8 @@ def test_history_solves_the_slender_equation(phi0):
     t, theta = rocked(BLOCK, phi0 * ALPHA, 6.0, sine=False)
     assert BLOCK.free_rocking(phi0 * ALPHA, t) == pytest.approx(theta, abs=1e-6 * ALPHA)
     t, theta = rocked(BLOCK, phi0 * ALPHA, 2.0, sine=True)
-    assert (
-        np.abs(BLOCK.free_rocking(phi0 * ALPHA, t) - theta).max() < 0.02 * ALPHA
-    )  # slender: alpha = 0.2
+    # slender: alpha = 0.2
+    assert np.abs(BLOCK.free_rocking(phi0 * ALPHA, t) - theta).max() < 0.02 * ALPHA
 
 
 def test_history_ends_at_rest():

@@ -94,9 +94,8 @@ def test_refinement_changes_nothing():
         at = np.searchsorted(dense, t)
         assert fine_u[at] == pytest.approx(u, abs=1e-12 * np.abs(u).max())
         assert fine_v[at] == pytest.approx(v, abs=1e-12 * np.abs(v).max())
-    assert v == pytest.approx(
-        -np.append(0.0, np.cumsum(0.05 * (a[1:] + a[:-1]))), abs=1e-12
-    )  # the free one
+    # the free one
+    assert v == pytest.approx(-np.append(0.0, np.cumsum(0.05 * (a[1:] + a[:-1]))), abs=1e-12)
     mirror = BLOCK.history(t, -a)[0]
     assert (mirror == -BLOCK.history(t, a)[0]).all()
 

@@ -78,9 +78,8 @@ def test_mass_of_rigid_motions(name):
     mass = CONCRETE.rho * lengths.prod()
     for i in range(d):
         assert 2.0 * system.kinetic_energy(system.influence[:, i]) == pytest.approx(mass, rel=1e-13)
-    second = mass * (
-        np.diag(lengths**2) / 12.0 + np.outer(lengths, lengths) / 4.0
-    )  # ∫ rho x xᵀ, before turning
+    # ∫ rho x xᵀ, before turning
+    second = mass * (np.diag(lengths**2) / 12.0 + np.outer(lengths, lengths) / 4.0)
     for turn in rotations(d):
         W = turn(np.eye(d)).T
         c, s = np.cos(BODIES[name].get("angle", 0.0)), np.sin(BODIES[name].get("angle", 0.0))

@@ -56,10 +56,8 @@ def test_the_shares_of_bubbles_on_flat_and_curved_facets() -> None:
     )
     sizes, shares = _integrals(bent)
     s, t = (one.ravel() for one in np.meshgrid(*[(np.arange(400) + 0.5) / 400] * 2, indexing="ij"))
-    s, t = (
-        np.where(s + t > 1.0, 1.0 - s, s),
-        np.where(s + t > 1.0, 1.0 - t, t),
-    )  # midpoints of a square, folded
+    # midpoints of a square, folded
+    s, t = (np.where(s + t > 1.0, 1.0 - s, s), np.where(s + t > 1.0, 1.0 - t, t))
     hats = np.stack([1.0 - s - t, s, t])
     bubbles = 4.0 * hats[OTHERS].prod(axis=1)
     slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
@@ -192,9 +190,8 @@ def test_pressure_and_shear_go_through_two_bodies(curved: bool, limit: float) ->
     def moved(x: Array, way: float) -> Array:
         return sheared(x - np.array([0.0, low, 0.0])) + np.array([way, 0.0, 0.0])
 
-    exact = per_body(
-        system, lambda x: moved(x, 0.0), lambda x: moved(x, slip)
-    )  # the lower one is the first
+    # the lower one is the first
+    exact = per_body(system, lambda x: moved(x, 0.0), lambda x: moved(x, slip))
     assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-9 * top
 
 

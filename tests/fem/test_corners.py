@@ -128,9 +128,8 @@ def test_one_group_is_a_group_for_each_face(name):
     one, d = seen(one), one.points.shape[1]
     assert sorted({len(corner) for corner in one.corners}) == list(range(2, d + 1))
     assert sum(len(corner) == d for corner in one.corners) == 2**d
-    assert (
-        np.linalg.norm(one.weights @ one.normals) < 1e-13 * one.weights.sum()
-    )  # a closed boundary
+    # a closed boundary
+    assert np.linalg.norm(one.weights @ one.normals) < 1e-13 * one.weights.sum()
 
 
 def thrown(name: str, surface_of: Any, **how: Any) -> tuple[ContactSurface, Array, Array, Array]:
@@ -469,9 +468,8 @@ def test_one_direction_is_one_condition():
     assert not seen(own).corners and seen(own).gap0[seen(own).points[:, 1] == 0.0] == pytest.approx(
         [0.25] * 5
     )
-    leaning_sides, names = body(
-        "trapezoid"
-    )  # seen from the corner, its side looks away from the ground
+    # seen from the corner, its side looks away from the ground
+    leaning_sides, names = body("trapezoid")
     below = fem.contact_surface(
         leaning_sides, group(names, "left", "bottom"), obstacle=ground, points=[(0.0, 0.0)]
     )

@@ -32,9 +32,8 @@ from vi_contact.run.static import static_equilibrium
 COMM = MPI.COMM_WORLD
 Q = 1e6
 SOFT, STIFF = 1e8, 1e14  # a larger contrast is lost in the factors of a PETSc without CHOLMOD
-ROUNDED = (
-    5.0 * SOFT / STIFF
-)  # the ground gives way by their ratio, a little more where its facets are small
+# the ground gives way by their ratio, a little more where its facets are small
+ROUNDED = 5.0 * SOFT / STIFF
 
 
 def pressed(mesh: Any, *, clamped: str, names: tuple[str, str]) -> tuple[ContactSurface, Array]:

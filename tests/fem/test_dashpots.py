@@ -127,14 +127,12 @@ def test_compliant_base(comm, wave):
     """V8.2: the surface moves with 2 v_up(t - H/c), the base with v_up(t) + v_up(t - 2H/c); then
     silence. 1 %."""
     speed, direction = WAVES[wave]
-    shake = vc.Ricker(
-        1.0, speed / 15.0, direction=direction
-    )  # 30 cells in the wavelength of the peak
+    # 30 cells in the wavelength of the peak
+    shake = vc.Ricker(1.0, speed / 15.0, direction=direction)
     up = soil.upgoing(shake, dt=1e-4)
     problem, crossing = linear(soil_on_compliant_base(comm, up)), 30.0 / speed
-    dt = (
-        0.7 * 0.5 / speed
-    )  # where the lead of consistent mass and the lag of the trapezoidal rule are equal
+    # where the lead of consistent mass and the lag of the trapezoidal rule are equal
+    dt = 0.7 * 0.5 / speed
     steps = math.ceil((shake.duration + 2.2 * crossing) / dt)
     top, foot = history(
         problem, [(0.0, 30.0), (0.0, 0.0)], derivative=1, dt=dt, steps=steps
@@ -144,9 +142,8 @@ def test_compliant_base(comm, wave):
     peak = np.abs(wanted).max()
     assert np.abs(top - wanted).max() < 0.01 * peak
     assert np.abs(foot - np.array([up(s) + up(s - 2.0 * crossing) for s in t])).max() < 0.01 * peak
-    assert (
-        np.abs(top[t > shake.duration + 1.2 * crossing]).max() < 2e-3 * peak
-    )  # the echo, 1e-6 of the energy
+    # the echo, 1e-6 of the energy
+    assert np.abs(top[t > shake.duration + 1.2 * crossing]).max() < 2e-3 * peak
 
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))  # of a box: x, y, z
@@ -190,9 +187,8 @@ def test_faces_of_a_box_have_their_impedance(comm, simplices, angle):
 def test_nodes_on_edges_and_corners_have_the_dashpots_of_all_their_faces(comm):
     """A quarter of the area of every cell face round a node, P along its normal, S along it: one
     face, two, three."""
-    mesh, tags = block(
-        comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3)
-    )  # cells of 1 m x 0.5 m x 1 m
+    # cells of 1 m x 0.5 m x 1 m
+    mesh, tags = block(comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3))
     quarter = {"left": (0, 0.125), "bottom": (1, 0.25), "back": (2, 0.125)}
     system = fem.assemble(mesh, SOIL, dashpots=[fem.Dashpots(tags[name]) for name in quarter])
     for c, rigid in enumerate(system.influence.T):

@@ -487,9 +487,8 @@ def test_an_edge_between_tied_ends(two):
     )
     rows = rows[np.lexsort(np.round(rows[:, [0, 1, 3, 4, 2]], 6).T)].reshape(3, 6, 8)
     assert np.abs(rows - rows[0]).max(axis=(0, 1))[[0, 1, 3, 4, 5]].max() < 1e-12
-    shares = np.array(
-        [1.0, 17.0 / 15.0, 13.0 / 15.0]
-    )  # cells along z are 38, 30 and 22 ninetieths long
+    # cells along z are 38, 30 and 22 ninetieths long
+    shares = np.array([1.0, 17.0 / 15.0, 13.0 / 15.0])
     assert rows[:, :, 6] == pytest.approx(shares[:, None] * rows[0, :, 6], rel=1e-12)
     if two:
         push = forces(problem, found.reaction_load(found.weights, system.rows))

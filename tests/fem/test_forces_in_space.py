@@ -107,9 +107,8 @@ def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, t
         assert np.abs(six_of(row, name) - expected).max() < 1e-10 * np.abs(expected).max(), name
     back = {name: cuts[name][[0, 2, 1]] for name in ("foot", "inclined")}  # sides exchanged
     turned = fem.SectionForces(back, loads=loads).start(problem, state)
-    for name in (
-        back
-    ):  # the other way through: N and M_t stay, along the same axes the others change their signs
+    # the other way through: N and M_t stay, along the same axes the others change their signs
+    for name in back:
         assert six_of(turned, name) == pytest.approx(
             six_of(row, name)[[0, 2, 1, 3, 5, 4]] * (1, -1, -1, 1, -1, -1)
         )
@@ -218,9 +217,10 @@ def test_one_leg_of_two(comm: Any) -> None:
     row = fem.SectionForces(cuts, loads=loads).start(problem, state)
     assert row["N_left"] == pytest.approx(-250.0, rel=1e-10)
     assert row["N_both"] == pytest.approx(-1000.0, rel=1e-10)
+    # -∫ s_2 sigma
     assert row["M_3_both"] == pytest.approx(
         250.0 * (0.25 - 1.25) + 750.0 * (2.25 - 1.25), rel=1e-10
-    )  # -∫ s_2 sigma
+    )
     for corners, text in (
         (rectangle(0.0, 0.3), "ends inside"),
         (rectangle(0.6, 1.2), "elements cover 0 of its 0.6 m²"),

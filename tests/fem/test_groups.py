@@ -231,9 +231,8 @@ def test_the_later_pair_of_initial_values_counts_where_cells_meet(degree):
         points, v = field(system, system.v0)
         place = points / (0.2, 0.1875)
         low, high = np.floor(place - 1e-6).astype(int), np.floor(place + 1e-6).astype(int)
-        touches = np.zeros(
-            len(points), dtype=bool
-        )  # the later ones, among the up to four squares about a point
+        # the later ones, among the up to four squares about a point
+        touches = np.zeros(len(points), dtype=bool)
         for i, j in product((low[:, 0], high[:, 0]), (low[:, 1], high[:, 1])):
             touches |= (i >= 0) & (i < 10) & (j >= 0) & (j < 8) & ((i + j) % 2 == later)
         assert 0 < touches.sum() < len(touches)

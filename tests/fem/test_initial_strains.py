@@ -122,14 +122,12 @@ def test_tensors_and_parts_of_a_body():
     gradient = WARM * np.array([[1.0, 3.0], [-0.5, -2.0]])
     problem, state, error = followed(2, lambda x: x @ gradient.T, fem.InitialStrain(gradient))
     sizes = [error, max_over_ranks(COMM, stress(problem, state)) / (E * WARM)]
-    across = np.diag(
-        [0.0, 0.0, WARM]
-    )  # sigma_xx = 0 again where the plane contracts as a bar that is pulled along z
+    # sigma_xx = 0 again where the plane contracts as a bar that is pulled along z
+    across = np.diag([0.0, 0.0, WARM])
     problem, state, error = followed(2, lambda x: NU * WARM * x, fem.InitialStrain(across))
     sizes += [error, max_over_ranks(COMM, stress(problem, state)) / (E * WARM)]
-    Q = WOOD._rotation[
-        :2, :2
-    ]  # in plane strain wood takes sigma_zz = -E3 alpha dT, and contracts by nu_i3 / E_i of it
+    # in plane strain wood takes sigma_zz = -E3 alpha dT, and contracts by nu_i3 / E_i of it
+    Q = WOOD._rotation[:2, :2]
     gradient = (
         WARM
         * Q
@@ -256,9 +254,8 @@ def test_sudden_warming_sends_waves_of_its_stress():
     h = runs[0]
     t, push, pull = h["t"] / crossing, -h["contact_force_x"] / unit, h["reaction_x_support"] / unit
     impulse = float(np.sum(0.5 * (push[1:] + push[:-1]) * np.diff(t)))
-    assert impulse == pytest.approx(
-        1.0, abs=0.045
-    )  # 1.5 % here, 1.0 % and 0.6 % on 100 and 200 cells
+    # 1.5 % here, 1.0 % and 0.6 % on 100 and 200 cells
+    assert impulse == pytest.approx(1.0, abs=0.045)
     middle = [
         np.mean(one[(t > a + 0.2) & (t < a + 0.8)])
         for one, a in ((push, 1.0), (pull, 0.0), (pull, 1.0))
@@ -296,9 +293,8 @@ def test_histories_work_on_a_body_that_is_held():
         linear(system), scheme=Midpoint(), solver=Condensed(), dt=0.25, t_end=1.0, record=record
     ).history
     late = [h[name][-1] / (E * WARM) for name in ("N_on", "N_through", "reaction_x_left")]
-    assert late == pytest.approx(
-        [-0.875, -0.875, 0.875], abs=1e-9
-    )  # forces are those of mid-step, s = 7/8
+    # forces are those of mid-step, s = 7/8
+    assert late == pytest.approx([-0.875, -0.875, 0.875], abs=1e-9)
     energy = [h[name][-1] / (E * WARM**2) for name in ("energy_strain", "work_input")]
     assert energy == pytest.approx([1.0, 1.0], abs=1e-9)
 

@@ -94,9 +94,8 @@ def test_a_half_disk_whose_named_arc_is_a_copy_of_its_boundary(comm):
     owned = mesh.topology.index_map(1).size_local
     n = comm.allreduce(int((tags["arc"].indices < owned).sum()))
     assert n >= 8
-    assert size(tags["arc"]) == pytest.approx(
-        2 * n * math.sin(math.pi / (2 * n)), rel=1e-6
-    )  # Gmsh spaces to 1e-9
+    # Gmsh spaces to 1e-9
+    assert size(tags["arc"]) == pytest.approx(2 * n * math.sin(math.pi / (2 * n)), rel=1e-6)
 
 
 def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
@@ -126,9 +125,8 @@ def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
 
     expected = {"base": 2.0, "outer": 6.0, "middle": 0.0, "body": 2.0, "half": 1.0}
     _, tags = fem.build_mesh(Shared(), comm)
-    assert (
-        sizes(tags) == expected
-    )  # ds leaves out the inner facets of "middle", though they are there
+    # ds leaves out the inner facets of "middle", though they are there
+    assert sizes(tags) == expected
     assert comm.allreduce(len(tags["middle"].indices)) > 0
     for version in (2.2, 4.1):
         if comm.rank == 0:
@@ -323,9 +321,8 @@ def test_a_flawed_box_is_refused_in_three_dimensions(comm):
         def build(self, gmsh):
             BlockMesh(lengths=(1.0,) * 3, divisions=(2, 2, 2), **self.moves).build(gmsh)
             if "simplices" in self.moves:
-                gmsh.model.mesh.setNode(
-                    14, [-0.7, 0.5, 0.5], []
-                )  # the middle, out through the left side
+                # the middle, out through the left side
+                gmsh.model.mesh.setNode(14, [-0.7, 0.5, 0.5], [])
             else:
                 gmsh.model.mesh.setNode(27, [0.4, 0.4, 0.4], [])  # a corner, in past the middle
 

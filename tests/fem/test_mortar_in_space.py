@@ -94,9 +94,8 @@ def face(
             np.roll(corners, -1, axis=1)[:, i] - corners[:, i], corners[:, i - 1] - corners[:, i]
         )
         np.add.at(normals, rows[:, i], turned if up else -turned)
-        for j in range(
-            rows.shape[1]
-        ):  # ∫ phi_i of bilinear functions: 4/36, 2/36, 1/36, 2/36 of the parallelograms
+        # ∫ phi_i of bilinear functions: 4/36, 2/36, 1/36, 2/36 of the parallelograms
+        for j in range(rows.shape[1]):
             share = 1.0 / 18.0 if kind == "t" else (4.0, 2.0, 1.0, 2.0)[j - i] / 36.0
             np.add.at(weights, rows[:, j], share * np.linalg.norm(turned, axis=1))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -142,9 +141,8 @@ def test_polygons():
     assert not areas(overlaps(one, two + 9.0)).any()
     places, weights = rule(3)
     x, y = places[:, 0], places[:, 1]
-    assert weights @ (x**2 * y**2) == pytest.approx(
-        2.0 * 4.0 / 720.0, rel=1e-14
-    )  # 2 a! b! / (a + b + 2)!
+    # 2 a! b! / (a + b + 2)!
+    assert weights @ (x**2 * y**2) == pytest.approx(2.0 * 4.0 / 720.0, rel=1e-14)
     inner = np.einsum("qc,kcx->kqx", places, one[:, :3])
     assert np.einsum("kqv,kvx->kqx", hats(one, inner), one) == pytest.approx(inner, abs=1e-14)
 
@@ -316,9 +314,8 @@ def placed(number: int, distorted: float = 0.0, bent: float = 0.0) -> Any:
             [np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)]
         )
         moved = x + shift
-        moved[:, 1] += bent * (
-            (moved[:, 0] - 0.9) ** 2 + moved[:, 0] * moved[:, 2]
-        )  # nodes of both sides on one face
+        # nodes of both sides on one face
+        moved[:, 1] += bent * ((moved[:, 0] - 0.9) ** 2 + moved[:, 0] * moved[:, 2])
         return np.asarray(moved @ rotation(number).T)
 
     return deform
@@ -430,9 +427,8 @@ def test_a_block_slides_down_a_plane_alike_in_any_orientation():
     )
     assert first.active.any() and first.certificate.max() <= 1e-9
     friction = sliding(MPI.COMM_SELF, 0, 0.3).surface.everywhere(first.state.r_t)
-    assert np.linalg.norm(friction, axis=1) == pytest.approx(
-        0.3 * first.r_n[-1], rel=1e-9
-    )  # all of it slides
+    # all of it slides
+    assert np.linalg.norm(friction, axis=1) == pytest.approx(0.3 * first.r_n[-1], rel=1e-9)
     assert np.abs(found.u @ rotation(4) - first.u).max() < 1e-9 * np.abs(first.u).max()
     assert np.abs(found.r_n - first.r_n).max() < 1e-9 * first.r_n.max()
 

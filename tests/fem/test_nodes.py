@@ -65,9 +65,8 @@ def test_numbers_alone_are_gathered():
     assert not len(boundary(space, tags["bottom"], beyond=0.5).vertices)
     space.comm = system.algebra.comm = weighed = Weighed(COMM)
     surface = contact_surface(system, tags["bottom"])
-    shared = (
-        0 if COMM.size == 1 else 4 * 13 * 8 * (1 + 2 * 3)
-    )  # up to two cuts, seen from both sides: number and box
+    # up to two cuts, seen from both sides: number and box
+    shared = 0 if COMM.size == 1 else 4 * 13 * 8 * (1 + 2 * 3)
     shared *= 4  # facets round these nodes, and their parts, in the search for hinges
     own = len(nodes_on(space, tags["bottom"]).numbers)
     assert 48 * own <= weighed.gathered <= 48 * own + shared
@@ -75,9 +74,8 @@ def test_numbers_alone_are_gathered():
     assert ContactProblem(
         system, surface, friction=friction, mass=Redistributed()
     ).equations.massless.any()
-    neighbours = (
-        0 if COMM.size == 1 else 4 * 3 * 13 * 3 * 8 * (1 + 8)
-    )  # columns asked for, then unknowns told of
+    # columns asked for, then unknowns told of
+    neighbours = 0 if COMM.size == 1 else 4 * 3 * 13 * 3 * 8 * (1 + 8)
     assert weighed.gathered <= neighbours
 
 

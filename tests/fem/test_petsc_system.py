@@ -264,9 +264,8 @@ def test_bad_matrices():
     ):
         with pytest.raises(InputError, match=said):
             fem.system_from_matrices(*matrices, **({"coordinates": points} | given))
-    with pytest.raises(
-        InputError, match="clamped goes from 1000000 to 1000000"
-    ):  # of one rank, told on all
+    # of one rank, told on all
+    with pytest.raises(InputError, match="clamped goes from 1000000 to 1000000"):
         fem.system_from_matrices(
             M, C, K, coordinates=points, clamped=[10**6] if COMM.rank == COMM.size - 1 else ()
         )

@@ -13,13 +13,8 @@ from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 
-GAMMA, LEVEL, HEIGHT, BASE, SLOPE = (
-    9810.0,
-    5.0,
-    6.0,
-    4.0,
-    0.2,
-)  # N/m³, m; the upstream face leans by SLOPE
+# N/m³, m; the upstream face leans by SLOPE
+GAMMA, LEVEL, HEIGHT, BASE, SLOPE = (9810.0, 5.0, 6.0, 4.0, 0.2)
 
 
 def water(points: Array, t: float) -> Array:

@@ -73,9 +73,8 @@ def test_contact_forces_balance_the_weight(
     assert isclose(state.r_n.sum(), weight, rel_tol=SAME)
     upper_one, both = moments(problem, state, middle)
     assert abs(upper_one) <= SAME * weight * WIDE, x
-    assert abs(both) <= SAME * weight * WIDE, (
-        x
-    )  # what the lower block feels is the opposite, at the same place
+    # what the lower block feels is the opposite, at the same place
+    assert abs(both) <= SAME * weight * WIDE, x
 
 
 def moments(problem: Any, state: Any, middle: float) -> tuple[float, float]:

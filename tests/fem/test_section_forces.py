@@ -199,9 +199,8 @@ def test_frames_give_the_same_forces(comm: Any) -> None:
     names = [name for name in one if name.startswith(("reaction", "N_", "V_", "M_", "racking"))]
     assert len(names) == 10
     for name in names:
-        size = np.abs(
-            one[name if "racking" in name else "V_foot"]
-        ).max()  # vertical forces are zero by symmetry
+        # vertical forces are zero by symmetry
+        size = np.abs(one[name if "racking" in name else "V_foot"]).max()
         assert np.abs(one[name] - two[name]).max() < 1e-8 * size, name
     assert (
         np.abs(one["reaction_x_foot"] + one["V_foot"]).max() < 1e-10 * np.abs(one["V_foot"]).max()

@@ -229,9 +229,8 @@ def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
         state = vc.static_equilibrium(problem)
         found[load] = surface.everywhere(state.r_n / surface.weights)
         corner = np.sort(displacements_at(system, problem.cartesian(state.u), (2.0, 1.0)))
-        expected = (
-            (-1e-3, -1e-3) if load < 0.0 else (-0.09695e-3, 17.24968e-3)
-        )  # of the mesh that is cut open
+        # of the mesh that is cut open
+        expected = (-1e-3, -1e-3) if load < 0.0 else (-0.09695e-3, 17.24968e-3)
         if load < 0.0 or not graded:
             assert corner == pytest.approx(expected, abs=1e-8)
     assert found[1e6] == pytest.approx(np.zeros(4), abs=1e-3)

@@ -226,9 +226,8 @@ def test_processing_runs_in_its_order_and_notes_it():
         "scaled",
     ]
     a = record.acceleration
-    round_off = (
-        a.size * np.finfo(float).eps * np.abs(a).sum() * record.dt
-    )  # of a sum of so many terms
+    # of a sum of so many terms
+    round_off = a.size * np.finfo(float).eps * np.abs(a).sum() * record.dt
     assert abs(integrated(record)[1][-1]) < round_off
     assert Processing()(shaking()).notes == ("made here",)
 

@@ -13,9 +13,8 @@ from vi_contact.ground_motion import UNITS, read_record
 pytestmark = pytest.mark.serial
 
 G = 9.80665
-VALUES = np.array(
-    [0.0, 0.0063, -0.00123, 0.5, -0.25, 0.125, 1e-5, 0.3, -0.3, 0.01, 0.02]
-)  # 11: the last row is short
+# 11: the last row is short
+VALUES = np.array([0.0, 0.0063, -0.00123, 0.5, -0.25, 0.125, 1e-5, 0.3, -0.3, 0.01, 0.02])
 
 
 def write(tmp_path, text, name="record.txt"):
@@ -199,9 +198,8 @@ def smc(*given, **options):
 
 def test_smc_is_cut_by_column_and_its_header_understood(tmp_path):
     text = smc()
-    assert (
-        "-1.2300E-3 5.0000E-1-2.5000E-1" in text
-    )  # the second and third values of this piece touch
+    # the second and third values of this piece touch
+    assert "-1.2300E-3 5.0000E-1-2.5000E-1" in text
     record = read_record(write(tmp_path, text))
     assert np.allclose(record.acceleration, 0.01 * VALUES, rtol=1e-12, atol=0.0)
     assert record.dt == 0.005 and record.format == "USGS SMC" and record.units == "cm/s2"

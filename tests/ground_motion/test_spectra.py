@@ -125,18 +125,15 @@ def test_limits_of_the_period():
     SD = PGD."""
     record = shaking()
     short = response_spectrum(record, np.array([1e-3]))
-    corner = (
-        np.max(np.abs(np.diff(record.acceleration, n=2))) / record.dt
-    )  # change of slope: the oscillator rings by
-    assert abs(short.psa[0] - pga(record)) < corner * 1e-3 / (
-        2.0 * np.pi
-    )  # no more than this over omega
+    # change of slope: the oscillator rings by
+    corner = np.max(np.abs(np.diff(record.acceleration, n=2))) / record.dt
+    # no more than this over omega
+    assert abs(short.psa[0] - pga(record)) < corner * 1e-3 / (2.0 * np.pi)
     assert abs(short.acceleration[0] - pga(record)) < corner * 1e-3 / (2.0 * np.pi)
     still = baseline_corrected(record)
     long = response_spectrum(still, np.array([1e5]), damping=0.0)
-    assert (
-        pgd(still) * (1.0 - 1e-6) <= long.displacement[0] <= pgd(still) * (1.0 + 1e-4)
-    )  # pgd is that of samples
+    # pgd is that of samples
+    assert pgd(still) * (1.0 - 1e-6) <= long.displacement[0] <= pgd(still) * (1.0 + 1e-4)
     assert pgv(still) * (1.0 - 1e-6) <= long.velocity[0] <= pgv(still) * (1.0 + 1e-2)
 
 
@@ -146,9 +143,8 @@ def test_a_finer_grid_with_the_same_straight_lines_changes_nothing():
     fine = Record(acceleration=samples, dt=record.dt / 4.0)
     periods = np.geomspace(0.02, 5.0, 30)
     first, second = response_spectrum(record, periods), response_spectrum(fine, periods)
-    bend = (
-        np.max(np.abs(np.diff(record.acceleration))) / record.dt
-    )  # v bends by this between looks dt / 4 apart
+    # v bends by this between looks dt / 4 apart
+    bend = np.max(np.abs(np.diff(record.acceleration))) / record.dt
     bent = bend * (record.dt / 4.0) ** 2 / 8.0
     for name, extra in (("displacement", 0.0), ("acceleration", 0.0), ("velocity", bent)):
         assert np.allclose(getattr(first, name), getattr(second, name), rtol=LOW, atol=extra), name

@@ -108,9 +108,8 @@ def test_kanai_tajimi_variance():
         exact, rel=1e-4
     )
     record = synthetic(spectrum, 600.0, 0.002, seed=7)
-    above = (
-        2.0 * spectrum.s0 * 4.0 * 0.36 * 15.6**2 / (math.pi / 0.002)
-    )  # what lies above the Nyquist frequency
+    # what lies above the Nyquist frequency
+    above = 2.0 * spectrum.s0 * 4.0 * 0.36 * 15.6**2 / (math.pi / 0.002)
     assert np.mean(record.acceleration**2) == pytest.approx(exact - above, rel=0.05)
 
 

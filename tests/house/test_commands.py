@@ -116,10 +116,8 @@ def accepted(command: str) -> str:
             if not (ROOT / "demos" / f"{name}.py").is_file():
                 return f"there is no demo {name}"
             sources.append(ROOT / "demos" / f"{name}.py")
-            if name in (
-                "wall",
-                "channel",
-            ):  # their options are those of the command run, and --case
+            # their options are those of the command run, and --case
+            if name in ("wall", "channel"):
                 given = words[words.index(name) + 1 :]
                 if "--case" in given:
                     at = given.index("--case")
@@ -249,9 +247,8 @@ def needle(command: str) -> str:
     if found := re.match(r"python3 benchmarks/(?:peers/)?(\w+)\.py", command):
         return rf"\b{found[1]}\b"
     if found := re.match(r"(?:mpirun -n 3 )?vi-contact (\w+)", command):
-        printed = {"run": "[01]", "report": "2"}.get(
-            found[1], ""
-        )  # by the command new, which tests give again
+        # by the command new, which tests give again
+        printed = {"run": "[01]", "report": "2"}.get(found[1], "")
         return rf'"{found[1]}"|main\(\[?\*?commands\[{printed}\]'
     return ""
 
@@ -484,8 +481,7 @@ def test_a_figure_of_the_theory(
     assert command in program.commands(DOCS / "theory" / "index.md")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", command.split()[1:])
-    monkeypatch.setattr(
-        logging.getLogger("vi_contact"), "level", logging.WARNING
-    )  # the program changes it
+    # the program changes it
+    monkeypatch.setattr(logging.getLogger("vi_contact"), "level", logging.WARNING)
     assert loaded(DOCS / "theory" / "figures.py").main() == 0
     assert "step: " in capsys.readouterr().out and Path("results/theory/theory_step.png").is_file()

@@ -30,9 +30,8 @@ def test_the_boundary_elements_demo(
         lambda rows, *a, **k: drawn.append(rows) or plot_panels(rows, *a, **k),
     )
     numbers: dict[str, Any] = module.main(quick=True, out=tmp_path, progress=False)
-    shear = drawn[0][1][
-        2
-    ]  # concrete on steel: the support holds the corners together, by both methods
+    # concrete on steel: the support holds the corners together, by both methods
+    shear = drawn[0][1][2]
     assert shear.quantity == SHEAR and all(curve.y[0] > 0.0 > curve.y[-1] for curve in shear.curves)
     of = {name.split(": ")[0] for name in numbers}
     assert len(of) == 9

@@ -28,9 +28,8 @@ def test_the_raft_demo(shared_tmp, capsys):
     numbers = module.main(quick=True, out=shared_tmp, progress=False)
     assert 0.0 < numbers["worst certificate"] <= 1e-9 and numbers["energy defect"] <= 1e-10
     (wide, deep, thick), (*_, length, width) = module.RAFT, module.CORE
-    walls = (
-        (length * width - (length - 1.6) * (width - 1.6)) * 3 * (4.0 - 0.6)
-    )  # of 0.8 m between slabs of 0.6 m
+    # of 0.8 m between slabs of 0.6 m
+    walls = (length * width - (length - 1.6) * (width - 1.6)) * 3 * (4.0 - 0.6)
     weight = 2500.0 * 9.80665 * (wide * deep * (thick + 3 * 0.6) + walls)
     assert numbers["weight [MN]"] == pytest.approx(1e-6 * weight, rel=1e-9)
     assert (

@@ -25,9 +25,8 @@ def test_closed_forms() -> None:
     assert disk.deflection(np.array([0.0, disk.b, 1.0])) == pytest.approx(
         [disk.gap, disk.gap, 0.0], abs=1e-15
     )
-    r = disk.b + h * np.arange(
-        3
-    )  # flat with slope and curvature zero: what it falls by is of third order
+    # flat with slope and curvature zero: what it falls by is of third order
+    r = disk.b + h * np.arange(3)
     assert (
         np.all(disk.gap - disk.deflection(r[1:]) < 3.0 * h**2 * h)
         and disk.deflection(r)[2] < disk.gap
@@ -35,9 +34,8 @@ def test_closed_forms() -> None:
     middle = 0.6 + h * np.arange(-2.0, 3.0)
     slope = np.diff(disk.deflection(middle)) / h
     laplacian = np.diff((middle[:-1] + h / 2) * slope) / h / middle[1:-1]
-    shear = (laplacian[2] - laplacian[0]) / (
-        2.0 * h
-    )  # 2 pi r Q: what the ground carries, less the load within r
+    # 2 pi r Q: what the ground carries, less the load within r
+    shear = (laplacian[2] - laplacian[0]) / (2.0 * h)
     assert np.pi * 0.6**2 - 2.0 * np.pi * 0.6 * shear == pytest.approx(disk.force, rel=1e-5)
     beam = LiftedBeam(EI=2.0, q=3.0, P=6.0)
     assert (beam.length, beam.height) == (4.0, 16.0) and beam.shape(

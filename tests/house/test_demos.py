@@ -258,9 +258,8 @@ def test_the_bouncing_bar_demo(
             energy,
         )
     assert (shared_tmp / "bouncing_bar.png").stat().st_size > 10_000
-    assert (
-        len([path for path in shared_tmp.iterdir() if path.is_dir()]) == 9
-    )  # each run has a folder of its own
+    # each run has a folder of its own
+    assert len([path for path in shared_tmp.iterdir() if path.is_dir()]) == 9
     assert comm.rank or "trapezoidal, redistributed mass (default)" in capsys.readouterr().out
 
 

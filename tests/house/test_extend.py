@@ -19,9 +19,8 @@ from vi_contact.cli.entry import main
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = (ROOT / "docs" / "guide" / "extend.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(
-    r"^```(\w+)\n(?:# (\S+)\n)?(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL
-)  # language, file, text
+# language, file, text
+BLOCKS = re.findall(r"^```(\w+)\n(?:# (\S+)\n)?(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 FILES = {file: text for _, file, text in BLOCKS if file}
 FRAGMENTS = [text for language, file, text in BLOCKS if language == "toml" and not file]
 

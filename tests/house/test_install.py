@@ -77,9 +77,8 @@ def test_the_cases_that_ship_are_installed() -> None:
         if path.is_file() and "__pycache__" not in path.parts and path.suffix not in (".py", ".pyi")
     }
     data = project["tool"]["setuptools"]["package-data"]
-    assert data["vi_contact"] == ["py.typed"] and data["*"] == [
-        "*.pyi"
-    ]  # checkers of types look for them
+    # checkers of types look for them
+    assert data["vi_contact"] == ["py.typed"] and data["*"] == ["*.pyi"]
     assert (ROOT / "vi_contact" / "py.typed").read_bytes() == b""
     homes = {
         ROOT / package.replace(".", "/"): named for package, named in data.items() if package != "*"

@@ -138,9 +138,8 @@ def test_a_notebook_runs_in_jupyter(name: str, tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     cells = json.loads(done.stdout.splitlines()[-1])
-    told = "".join(
-        one["text"] for one in cells[-1]
-    )  # a busy kernel sends one line in several messages
+    # a busy kernel sends one line in several messages
+    told = "".join(one["text"] for one in cells[-1])
     assert told == "all numbers are as the page says\n"
     kinds = [kind for cell in cells for one in cell for kind in one["kinds"]]
     assert kinds.count("image/png") >= 2 and ("text/html" in kinds) == (name == "shaken_wall")

@@ -388,9 +388,8 @@ def test_the_browser_asks_no_other_host_and_lacks_no_file(opened: Opened) -> Non
 def test_no_page_is_wider_than_the_screen_or_cut(opened: Opened) -> None:
     found = [(one["url"], at) for one in opened.pages for at in one["widths"]]
     assert {at["width"] for _, at in found} >= set(WIDTHS)
-    assert all(
-        at["width"] - 20 <= at["seen"] <= at["width"] for _, at in found
-    )  # 20: the bar to scroll with
+    # 20: the bar to scroll with
+    assert all(at["width"] - 20 <= at["seen"] <= at["width"] for _, at in found)
     assert [(url, at) for url, at in found if at["wide"] > 0 or at["cut"]] == []
 
 

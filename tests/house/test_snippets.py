@@ -108,9 +108,8 @@ def test_every_block_has_what_runs_it() -> None:
         if page.parent.name == "notebooks":
             assert set(found) <= {"{code-cell}"}, name  # tests/house/test_notebooks.py runs them
         elif page.parent.name == "gallery":
-            assert set(found) <= {"sh", "text"}, (
-                name
-            )  # docs/gallery/make.py runs and compares; their commands below
+            # docs/gallery/make.py runs and compares; their commands below
+            assert set(found) <= {"sh", "text"}, name
         else:
             known = [part.rsplit(" ", 1) for key in RUN.get(name, {}) for part in key.split(", ")]
             assert found == {language: int(number) for language, number in known}, (
@@ -142,9 +141,8 @@ def test_what_runs_a_block_is_there_and_reads_the_page(page: str) -> None:
             assert Path(page).stem in text, runner
         elif runner == "here":
             used = sorted(number for one in SNIPPETS if one.page == page for number in one.numbers)
-            others = len(blocks(page, "python")) - len(
-                used
-            )  # a last one that tests/house/test_documents.py runs
+            # a last one that tests/house/test_documents.py runs
+            others = len(blocks(page, "python")) - len(used)
             assert used == list(range(len(used))), page
             assert others == (Path(page).stem in ("soil", "solvers")), page
         else:

@@ -96,9 +96,8 @@ def test_your_wall(
     assert main(["run", "wall.toml", "--out", "results/higher"]) == 0
     for name in ("wall", "higher"):
         found = peaks(Path("results") / name)
-        assert (
-            0.0 < found["sliding_base"][1] - found["sliding_base"][2] <= 1.1e-4
-        )  # as the page says of the peaks
+        # as the page says of the peaks
+        assert 0.0 < found["sliding_base"][1] - found["sliding_base"][2] <= 1.1e-4
         now = (
             1e3 * found["sliding_base"][2],
             1e3 * found["theta_base"][1],

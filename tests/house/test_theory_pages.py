@@ -50,9 +50,8 @@ def test_pages_state_what_their_figures_show(
     phrases = figures.PAGES[name](tmp_path / "figure.png")
     assert len(phrases) >= 3 and figures.lacking(name, phrases) == []
     assert (tmp_path / "figure.png").stat().st_size > 20_000
-    assert figures.lacking(
-        name, ["$f = 2$ N it rests at $u = 0.03$ m"]
-    )  # a page that states another number is found
+    # a page that states another number is found
+    assert figures.lacking(name, ["$f = 2$ N it rests at $u = 0.03$ m"])
 
 
 def test_every_figure_is_on_its_page(figures: ModuleType) -> None:
@@ -148,10 +147,8 @@ def solved_blow_up(figures: ModuleType) -> list[str]:
             v, r = arrival(share, scheme)
             told = [", ".join(f"{round(one, 6) + 0.0:.2f}" for one in values) for values in (v, r)]
             rows.append(f"| {share:.2f} | {name} | {told[0]} | {told[1]} | {v[-1] ** 2:.2f} |")
-    early, late = (
-        Polynomial([-3.0, 4.0]),
-        Polynomial([5.0, -8.0]),
-    )  # velocities after Newmark's steps
+    # velocities after Newmark's steps
+    early, late = (Polynomial([-3.0, 4.0]), Polynomial([5.0, -8.0]))
     for share, speed in ((0.1, early), (0.6, early), (0.7, late), (0.9, late)):
         assert arrival(share, vc.Newmark())[0][-1] == pytest.approx(speed(share))
         assert arrival(share, vc.Midpoint())[0][-1] ** 2 == pytest.approx((2.0 * share - 1.0) ** 2)

@@ -60,9 +60,8 @@ def test_readings_give_the_target_velocities(target):
         if isinstance(reading, ImpulseUpdate):
             free = np.ones(6, dtype=bool)
             free[surface.owned[chosen]] = False
-            np.testing.assert_allclose(
-                impulse[free], 0.0, atol=1e-14
-            )  # nothing but the wall pushes
+            # nothing but the wall pushes
+            np.testing.assert_allclose(impulse[free], 0.0, atol=1e-14)
         else:
             np.testing.assert_array_equal(
                 np.delete(after, surface.owned[chosen]), np.delete(v, surface.owned[chosen])

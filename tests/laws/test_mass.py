@@ -172,9 +172,8 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="lumping is 1.5: give a share"):
         Redistributed(1.5)
     with pytest.raises(InputError, match="cannot be moved.*ConsistentMass"):
-        _ = replace(
-            chain_problem(4), mass=Redistributed()
-        ).equations  # lumped masses know no neighbours
+        # lumped masses know no neighbours
+        _ = replace(chain_problem(4), mass=Redistributed()).equations
     with pytest.raises(InputError, match="too coarse for redistributed mass.*refine"):
         _ = bar(2, mass=Redistributed()).equations
     given = thrown(10, mass=Redistributed(), impact=Inelastic())

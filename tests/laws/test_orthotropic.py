@@ -91,9 +91,8 @@ def test_a_matrix_of_axes_is_the_angle() -> None:
     assert by_matrix == pytest.approx(
         Orthotropic(**SPRUCE, axes=0.3).stiffness, rel=1e-14, abs=1e-5
     )
-    upright = Orthotropic(
-        **SPRUCE, axes=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    )  # axis 1 along y
+    # axis 1 along y
+    upright = Orthotropic(**SPRUCE, axes=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     assert upright.stiffness[1, 1, 1, 1] == Orthotropic(**SPRUCE).stiffness[0, 0, 0, 0]
 
 

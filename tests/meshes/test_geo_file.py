@@ -363,13 +363,14 @@ def test_other_mistakes_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"wall.geo: Gmsh cannot mesh it: .*line 4"):
         arrays_of(GeoFile(path=broken))
     stopped = "it stopped at a formula or size: check Field"
+    # newer versions name it
     for wrong, said in (
         (
             'Field[1] = MathEval; Field[1].F = "nofun(x)"; Background Field = 1;',
             f"{stopped}|invalid",
         ),
         ("Mesh.MeshSizeMax = -1;", f"{stopped}|Wrong mesh element size"),
-    ):  # newer versions name it
+    ):
         with pytest.raises(InputError, match=f"Gmsh cannot mesh it: .*({said})"):
             arrays_of(GeoFile(path=written(tmp_path, SQUARE.replace("EXTRA", wrong))))
     with pytest.raises(

@@ -74,9 +74,8 @@ def test_two_bodies_divided_alike(name):
         one, two = (np.unique(groups[f"{body}_{side}"]) for body in BODIES)
         assert np.isin(one, channel).all() and np.isin(two, soil).all()
         one, two = (nodes[np.lexsort(np.round(points[nodes], 6).T)] for nodes in (one, two))
-        assert np.abs(points[one] - points[two]).max() < 1e-9 and np.all(
-            one < two
-        )  # probes find the channel's
+        # probes find the channel's
+        assert np.abs(points[one] - points[two]).max() < 1e-9 and np.all(one < two)
     x, y, left = points[:, 0], points[:, 1], mesh.x[1]
     where = {
         "bedrock": np.isclose(y, 0.0),
@@ -193,9 +192,8 @@ def test_who_weighs():
     for weighing in ((), ("channel",), ("soil",), ("channel", "soil")):
         system = build(CHANNEL, COMM, weighing=weighing, sides=Rollers(component=0)).system
         up[weighing] = COMM.allreduce(float(system.influence[:, 1] @ system.load(0.0)))
-    lowest = (
-        0.5 * 0.5 * 1800.0 * STANDARD_GRAVITY * 24.0
-    )  # half of the lowest row of cells rests on the bedrock
+    # half of the lowest row of cells rests on the bedrock
+    lowest = 0.5 * 0.5 * 1800.0 * STANDARD_GRAVITY * 24.0
     soil = -1800.0 * STANDARD_GRAVITY * (24.0 * 8.0 - 12.0) + lowest
     assert up[()] == 0.0 and up[("channel",)] == pytest.approx(-WEIGHT, rel=1e-12)
     assert up[("soil",)] == pytest.approx(soil, rel=1e-12)
@@ -393,9 +391,8 @@ def test_a_moved_bedrock(ends, hht):
         assert len(problem.excitations) == (2 if base == "relative" else 0)
         assert problem.system.space.tied.any() == (ends is TiedSides)
         found.append(np.asarray(history["pressure"]))
-    same_dashpots = (
-        ends is not DashpotSides
-    )  # these resist the velocity they see: another problem in another frame
+    # these resist the velocity they see: another problem in another frame
+    same_dashpots = ends is not DashpotSides
     assert (np.abs(found[0] - found[1]).max() < 1e-8 * found[0].max()) == same_dashpots
     assert np.abs(found[0] - found[0][0]).max() > 0.1 * found[0].max()
 

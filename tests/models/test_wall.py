@@ -68,9 +68,8 @@ def test_mass_section_and_damping():
     wall = Wall(divisions=(4, 6), thickness=0.5, damping=Rayleigh(alpha=0.2, beta=0.0))
     system = build(wall, COMM).system
     ones = system.influence[:, 0]
-    free = (
-        1.0 - 1.5 / 9.0 * 2.0 / 3.0
-    )  # Mfree: the lowest row of elements keeps a third of its mass
+    # Mfree: the lowest row of elements keeps a third of its mass
+    free = 1.0 - 1.5 / 9.0 * 2.0 / 3.0
     assert 2.0 * system.kinetic_energy(ones) == pytest.approx(
         2400.0 * 6.0 * 9.0 * 0.5 * free, rel=1e-12
     )
@@ -134,9 +133,8 @@ def test_other_meshes_are_the_same_wall(wall):
     base = static_equilibrium(model.problem("free", excitation=()), solver=Condensed())
     points, u = field(model.system, base.u)
     top = u[np.isclose(points[:, 1], 9.0)][:, 1]
-    sag = (
-        -2400.0 * STANDARD_GRAVITY * 9.0**2 / (2.0 * 2.0e10)
-    )  # nu = 0: a column under its own weight
+    # nu = 0: a column under its own weight
+    sag = -2400.0 * STANDARD_GRAVITY * 9.0**2 / (2.0 * 2.0e10)
     assert top.mean() == pytest.approx(sag, rel=5e-3)
 
 

@@ -67,9 +67,8 @@ def test_curves_are_drawn_and_no_text_of_a_file_runs(page: Path) -> None:
         > 4
     )
     assert document.count('class="trace scatter') >= drawn
-    assert (
-        "&lt;script&gt;document.documentElement" in document
-    )  # seen in the legend as it is written
+    # seen in the legend as it is written
+    assert "&lt;script&gt;document.documentElement" in document
 
 
 def test_tables_are_sorted(page: Path) -> None:

@@ -58,13 +58,8 @@ DRAW = {
     "certificate": plotting.plot_certificate,
     "contact": lambda h, path: plotting.plot_contact(h, path, position=np.linspace(0.75, 8.25, 11)),
 }
-PANELS = {
-    "points": 3,
-    "excitation": 1,
-    "energy": 2,
-    "certificate": 2,
-    "contact": 3,
-}  # the colour bar is an axis too
+# the colour bar is an axis too
+PANELS = {"points": 3, "excitation": 1, "energy": 2, "certificate": 2, "contact": 3}
 
 
 @pytest.mark.parametrize("name", DRAW)
@@ -77,9 +72,8 @@ def test_every_picture_is_written_and_every_axis_labelled(name, tmp_path, figure
     axes = figures[0].axes
     assert len(axes) == PANELS[name]
     assert all(axis.get_ylabel() for axis in axes)
-    assert (
-        axes[len(axes) - 1 - (name == "contact")].get_xlabel() == "time [s]"
-    )  # shared by the panels above
+    # shared by the panels above
+    assert axes[len(axes) - 1 - (name == "contact")].get_xlabel() == "time [s]"
     assert all("[" in axis.get_ylabel() for axis in axes)  # with its unit
     assert figures[0]._suptitle if name == "points" else axes[0].get_title()
 
@@ -106,13 +100,8 @@ def test_energy_terms_share_one_unit(tmp_path, figures):
     plotting.plot_energy(h, tmp_path / "e.png")
     top, bottom = figures[0].axes
     assert "[J]" in top.get_ylabel()
-    assert set(lines(top)) == {
-        "input work",
-        "kinetic",
-        "strain",
-        "contact work",
-        "impact loss",
-    }  # the others are zero
+    # the others are zero
+    assert set(lines(top)) == {"input work", "kinetic", "strain", "contact work", "impact loss"}
     np.testing.assert_allclose(lines(top)["kinetic"], h["energy_kinetic"])
     assert bottom.get_yscale() == "log"
     for name in [name for name in h if name.startswith(("energy", "loss", "work"))]:

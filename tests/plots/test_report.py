@@ -247,9 +247,8 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
     )
     assert rows["sliding_stem"]["at the start"] == "0" and rows["sliding_stem"]["unit"] == "mm"
     safety = table(found, "Base shear", 1)["stem"]
-    assert (
-        safety["factor of safety against sliding, smallest"] == "1.667" == safety["at the end"]
-    )  # 1 / (1 - 0.4)
+    # 1 / (1 - 0.4)
+    assert safety["factor of safety against sliding, smallest"] == "1.667" == safety["at the end"]
     (row,) = table(found, "Accelerations").values()
     low, raw = (
         float(row[name])
@@ -262,9 +261,8 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
     (_, spectrum) = motion.charts
     full = spectrum.lines[1]
     assert full.x[0] == pytest.approx(0.02) and spectrum.lines[0].x[0] >= 10.0 * dt > full.x[0]
-    assert full.y[0] * G == pytest.approx(
-        2.0, rel=0.02
-    )  # stiff oscillators feel the ground's own peak
+    # stiff oscillators feel the ground's own peak
+    assert full.y[0] * G == pytest.approx(2.0, rel=0.02)
     assert table(found, "Certificate")["kinetic"]["over the largest energy"] == "0.375"
     (certificate,) = (one for one in found if one.title.startswith("Certificate"))
     assert "1.0e-13 of the largest energy (8 J)" in certificate.sentences[2]
@@ -371,9 +369,8 @@ def test_commands(
     for picture in ("spectrum.png", "transfer.png", "loop.png"):
         assert (folder / picture).stat().st_size > 10_000
     capsys.readouterr()
-    monkeypatch.setattr(
-        "importlib.util.find_spec", lambda _: None
-    )  # without the packages that web pages need
+    # without the packages that web pages need
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     before = sorted(tmp_path.iterdir())
     for wrong, text in (
         (["report", str(tmp_path)], "no history.csv"),

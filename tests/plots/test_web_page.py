@@ -73,10 +73,11 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_text_is_escaped_and_nothing_is_loaded(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
+    # data, plotly's, the page's own: plotly's own text may speak of scripts
     assert (
         text.count("<script") - text.count("<script src")
         == 3 + re.sub(r"(?s)^.*id=\"charts\">", "", text).count("<script") - 2
-    )  # data, plotly's, the page's own: plotly's own text may speak of scripts
+    )
     visible = without_scripts(text)
     assert "<script" not in visible and 'onerror="' not in visible
     assert not re.search(r"<img src=(?!\"data:image/png)", visible)

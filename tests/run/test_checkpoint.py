@@ -199,11 +199,8 @@ def test_restart_on_the_same_ranks(comm: Any, shared_tmp: Path) -> None:
     for name, values in straight.history.items():
         if comm.size == 1:
             assert np.array_equal(parts.history[name], values, equal_nan=values.dtype != bool), name
-        elif name not in (
-            "certificate",
-            "energy_defect",
-            "loss_algorithmic",
-        ):  # round-off themselves
+        elif name not in ("certificate", "energy_defect", "loss_algorithmic"):
+            # round-off themselves
             size = np.nanmax(np.abs(values)) or 1.0
             assert np.allclose(
                 parts.history[name], values, rtol=0.0, atol=1e-12 * size, equal_nan=True

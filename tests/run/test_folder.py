@@ -416,10 +416,8 @@ def test_damaged_histories_are_told(tmp_path: Path) -> None:
         (good.replace("0.2,2", "0.2,two"), "line 4 of '.*' is damaged"),
         (good.replace("0.2,2", "0.2,"), "line 4 of '.*' is damaged"),
         (good.replace("0.2,2", "0.2,2,2"), "line 4 of '.*' is damaged"),
-        (
-            re.sub(r"(?m)^0\.2,2.*$", "2", good),
-            "line 4 of '.*' is damaged",
-        ),  # it would fill the row
+        # it would fill the row
+        (re.sub(r"(?m)^0\.2,2.*$", "2", good), "line 4 of '.*' is damaged"),
         (good.replace("0.2,2", "0.2,7"), "do not follow each other"),
         (good.replace("0.2,2", "0.2,nan"), "do not follow each other"),
         ("\n".join(good.splitlines()[:4]), "does not reach step 4"),

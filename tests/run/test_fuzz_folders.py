@@ -325,15 +325,13 @@ def test_folders(sound: Path, tmp_path: Path) -> None:
         except InputError as error:
             assert "\n" not in str(error), (seed, name)
         else:
-            held = (
-                len(again) if name != "history.csv" else rows
-            )  # later ones of a killed run have no second copy
+            # later ones of a killed run have no second copy
+            held = len(again) if name != "history.csv" else rows
             assert np.array_equal(again[:held], whole[:held]), (seed, name)
         assert time.process_time() - begin < SECONDS, (seed, name)
         shutil.rmtree(folder)
-    assert (
-        1 < kept < 23
-    )  # 5 to 14 with other seeds: the files of other machines differ, and the dice fall elsewhere
+    # 5 to 14 with other seeds: the files of other machines differ, and the dice fall elsewhere
+    assert 1 < kept < 23
 
 
 def restarted(folder: Path) -> Solution:

@@ -33,10 +33,8 @@ from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
-COUNT, DRAWN = (
-    50,
-    8,
-)  # how many folders, and how many of those that are drawn, which takes a second each
+# how many folders, and how many of those that are drawn, which takes a second each
+COUNT, DRAWN = (50, 8)
 NO_NUMBERS = ["nan", "1e999", "1_0", "", "x", "1" * 5000, "\0", '"', "-1"]
 ODD: list[Any] = [
     None,
@@ -71,9 +69,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         problem, scheme=scheme, dt=5e-3, steps=40, record=record, out=folder, progress=False
     )
     facts = json.loads((folder / "summary.json").read_text("utf-8"))
-    facts |= {
-        name: 0.125 for name in facts if name.startswith("seconds")
-    }  # whose digits are others in every run: the
+    # whose digits are others in every run: the
+    facts |= {name: 0.125 for name in facts if name.startswith("seconds")}
     facts["memory"]["peak_bytes"] = [2**28]  # dice would fall on other places of the file
     (folder / "summary.json").write_text(json.dumps(facts, indent=1), "utf-8")
     return folder
@@ -276,9 +273,8 @@ def test_commands_end_with_a_file_or_a_sentence(
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                warnings.filterwarnings(
-                    "ignore", "Glyph"
-                )  # that no font has, in a text of a mutated file
+                # that no font has, in a text of a mutated file
+                warnings.filterwarnings("ignore", "Glyph")
                 code = main([*words[:first], str(folder), *words[first:]])
             said = capsys.readouterr().err
             if code:

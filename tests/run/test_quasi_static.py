@@ -30,11 +30,8 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.nsgs import NSGS
 
 pytestmark = pytest.mark.serial
-STIFFNESS, THRESHOLD, H = (
-    4.0e6,
-    50.0,
-    0.1,
-)  # EA of the bar [N], friction per length [N/m], distance of its nodes [m]
+# EA of the bar [N], friction per length [N/m], distance of its nodes [m]
+STIFFNESS, THRESHOLD, H = (4.0e6, 50.0, 0.1)
 
 
 def pulled(

@@ -404,9 +404,8 @@ def test_a_frame_goes_on_and_tells_at_its_end() -> None:
         assert users("f", lambda: 1 / 0, 3) == 3
         done.append(1)
     assert done == [1]
-    with pytest.raises(
-        vc.InputError, match="f ended in ZeroDivisionError"
-    ):  # without a frame at once
+    # without a frame at once
+    with pytest.raises(vc.InputError, match="f ended in ZeroDivisionError"):
         users("f", lambda: 1 / 0, 3)
     other = (False, None, "", "KeyError('a')")
     with (

@@ -171,9 +171,8 @@ def test_v9_2_newmark_gains_at_release() -> None:
     r_n, gap = 0.5 * found["pressure"][:, 0], found["gap"][:, 0]
     change = 0.5 * (r_n[:-1] * gap[1:] - r_n[1:] * gap[:-1])
     assert change.max() > 1e-6 * total.max()
-    assert (
-        np.abs(np.diff(total) - change).max() < 1e-10 * total.max()
-    )  # as V9.7: 1/dt² amplifies round-off
+    # as V9.7: 1/dt² amplifies round-off
+    assert np.abs(np.diff(total) - change).max() < 1e-10 * total.max()
 
 
 @pytest.mark.parametrize("reading", ["literal", "projection"])
@@ -301,10 +300,8 @@ def test_probe_absolute_acceleration_of_a_free_body_is_zero() -> None:
     trapezoid = 0.5 * (ground[1:] + ground[:-1])
     midpoint = np.array([SHAKE.acceleration((k + 0.5) * DT) for k in range(50)])
     assert np.abs(midpoint).max() > 1.0
-    for name in (
-        "a_x_a",
-        "a_x_b",
-    ):  # the scheme takes the load at midpoints, the recorder the mean of both ends
+    # the scheme takes the load at midpoints, the recorder the mean of both ends
+    for name in ("a_x_a", "a_x_b"):
         assert found[name][1:] == pytest.approx(trapezoid - midpoint, abs=1e-9)
         assert found[name][0] == ground[0]
 

@@ -80,9 +80,8 @@ def test_another_problem_is_refused_by_name(left: Path, name: str) -> None:
     ):
         run(None, 80, restart=left, **arguments)
     goes_on = run(None, 80, restart=left, changed=True, **arguments)
-    assert len(goes_on.history["t"]) == (
-        81 if name != "dt" else 141
-    )  # after another dt steps are counted anew
+    # after another dt steps are counted anew
+    assert len(goes_on.history["t"]) == (81 if name != "dt" else 141)
 
 
 @serial

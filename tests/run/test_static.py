@@ -198,15 +198,11 @@ def test_balanced_loads_need_no_support():
     ("case", "way"),
     [
         ({"up": True}, r"\(0, 1\)"),
-        (
-            {"push": 1.0},
-            r"\(1, .*\)",
-        ),  # 1 Pa on the top of a block that is free to slide: its weight is 70 kPa
+        # 1 Pa on the top of a block that is free to slide: its weight is 70 kPa
+        ({"push": 1.0}, r"\(1, .*\)"),
         ({"push": 1.3e4, "held": True}, r"\(1, "),  # T H > W L / 2: it tips over
-        (
-            {"points": [(0.0, 0.0), (0.25, 0.0)], "held": True},
-            r"\(1, -0.17\)",
-        ),  # supported on the left quarter only
+        # supported on the left quarter only
+        ({"points": [(0.0, 0.0), (0.25, 0.0)], "held": True}, r"\(1, -0.17\)"),
         ({"push": -20.0, "lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)}, r"\(-1, .*\)"),
     ],
     ids=["lifted", "pushed", "tipped", "ledge", "pushed in 3D"],

@@ -48,9 +48,8 @@ def channel() -> vc.ContactProblem:
     return build(Channel(ChannelMesh(size=0.5, far=1.0)), COMM).problem(excitation=())
 
 
-PROBLEMS: dict[
-    str, tuple[Callable[[], vc.ContactProblem], int]
-] = {  # name -> problem, linear iterations in all
+# name -> problem, linear iterations in all
+PROBLEMS: dict[str, tuple[Callable[[], vc.ContactProblem], int]] = {
     "inclined": (lambda: standing(angle=0.3), 200),
     "with a gap": (lambda: standing(gap=0.01), 230),
     "in space": (lambda: standing(**SPACE), 310),
@@ -81,10 +80,8 @@ def test_as_with_a_factor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where the body stands along the ground, which nothing but its start says."""
     problem, most = PROBLEMS[name][0](), PROBLEMS[name][1]
     exact = vc.static_equilibrium(problem, solver=vc.Condensed())
-    for factor in (
-        "petsc_algebra.PetscFactor",
-        "copied_factor.ContactLast",
-    ):  # nothing is factorised
+    # nothing is factorised
+    for factor in ("petsc_algebra.PetscFactor", "copied_factor.ContactLast"):
         monkeypatch.setattr(f"vi_contact.fem.{factor}", None)
     Watched.prepared.clear()
     found = vc.static_equilibrium(problem, solver=Watched())

@@ -93,9 +93,8 @@ def test_gravity_stage_of_a_clamped_wall_leaves_its_side_touching():
     free = assemble(mesh, CONCRETE, loads=BodyForce((0.0, -CONCRETE.rho * 9.80665)))
     points, u = field(system, start.u)
     forces = field(free, free.K @ free.space.restrict(u[free.space.nodes]))[1]
-    base = forces[
-        points[:, 1] == 0.0
-    ]  # K u of the unclamped body: supports minus the base's own share of the weight
+    # K u of the unclamped body: supports minus the base's own share of the weight
+    base = forces[points[:, 1] == 0.0]
     weight = 6.0 * CONCRETE.rho * 9.80665
     own = CONCRETE.rho * 9.80665 * 0.5 * 2.0 * 0.5  # half of the lowest row of elements
     assert base[:, 0].sum() == pytest.approx(pushing, rel=1e-9)

@@ -74,18 +74,10 @@ def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
         (160, None, 0.0, ((4e-3, 50), (1e-3, 100), (2.5e-3, 10))),
         (None, 0.3, 0.0, ((4e-3, 50), (1e-3, 100))),
         (110, None, 0.2, ((4e-3, 0), (1e-3, 100), (2.5e-3, 10))),
-        (
-            None,
-            0.4,
-            0.1999,
-            ((4e-3, 1), (1e-3, 97), (2.5e-3, 40)),
-        ),  # on from 0.2039: 97 steps reach 0.3
-        (
-            None,
-            0.4,
-            0.2 - 1e-12,
-            ((4e-3, 0), (1e-3, 100), (2.5e-3, 40)),
-        ),  # round-off adds no step to any piece
+        # on from 0.2039: 97 steps reach 0.3
+        (None, 0.4, 0.1999, ((4e-3, 1), (1e-3, 97), (2.5e-3, 40))),
+        # round-off adds no step to any piece
+        (None, 0.4, 0.2 - 1e-12, ((4e-3, 0), (1e-3, 100), (2.5e-3, 40))),
     ],
 )
 def test_steps_of_a_schedule(steps, t_end, t0, parts):
@@ -373,9 +365,8 @@ def test_every_closure_happens_in_a_shortest_step(scheme):
     assert sum(closing) >= 4 and set(levels[closing]) == {halvings}
     assert [report.new.k for report in reports] == list(range(1, len(reports) + 1))
     base = np.cumsum(2.0**-levels)
-    assert base[-1] == 500 and set(np.arange(1, 501)) <= set(
-        base
-    )  # every base step ends; nothing is skipped
+    # every base step ends; nothing is skipped
+    assert base[-1] == 500 and set(np.arange(1, 501)) <= set(base)
     assert all(report.certificate.worst <= 1e-9 for report in reports)
 
 
@@ -437,10 +428,8 @@ def test_time_of_the_first_contact_of_the_thrown_bar(halvings, dt):
 def test_contact_work_of_the_thrown_bar_falls_with_halving():
     """V9.1: the first closure loses its reaction times the gap before it, which halving makes
     smaller."""
-    lost, dt = (
-        [],
-        0.5 / 44.9,
-    )  # the bar arrives at 0.9 of a step, 0.15 of a quarter, 0.025 after the last sixteenth
+    # the bar arrives at 0.9 of a step, 0.15 of a quarter, 0.025 after the last sixteenth
+    lost, dt = ([], 0.5 / 44.9)
     for halvings in (0, 2, 4):
         reports = run(thrown(100), HALF, dt=HalvedAtImpact(dt, halvings), steps=100)
         report = next(report for report in reports if report.new.active.any())

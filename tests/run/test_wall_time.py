@@ -273,7 +273,6 @@ def test_the_age_is_that_of_the_process() -> None:
         capture_output=True,
         text=True,
     ).stdout
-    assert (
-        0.5 <= float(said) <= time.monotonic() - begin + 0.1
-    )  # a tick of the kernel is a hundredth of a second
+    # a tick of the kernel is a hundredth of a second
+    assert 0.5 <= float(said) <= time.monotonic() - begin + 0.1
     assert age() >= float(said)

@@ -67,9 +67,8 @@ def test_acceleration_of_resting_contacts() -> None:
     a, reaction = acceleration(resting, np.zeros(11), np.zeros(11))
     assert a[0] == 0.0  # not the whole bar: stress has not built up, only the foot is held
     assert 0.0 < reaction[0] < 100.0 and not reaction[1:].any()
-    rigid = bar(
-        1, E=0.0, gravity=10.0, lumped=True
-    )  # without stiffness the foot carries half the bar
+    # without stiffness the foot carries half the bar
+    rigid = bar(1, E=0.0, gravity=10.0, lumped=True)
     assert acceleration(rigid, np.zeros(2), np.zeros(2))[1][0] == pytest.approx(50.0, rel=1e-13)
     lifted = bar(10, gap=1.0, gravity=10.0)
     a, reaction = acceleration(lifted, np.zeros(11), np.zeros(11))
@@ -117,16 +116,14 @@ def test_acceleration_with_friction(pull: float, speed: float, slips: bool) -> N
     already."""
     problem = column(1, v0=(speed, 0.0), friction=Coulomb(0.5), mass=CONSISTENT)
     system = problem.system
-    force = np.array(
-        [pull, -1.0, pull, -1.0]
-    )  # in the body's own frame: pulled along, pressed down
+    # in the body's own frame: pulled along, pressed down
+    force = np.array([pull, -1.0, pull, -1.0])
     problem = replace(problem, system=replace(system, load=replace(system.load, constant=force)))
     a, reaction = acceleration(problem, np.zeros(4), problem.equations.v0)
     r_t, r_n = reaction[0], reaction[1]
     assert r_n > 0.0 and not reaction[2:].any()
-    assert (
-        0.0 < r_t <= 0.5 * r_n * (1.0 + 1e-12)
-    )  # the body's reaction on its support, along the pull
+    # the body's reaction on its support, along the pull
+    assert 0.0 < r_t <= 0.5 * r_n * (1.0 + 1e-12)
     assert bool(r_t >= 0.5 * r_n * (1.0 - 1e-12)) == slips
     assert bool(abs(a[0]) <= 1e-13) != slips
 

@@ -124,9 +124,8 @@ def test_initial_data_are_put_into_equilibrium_once() -> None:
 
 def test_gravity_stage_stays_still() -> None:
     """A bar that stands on the ground in equilibrium does not move when the dynamics begin."""
-    problem = bar(
-        40, clamped=True, gravity=10.0, mass=MASSLESS
-    )  # hangs from its clamped top and touches below
+    # hangs from its clamped top and touches below
+    problem = bar(40, clamped=True, gravity=10.0, mass=MASSLESS)
     rest = static_equilibrium(problem, solver=Condensed())
     for report in run(problem, DEFAULT, dt=0.01, steps=50, state=rest):
         assert np.abs(report.new.u - rest.u).max() <= 1e-12 * np.abs(rest.u).max()

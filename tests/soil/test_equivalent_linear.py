@@ -34,9 +34,8 @@ def differences(found, shear, damping, strain, peak):
 @pytest.mark.parametrize("rock", [None, ROCK])
 def test_one_linear_layer_is_the_closed_form(rock):
     """Four equal layers of linear soil amplify as one does, on a base that moves and on rock."""
-    record = Record(
-        np.eye(1, 8192, 4096)[0], 0.01
-    )  # all frequencies; the response lies well inside of it
+    # all frequencies; the response lies well inside of it
+    record = Record(np.eye(1, 8192, 4096)[0], 0.01)
     found = equivalent_linear(
         [(5.0, SOIL, SoilCurves.linear(0.1))] * 4, record, rock=rock, rock_damping=0.0
     )

@@ -194,8 +194,7 @@ def test_both_routes_make_the_same_exchanges(monkeypatch):
         assert compiled.history == other.history and compiled.iterations == other.iterations
         assert np.abs(compiled.r - other.r).max() <= 1e-13 * np.abs(other.r).max()
         gap = problem.G @ compiled.r + problem.q
-        sure = (
-            np.maximum(compiled.r, gap) > 1e-12 * np.abs(compiled.r).max()
-        )  # not where both are round-off
+        # not where both are round-off
+        sure = np.maximum(compiled.r, gap) > 1e-12 * np.abs(compiled.r).max()
         assert compiled.r.min() >= 0.0 and np.array_equal(compiled.active[sure], other.active[sure])
         assert sure.all() or problem is hard

@@ -187,9 +187,8 @@ def test_results_tell_method_and_iterations():
     assert report.result.method == "condensed ActiveSet" and report.new.active.all()
     step = report.step
     prepared = Condensed().prepare(step.A, step.surface, step.scale)
-    assert (
-        prepared.solve(replace(step, active=np.array([True]))).iterations == 0
-    )  # the guess was right
+    # the guess was right
+    assert prepared.solve(replace(step, active=np.array([True]))).iterations == 0
     assert prepared.solve(replace(step, active=np.array([False]))).iterations == 1
     assert kkt_residual(step, prepared.solve(step)).worst <= 1e-14
 

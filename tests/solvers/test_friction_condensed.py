@@ -114,9 +114,8 @@ def test_friction_on_springs(scheme: Any, mass: Any) -> None:
     assert len(closed) > 50
     for report in closed:
         assert report.certificate.worst <= 1e-12
-        assert report.new.u[1] == pytest.approx(
-            0.2 * report.new.r_n[0], rel=1e-9
-        )  # u_n = -u_y of the base
+        # u_n = -u_y of the base
+        assert report.new.u[1] == pytest.approx(0.2 * report.new.r_n[0], rel=1e-9)
         assert report.new.r_t[0, 0] == pytest.approx(0.4 * report.new.r_n[0], rel=1e-12)
 
 

@@ -101,17 +101,11 @@ def test_lists_are_told_of_or_read():
 @pytest.mark.parametrize(
     ("G", "q", "count"),
     [
-        (
-            [[1.0, 2.0], [2.0, 1.0]],
-            [-1.0, -1.0],
-            3,
-        ),  # several: Cottle, Pang and Stone, positive but not a P-matrix
+        # several: Cottle, Pang and Stone, positive but not a P-matrix
+        ([[1.0, 2.0], [2.0, 1.0]], [-1.0, -1.0], 3),
         ([[0.0, 1.0], [1.0, 0.0]], [-1.0, -1.0], 1),  # no diagonal: a game
-        (
-            [[0.0, -1.0], [1.0, 0.0]],
-            [-1.0, -1.0],
-            0,
-        ),  # skew: copositive-plus, and without a solution
+        # skew: copositive-plus, and without a solution
+        ([[0.0, -1.0], [1.0, 0.0]], [-1.0, -1.0], 0),
         ([[-1.0]], [-1.0], 0),  # a ray at once
         ([[0.0, -10.0], [20.0, 0.0]], [1.0, -1.0], 1),
     ],
@@ -241,10 +235,8 @@ def friction_states(G: Array, q: Array, cohesion: float, slope: float) -> list[A
         A, b = np.zeros((2 * m, 2 * m)), np.zeros(2 * m)
         for i, state in enumerate(states):
             n, t = 2 * i, 2 * i + 1
-            A[n, n], A[t, t] = (
-                1.0,
-                1.0,
-            )  # open, r = 0; under cohesion open points are not tried here
+            # open, r = 0; under cohesion open points are not tried here
+            A[n, n], A[t, t] = (1.0, 1.0)
             if state != "open":
                 A[n], b[n] = G[n], -q[i, 0]
             if state == "stick":
@@ -310,10 +302,8 @@ def test_friction_that_is_not_solved_ends_in_its_sentence():
             )
             ended += 1
     assert ended > 0
-    for G in (
-        np.array([[1.0, -3.0], [-3.0, 1.0]]),
-        np.array([[1.0, -1.0], [-1.0, 1.0]]),
-    ):  # rᵀG r < 0 and = 0
+    # rᵀG r < 0 and = 0
+    for G in (np.array([[1.0, -3.0], [-3.0, 1.0]]), np.array([[1.0, -1.0], [-1.0, 1.0]])):
         step = FrictionNewton().prepare(
             np.kron(G, np.eye(2)) + np.eye(4, k=1) * 1e-3, np.zeros(2, bool)
         )

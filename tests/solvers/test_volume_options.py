@@ -442,9 +442,8 @@ def test_a_closed_solver_opens_again(pushed: Case) -> None:
         change = np.max(np.abs(prepared.solve(pushed.step).x - first.x), initial=0.0)
         size = np.max(np.abs(first.x), initial=0.0)
         change, size = pushed.step.surface.comm.max(np.array([change, size]))
-        assert (
-            change <= 1e-11 * size
-        )  # not 0: MUMPS on several ranks does not repeat itself to the last bit
+        # not 0: MUMPS on several ranks does not repeat itself to the last bit
+        assert change <= 1e-11 * size
 
 
 def test_methods_do_not_disturb_the_matrix(pushed: Case) -> None:

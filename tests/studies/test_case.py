@@ -34,11 +34,8 @@ from vi_contact.studies.cases.vocabulary import names_of, words
 ROOT = Path(__file__).resolve().parents[2]
 WALL = ROOT / "demos" / "cases" / "wall.toml"
 COMM = MPI.COMM_WORLD
-ROUND_OFF = (
-    "certificate",
-    "energy_defect",
-    "loss_algorithmic",
-)  # nothing but round-off in these runs
+# nothing but round-off in these runs
+ROUND_OFF = ("certificate", "energy_defect", "loss_algorithmic")
 
 
 def write(folder: Path, text: str, name: str = "case.toml") -> Path:
@@ -688,6 +685,7 @@ def test_case_files_know_the_public_names() -> None:
         "CrossChecked",
         "GroundMotion",
     }
+    # no words
     others = {
         "ExponentialDecay",
         "StaticKinetic",
@@ -695,7 +693,7 @@ def test_case_files_know_the_public_names() -> None:
         "with_weight",
         "PMatrix",
         "p_matrix",
-    }  # no words
+    }
     assert wanted - known == others
 
 

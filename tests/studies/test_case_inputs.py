@@ -90,10 +90,11 @@ def test_every_path_is_relative_to_the_case_file(
     """Mesh, source of a cut, record and run folder."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
+    # changes nothing
     cut = (
         'type = "read_mesh"\npath = "meshes/block.msh"',
         'type = "Welded"\nsource = "meshes/block.msh"\nfirst = "left"\nsecond = "left"',
-    )  # changes nothing
+    )
     assert main(["run", case(folder, cut), "--quiet"]) == 0
     assert (folder / "out" / "history.csv").is_file() and not list(
         (tmp_path / "elsewhere").iterdir()

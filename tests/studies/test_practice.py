@@ -33,13 +33,14 @@ def settings(name: str) -> list[str]:
     """The options of the quick run in the head of a case, as settings."""
     head = (STARTERS / f"{name}.toml").read_text("utf-8").split("title =")[0]
     assert f"vi-contact run {name}.toml --set {LARGE} --steps 200" in head
+    # strong at once
     return [
         LARGE,
         "run.steps=200",
         "run.t_end=",
         "fields=",
         "excitation.1.record.envelope.rise=0.2",
-    ]  # strong at once
+    ]
 
 
 def run(name: str, out: Path, *more: str) -> Any:
@@ -103,12 +104,10 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
     assert abs(across[0]) < EXACT * wall and up[0] == pytest.approx(wall, rel=EXACT)
     assert history["reaction_y_rock"][0] == pytest.approx(whole, rel=EXACT)
     soil = 0.5 * 1900.0 * G * 5.4**2
-    assert (
-        np.tan(np.radians(25.0)) ** 2 * soil < history["N_stem"][0] < 0.3 / 0.7 * soil
-    )  # phi = 40 degrees
-    assert (
-        0.1 * 5.4 < history["height_stem"][0] < 5.4 / 3.0
-    )  # the elastic fill leans back from the top of the stem
+    # phi = 40 degrees
+    assert np.tan(np.radians(25.0)) ** 2 * soil < history["N_stem"][0] < 0.3 / 0.7 * soil
+    # the elastic fill leans back from the top of the stem
+    assert 0.1 * 5.4 < history["height_stem"][0] < 5.4 / 3.0
     assert np.all(np.abs(history["T_base"]) <= 0.5 * history["N_base"] * (1.0 + 1e-9))
     assert history["N_stem"].max() > 1.05 * history["N_stem"][0]
     found = {one.name: one for one in comparisons(tmp_path)}
@@ -149,9 +148,8 @@ def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> Non
     assert history["N_joint"][0] == pytest.approx(n, rel=EXACT)
     assert history["T_joint"][0] == pytest.approx(-water, rel=EXACT)
     assert history["e_joint"][0] == pytest.approx(e, rel=1e-8) and 0.0 < e < 5.0  # within the kern
-    assert 1.0 / (1.0 - history["margin_joint"][0]) == pytest.approx(
-        0.75 * n / water, rel=1e-8
-    )  # 1.32 against sliding
+    # 1.32 against sliding
+    assert 1.0 / (1.0 - history["margin_joint"][0]) == pytest.approx(0.75 * n / water, rel=1e-8)
     assert history["sliding_joint"][-1] - history["sliding_joint"][0] > 1e-4
     assert history["margin_joint"].min() < 1e-9
 
@@ -229,9 +227,8 @@ def test_culvert_racks_with_the_ground(tmp_path: Path) -> None:
         weight, rel=EXACT
     )
     (found,) = comparisons(tmp_path / "run")
-    assert (
-        found.expected == pytest.approx(0.965, abs=1e-3) and 0.3 < found.found < 1.0
-    )  # it slips at first
+    # it slips at first
+    assert found.expected == pytest.approx(0.965, abs=1e-3) and 0.3 < found.found < 1.0
     head, _ = (STARTERS / "culvert.toml").read_text("utf-8").split('[[stage]]\nname = "motion"')
     _, records = (
         (STARTERS / "culvert.toml").read_text("utf-8").split("# What is written of every step")
@@ -250,7 +247,6 @@ def test_culvert_racks_with_the_ground(tmp_path: Path) -> None:
         for one in ("free_field", "box")
     )
     strain = 1900.0 * 0.1 * G * 7.0 / (111e6 / 2.6)
-    assert sheared == pytest.approx(
-        strain, rel=0.08
-    )  # 20 m from the box, which disturbs it by some per cent
+    # 20 m from the box, which disturbs it by some per cent
+    assert sheared == pytest.approx(strain, rel=0.08)
     assert 0.6 * sheared < racked < 0.9 * sheared

@@ -342,9 +342,8 @@ def test_settings_may_leave_laws_of_the_file_behind(
 ) -> None:
     """``--set contact=`` asks for the body without contact; a law that is set beside it is in
     vain."""
-    held = CASE.replace(
-        'clamped = "lower_bottom"', 'clamped = ["lower_bottom", "upper_top"]'
-    )  # or it would fly
+    # or it would fly
+    held = CASE.replace('clamped = "lower_bottom"', 'clamped = ["lower_bottom", "upper_top"]')
     path = str(written(tmp_path, held + RUBS + STRIKES))
     assert main(["run", path, "--quiet", "--out", str(tmp_path / "out"), "--set", "contact="]) == 0
     capsys.readouterr()
@@ -484,9 +483,8 @@ def test_weights_that_add_up_are_taken() -> None:
         COMM.allreduce(float(one.load.constant @ one.influence[:, 1]), MPI.SUM)
         for one in (pushed, plain)
     ]
-    assert totals[1] == pytest.approx(
-        3.0 * totals[0], rel=0.2
-    )  # 1.5 and 0.5 times the weight, less at a side
+    # 1.5 and 0.5 times the weight, less at a side
+    assert totals[1] == pytest.approx(3.0 * totals[0], rel=0.2)
 
 
 # Every key of the laws changes the model

@@ -112,9 +112,8 @@ def test_materials_and_damping_by_cell_group(shared_tmp: Path, words: str) -> No
     the damping; a ratio belongs to the material of its group, and the others have none."""
     file = shared_tmp / "groups.toml"
     if COMM.rank == 0:
-        case = CASE.replace(
-            "RATIO", "xi = 0.05" if "Ratio" in words else ""
-        )  # other laws do not read it
+        # other laws do not read it
+        case = CASE.replace("RATIO", "xi = 0.05" if "Ratio" in words else "")
         file.write_text(case + f'[system]\ndamping = {{type = "{words}\n', encoding="utf-8")
     COMM.Barrier()
     found, expected = (

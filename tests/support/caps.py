@@ -38,12 +38,8 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_from_script
 from vi_contact.meshes.two_blocks import Blocks
 
-EVEN, DEEP, REACH, GROWTH = (
-    1.25,
-    0.6,
-    4.0,
-    1.2,
-)  # in a: cells of 1/n up to EVEN along the surface and to DEEP below it,
+# in a: cells of 1/n up to EVEN along the surface and to DEEP below it,
+EVEN, DEEP, REACH, GROWTH = (1.25, 0.6, 4.0, 1.2)
 # where stress changes as fast; (1 + GROWTH y)/n at a distance y from there; the box ends at REACH
 LOWEST = (0, "x", "left"), (2, "z", "back")  # the sides of a block where x and z are lowest
 Motion = Callable[[Array, float], Array]

@@ -143,9 +143,8 @@ def run(steps: int, *, amplitude: float = 2.0, dt: float = 1.0 / 80.0) -> tuple[
         new = free + A.solve(b.G.T @ p)
         v = 2.0 * (new - u) / dt - v
         u, hit = new, p > 0.0
-        if (
-            hit.any()
-        ):  # the closed points stop: an impulse that leaves the other openings' rates to the mass
+        # the closed points stop: an impulse that leaves the other openings' rates to the mass
+        if hit.any():
             v = v - impulses[:, hit] @ np.linalg.solve(delassus[np.ix_(hit, hit)], (b.G @ v)[hit])
         gaps.append(b.G @ u)
         points.append(u[corners])

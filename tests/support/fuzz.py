@@ -106,9 +106,8 @@ class Fuzz:
             )
 
             def kept(**values: Any) -> None:
-                with self.keeping(
-                    f"seed-{SEED}", values
-                ):  # the last one that is tried is the smallest that fails
+                # the last one that is tried is the smallest that fails
+                with self.keeping(f"seed-{SEED}", values):
                     test(**values)
 
             kept.__name__ = test.__name__

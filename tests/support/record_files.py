@@ -3,9 +3,8 @@ readers."""
 
 import numpy as np
 
-VALUES = np.array(
-    [0.125, -12.5, 3.25, -0.5, 101.0, -250.75, 8.0, 1e-3, -1e-3, 42.0, -7.5]
-)  # cm/s2; 11: a short row
+# cm/s2; 11: a short row
+VALUES = np.array([0.125, -12.5, 3.25, -0.5, 101.0, -250.75, 8.0, 1e-3, -1e-3, 42.0, -7.5])
 
 
 def rows(values, per_line, width, decimals):

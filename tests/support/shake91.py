@@ -26,6 +26,7 @@ REDUCTION = {
 DAMPED = [1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2, 1e-1]
 DAMPING = [0.0024, 0.0042, 0.008, 0.014, 0.028, 0.051, 0.098, 0.155, 0.21, 0.25, 0.28]
 FEET = [5, 5] + [10] * 14
+# ft/s
 SPEED = [
     1000,
     900,
@@ -43,7 +44,7 @@ SPEED = [
     1500,
     1600,
     1800,
-]  # ft/s
+]
 KIND = ["sand"] * 4 + ["clay"] * 4 + ["sand"] * 8
 WEIGHT = [125] * 8 + [130] * 8  # lb/ft³
 ROCK = LinearElastic.from_wave_speeds(8000 * FOOT, 4000 * FOOT, 140 * PCF)

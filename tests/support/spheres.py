@@ -26,9 +26,8 @@ from vi_contact.solvers.condensed import Condensed
 
 STEEL = LinearElastic(E=2.1e11, nu=0.3, rho=7800.0)
 ALUMINIUM = LinearElastic(E=7.0e10, nu=0.3, rho=2700.0)
-FIBROUS = LinearElastic(
-    E=2.0e11, nu=0.0, rho=7800.0
-)  # no contraction: slip is along Q, see half_space.Mindlin
+# no contraction: slip is along Q, see half_space.Mindlin
+FIBROUS = LinearElastic(E=2.0e11, nu=0.0, rho=7800.0)
 RADIUS, SLOPE, MU, COARSER = 0.01, 1e-3, 0.3, 0.83  # of a sphere [m]; a/R
 APPROACHES = np.linspace(0.85, 1.15, 13)[1:]  # in a
 
@@ -173,13 +172,8 @@ def averaged(rows: Sequence[Sequence[dict[str, float]]]) -> list[dict[str, float
     ]
 
 
-PATH = (
-    (0.25, 0.0),
-    (0.5, 0.0),
-    (0.75, 0.0),
-    (0.9, 0.0),
-    (0.9, 0.5),
-)  # Q/(mu P): where it turned, half the way back
+# Q/(mu P): where it turned, half the way back
+PATH = ((0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (0.9, 0.0), (0.9, 0.5))
 
 
 @dataclass(frozen=True)

@@ -75,9 +75,8 @@ def thrown(system: SemiDiscreteSystem, *functions: Callable[[Array], Array]) -> 
 def momenta(problem: ContactProblem, v: Array) -> Array:
     """(bodies, d) linear momentum of each body, with the mass matrix of the equations."""
     system, bodies = problem.system, problem.system.space.bodies
-    momentum = (
-        problem.equations.M @ v
-    )  # on the unknowns of the equations: forces, hence back with the transpose
+    # on the unknowns of the equations: forces, hence back with the transpose
+    momentum = problem.equations.M @ v
     rows = []
     for body in range(int(largest(system.algebra.comm, bodies.max(initial=0))) + 1):
         rigid = np.column_stack(

@@ -19,12 +19,8 @@ from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 
-POINTS = (
-    12,
-    6,
-    7,
-    26,
-)  # columns of the reference table: top of the contact side, two of its points, the opposite side
+# columns of the reference table: top of the contact side, two of its points, the opposite side
+POINTS = (12, 6, 7, 26)
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)
 
 

@@ -42,9 +42,8 @@ def sheared(
     mesh, tags = fem.build_mesh(
         rings if slip else Welded(rings, "lining_out", "soil_in"), MPI.COMM_SELF
     )
-    shrunk = -pressure / (
-        2.0 * (SOIL.lame_lambda + SOIL.shear_modulus)
-    )  # strain of the ground without the tunnel
+    # strain of the ground without the tunnel
+    shrunk = -pressure / (2.0 * (SOIL.lame_lambda + SOIL.shear_modulus))
     motion = np.array([shrunk + 0.5 * gamma, shrunk - 0.5 * gamma])
     prescribed = [fem.Prescribed(tags["soil_out"], lambda x, t: motion * x)]
     for body in ("lining", "soil"):

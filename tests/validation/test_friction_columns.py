@@ -50,9 +50,8 @@ def history(
     losses = sum(value for name, value in found.items() if name.startswith("loss_"))
     defect = total + losses - found["work_input"] - total[0]
     way = max(np.abs(found["slip"]).max(), np.abs(found["gap"]).max())
-    assert np.abs(defect).max() <= 1e-11 * total.max() + rounded(
-        problem, way
-    )  # measured: 0.18 of it
+    # measured: 0.18 of it
+    assert np.abs(defect).max() <= 1e-11 * total.max() + rounded(problem, way)
     assert found["certificate"].max() <= 1e-12
     assert np.diff(found["loss_friction"]).min() >= -1e-14 * total.max()
     return found

@@ -93,9 +93,8 @@ def pressed(
     state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
     r, w = np.hypot(surface.points[:, 0], surface.points[:, 2]), surface.weights
     expected, found, core = exact.pressure(r), state.r_n / w, r < 0.5 * a
-    assert (
-        state.r_n[r > a + 2.0 * a / min(upper, lower)].max(initial=0.0) == 0.0
-    )  # swapped, no condition lies there
+    # swapped, no condition lies there
+    assert state.r_n[r > a + 2.0 * a / min(upper, lower)].max(initial=0.0) == 0.0
     return {
         "force": 4.0 * state.r_n @ np.abs(surface.normals[:, 1]) / FORCE - 1.0,
         "peak": (w[core] @ found[core]) / (w[core] @ expected[core]) - 1.0,

@@ -82,9 +82,8 @@ def follow(
     [
         ("strip", 1.0),
         *(
-            pytest.param(
-                body, courant, marks=pytest.mark.serial
-            )  # one body on two ranks: the others have the same path
+            # one body on two ranks: the others have the same path
+            pytest.param(body, courant, marks=pytest.mark.serial)
             for body, courant in (
                 ("bar", 1.0),
                 ("triangles", 1.0),

@@ -103,9 +103,8 @@ def test_midpoint_on_the_reference_mesh(law):
     for column, times in TIMES.items():
         expected = pytest.approx(reference[column], rel=0.0, abs=0.5001 * LAST_DIGIT[column])
         assert at(history, column, *times) == expected, column
-    force = history["contact_resultant"][
-        25:37
-    ].mean()  # means of the steps that end at 1.25 ... 1.8
+    # means of the steps that end at 1.25 ... 1.8
+    force = history["contact_resultant"][25:37].mean()
     assert force == pytest.approx(reference["force"][0], rel=0.0, abs=0.5001e-3)
 
 

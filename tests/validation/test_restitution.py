@@ -27,10 +27,8 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 SPEED, MASS = 10.0, 10.0  # V1.1: of the approach [m/s], of the bar [kg] for a unit area
 MESHES, RESTITUTIONS = (1, 10, 160), (0.0, 0.5, 1.0)
-COURANT, END = (
-    0.45,
-    1.3,
-)  # the gap closes well inside a step: no tie that round-off decides; contact ends at 7/6 s
+# the gap closes well inside a step: no tie that round-off decides; contact ends at 7/6 s
+COURANT, END = (0.45, 1.3)
 LAWS = {
     "reset": lambda e: (ZienkiewiczWoodTaylor(), Newton(e)),
     "projection": lambda e: (ZienkiewiczWoodTaylor(), Newton(e, ImpulseUpdate())),

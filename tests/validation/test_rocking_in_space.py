@@ -36,9 +36,8 @@ COMM = MPI.COMM_WORLD
 G = 9.81
 OBLONG, SQUARE = RigidBlock((0.5, 2.0, 0.4)), RigidBlock((0.4, 2.0, 0.4))
 STIFF, STIFFER = (vc.LinearElastic(E=E, nu=0.0, rho=2400.0) for E in (3.0e11, 3.0e12))
-DAMPING = vc.Rayleigh(
-    alpha=0.0, beta=1.0e-3
-)  # half of critical in the lowest bending: an impact is over in some ms
+# half of critical in the lowest bending: an impact is over in some ms
+DAMPING = vc.Rayleigh(alpha=0.0, beta=1.0e-3)
 TURN = np.array(
     [[np.cos(0.4), 0.0, np.sin(0.4)], [0.0, 1.0, 0.0], [-np.sin(0.4), 0.0, np.cos(0.4)]]
 )

@@ -52,12 +52,8 @@ PROBLEMS: dict[str, Callable[[Any], ContactProblem]] = {
     "inclined box of tetrahedra": partial(thrown_box, simplices=True, angle=0.5),
 }
 problems = pytest.mark.parametrize("name", PROBLEMS)
-ON_RANKS = (
-    "turned wall",
-    "points and gap",
-    "stiff springs",
-    "inclined box of tetrahedra",
-)  # a kind of each
+# a kind of each
+ON_RANKS = ("turned wall", "points and gap", "stiff springs", "inclined box of tetrahedra")
 many_routes = pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=() if name in ON_RANKS else pytest.mark.serial) for name in PROBLEMS],
@@ -90,9 +86,8 @@ def test_all_routes_agree_at_every_step(name):
         steps -= 19
     solvers = (*CONDENSED.values(), *VOLUME.values())
     checked = cross_check(problem, scheme=SCHEME, solvers=solvers, dt=dt, steps=steps, state=state)
-    assert (
-        len({found.method for found in checked.found}) == len(solvers) - 2
-    )  # both forms of Hildreth have one name
+    # both forms of Hildreth have one name
+    assert len({found.method for found in checked.found}) == len(solvers) - 2
     for found in checked.found:
         assert found.relative["u"] < 1e-9, found.method
         assert found.relative["r_n"] < 1e-9, found.method

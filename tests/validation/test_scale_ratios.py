@@ -75,7 +75,8 @@ def test_counts_are_those_of_the_table(tmp_path: Path) -> None:
         assert row["certificate"] <= 1e-9 and row["renewals"] <= 4 and row["newton_steps"] <= 12
         if not row["mu"]:
             linear = row["linear_iterations"] / row["over_linear"]
+            # of a handful
             assert (
                 row["linear_iterations"] <= (1.5 if courant in ("1", "10") else 2.0) * linear + 1.0
-            )  # of a handful
+            )
             assert row["products"] <= MOST_PRODUCTS[courant]

@@ -89,9 +89,8 @@ def errors(name: str, n: int, curved: bool) -> tuple[float, float]:
     "name, curved",
     [
         *(
-            pytest.param(
-                name, curved, marks=pytest.mark.serial
-            )  # ranks do not change an order: one kind of cells shows it
+            # ranks do not change an order: one kind of cells shows it
+            pytest.param(name, curved, marks=pytest.mark.serial)
             for name, curved in (
                 ("quadrilaterals", False),
                 ("quadrilaterals", True),

@@ -30,9 +30,8 @@ from vi_contact.solvers.normal.hildreth import Hildreth
 pytestmark = pytest.mark.slow
 
 ROWS = (10, 20, 40, 100, 200, 400)
-one_rank = (
-    pytest.mark.serial
-)  # whole marches, slow on several ranks; the last test here shows that these do not matter
+# whole marches, slow on several ranks; the last test here shows that these do not matter
+one_rank = pytest.mark.serial
 
 
 def prepared(case: str) -> tuple[ContactProblem, EffectiveMatrix, PreparedCondensed]:

@@ -41,9 +41,8 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 
 SHEAR, NU, X0 = 0.4, 0.3, 1.0 / 7.0
-one_rank = (
-    pytest.mark.serial
-)  # finer meshes: the coarser rows of both tables are computed on any number of ranks
+# finer meshes: the coarser rows of both tables are computed on any number of ranks
+one_rank = pytest.mark.serial
 MATERIAL = plane_strain(SHEAR, NU, rho=1.0)
 SIDES = ("left", "right", "top")
 

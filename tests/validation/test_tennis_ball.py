@@ -78,9 +78,8 @@ def test_flight(scheme, law):
     Tresca's goes on to act on what does not touch, as the source warns."""
     history = run(law, scheme)
     last = int(history["last"])
-    flight = slice(
-        last + 2, None
-    )  # the force of a step is the mean of both ends in the default scheme
+    # the force of a step is the mean of both ends in the default scheme
+    flight = slice(last + 2, None)
     assert 1.2 < history["t"][last] < 1.4 and history["contact_active"][1 : last + 1].min() >= 1.0
     assert not history["pressure"][flight].any() and history["contact_min_gap"][-1] > 0.1
     for name in ("energy", "momentum_y"):
@@ -108,9 +107,8 @@ def test_momentum_and_energy_have_their_sources(scheme, law):
     largest = history["energy"].max()
     assert np.max(np.abs(history["work_input"] - losses - history["energy"])) < 1e-10 * largest
     assert np.abs(history["loss_contact"]).max() < 1e-3 * largest
-    if (
-        scheme == "midpoint"
-    ):  # V9.1; the default scheme has the work of mean reactions, which may be of either sign
+    # V9.1; the default scheme has the work of mean reactions, which may be of either sign
+    if scheme == "midpoint":
         assert np.diff(history["loss_contact"]).min() > -1e-14 * largest
         assert np.diff(history["loss_friction"]).min() > -1e-14 * largest
 

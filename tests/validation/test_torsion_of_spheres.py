@@ -25,10 +25,8 @@ FORM = Lubkin(force=2.0, a=1.3, mu=0.4, G=5.0)
 def carried(c: float) -> float:
     """The moment of τ: 2 π ∫ r² τ dr."""
     total = 0.0
-    for edge, start in (
-        (c, 0.0),
-        (FORM.a, np.arcsin(c / FORM.a)),
-    ):  # r = edge sin: smooth at both roots
+    # r = edge sin: smooth at both roots
+    for edge, start in ((c, 0.0), (FORM.a, np.arcsin(c / FORM.a))):
         angle, w = gauss(start, 0.5 * np.pi)
         r = edge * np.sin(angle)
         total += 2.0 * np.pi * float((w * edge * np.cos(angle) * r**2) @ FORM.traction(r, c))

@@ -25,9 +25,8 @@ from vi_contact.meshes.block import BlockMesh
 
 B, L, H, K, P = 12.0, 9.0, 4.0, 2.0e7, 1.2e7  # m, Pa/m, N
 RAFT = LinearElastic(E=1.0e13, nu=0.0, rho=1.0)
-SAG = (
-    60.0 / 384.0 * K * B**4 / (RAFT.E * H**3)
-)  # of a beam with this load, over its settlement on springs
+# of a beam with this load, over its settlement on springs
+SAG = 60.0 / 384.0 * K * B**4 / (RAFT.E * H**3)
 
 
 class Standing:
@@ -100,9 +99,8 @@ def test_v2_10_raft_that_lifts_off(e):
             ]
         )
     assert np.all(errors[1] < np.array([3.3e-3, 6.6e-3, 4e-3]))
-    assert np.all(
-        np.divide(*errors) > 5.0
-    )  # 16, but for where the end of contact lies between two nodes
+    # 16, but for where the end of contact lies between two nodes
+    assert np.all(np.divide(*errors) > 5.0)
 
 
 def test_v2_10_raft_that_stands_on_a_corner():

@@ -229,9 +229,8 @@ def test_a_component_is_bounded_and_another_held(comm: Any) -> None:
     u, v = fem.Function(V), ufl.TestFunction(V)
     bcs = [fem.dirichletbc(0.0, left, V.sub(0)), fem.dirichletbc(0.0, rollers, V.sub(1))]
     stiff = 2.0 + 1.0  # of a strip that cannot become wider
-    F = (
-        elastic(u, v) - 0.09 * v[0] * ufl.ds
-    )  # on all sides: 0.27 in all, what is 0.09 (1 + 2 x) / stiff without wall
+    # on all sides: 0.27 in all, what is 0.09 (1 + 2 x) / stiff without wall
+    F = elastic(u, v) - 0.09 * v[0] * ufl.ds
     free = vi.solve(F, u, bcs=bcs)
     largest = comm.allreduce(float(np.max(u.x.array)), op=_largest())
     assert free.active == (0, 0) and largest > 0.01

@@ -12,10 +12,8 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.serial,
-]  # what PETSc does alone; test_inequality.py has our routes on ranks
+# what PETSc does alone; test_inequality.py has our routes on ranks
+pytestmark = [pytest.mark.slow, pytest.mark.serial]
 ROOT = Path(__file__).resolve().parents[2]
 KEYS = {
     "unknowns",

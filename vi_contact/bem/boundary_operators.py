@@ -138,10 +138,8 @@ class Galerkin:
         dv = SLOPE[:, None] / mesh.lengths[e][:, None, None]
         du = SLOPE / mesh.lengths[f][:, None, None]
         phi, g = m[2].sum((1, 2))[:, None, None], tensor(m[3:6].sum((2, 3)))[..., None, None]
-        sum_u, sum_v = (
-            m[6:10].sum(3)[..., None],
-            m[6:10].sum(2)[:, :, None, :],
-        )  # summed over shapes of u; of v
+        # summed over shapes of u; of v
+        sum_u, sum_v = (m[6:10].sum(3)[..., None], m[6:10].sum(2)[:, :, None, :])
         across_x, across_y = (sum_u[:2] * n_x).sum(0), (sum_v[:2] * n_y).sum(0)
         mu, turned = self.shear, TURN.T @ np.moveaxis(g, (0, 1), (-2, -1)) @ TURN
         values = np.empty((2, 2, *m.shape[1:]), m.dtype)

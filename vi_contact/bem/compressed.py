@@ -95,9 +95,8 @@ class CompressedBlocks:
                 numbers[:, start : start + len(part.places)],
             )
             start += len(part.places)
-        for real, imag in zip(
-            *np.split(numbers, 2), strict=True
-        ):  # one full matrix at a time: half of the memory
+        # one full matrix at a time: half of the memory
+        for real, imag in zip(*np.split(numbers, 2), strict=True):
             single, double, hyper = np.split(
                 (real + 1j * imag)[self.places], [16 * n**2, 24 * n**2]
             )
@@ -180,9 +179,8 @@ def compressed_blocks(
     for axis in (1, 2):
         full = np.maximum(full, np.take(full, np.argsort(mesh.after), axis))
     first = (-full[0] / (speeds[0] * dt)).astype(int)
-    smooth = ((full[1] + h) / (speeds[1] * dt) + 2.5).astype(
-        int
-    )  # half a step late or more: rounding does not matter
+    # half a step late or more: rounding does not matter
+    smooth = ((full[1] + h) / (speeds[1] * dt) + 2.5).astype(int)
     spans = np.minimum([first - first % MULTIPLE, smooth + -smooth % MULTIPLE], steps)
     above = np.stack(np.triu_indices(n))
     windows, group = np.unique(spans[:, above[0], above[1]], axis=1, return_inverse=True)

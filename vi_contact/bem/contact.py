@@ -191,9 +191,8 @@ class BoundaryContact:
             return
         corner, normals = int(np.argmax(turns)), self.compliance.normals
         directions = np.asarray(self.obstacle.directions(points, normals))
-        if (
-            np.max(np.abs(directions - normals)) <= 1e-9
-        ):  # the obstacle follows the boundary; a plane has one direction
+        # the obstacle follows the boundary; a plane has one direction
+        if np.max(np.abs(directions - normals)) <= 1e-9:
             raise InputError(
                 f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} "
                 "degrees "

@@ -137,9 +137,8 @@ def energetic_blocks(
         last = steps if small else AHEAD * steps
         with ThreadPoolExecutor(threads) as pool:
             for start in range(1, last + 1, threads):
-                for now in pool.map(
-                    at, range(start, min(start + threads, last + 1))
-                ):  # each at a time of its own
+                # each at a time of its own
+                for now in pool.map(at, range(start, min(start + threads, last + 1))):
                     if now is None:
                         yield None
                         continue

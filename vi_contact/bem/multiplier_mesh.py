@@ -76,9 +76,8 @@ class MultiplierMesh:
             raise InputError(
                 f"{owner}: sigma is for means and testing is 'end'; give testing='mean' or sigma=0"
             )
-        if (
-            2.0 * self.sigma * self.compliance.dt * EPS > 1.0
-        ):  # the weight at the end of a step, 1/(2 sigma dt)
+        # the weight at the end of a step, 1/(2 sigma dt)
+        if 2.0 * self.sigma * self.compliance.dt * EPS > 1.0:
             raise InputError(
                 f"{owner}: sigma = {self.sigma:g} 1/s gives ends of steps no weight; reduce sigma"
             )

@@ -316,9 +316,8 @@ def _at_corners(
     """
     if not len(chosen):
         return
-    at_end = pairs.shares_end[
-        chosen
-    ]  # the corner is the end of the first element and the start of the second
+    # the corner is the end of the first element and the start of the second
+    at_end = pairs.shares_end[chosen]
     from_corner = np.where(at_end, -1.0, 1.0)
     a, b = pairs.a[:, chosen] * from_corner, -pairs.b[:, chosen] * from_corner
     aa, ab, bb = (a**2).sum(0), (a * b).sum(0), (b**2).sum(0)

@@ -190,10 +190,8 @@ class _SpaceTime:
         """Return the run with the certificates of its steps measured by its largest numbers."""
         limit = (self._still + self._slope * np.maximum(run.r_n, 0.0)) * self._rubs
         motion = max(max_abs(run.displacement), max_abs(self.contact.v_free)) or 1.0
-        gap, slip = (
-            run.gap / motion,
-            run.slip / motion,
-        )  # slips alone are no measure: where all stick, they are errors
+        # slips alone are no measure: where all stick, they are errors
+        gap, slip = (run.gap / motion, run.slip / motion)
         limit, r_t = (
             one / (max(max_abs(limit), max_abs(run.r_t)) or 1.0) for one in (limit, run.r_t)
         )

@@ -57,9 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Other statuses are 128 + n (signal n) and 75 (wall time).
     """
-    if (
-        arguments is None
-    ):  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
+    # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
+    if arguments is None:
         logging.getLogger().addFilter(lambda record: record.levelno > logging.INFO)
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
@@ -89,9 +88,8 @@ def status_of(call: Callable[[], object]) -> int:
         return _stopped(error, 1)
     except KeyboardInterrupt as error:
         stopped = error if isinstance(error, Interrupted) else Interrupted()
-        if isinstance(
-            error, OutOfTime
-        ):  # on all ranks: a launcher kills what is left when the first one has failed
+        # on all ranks: a launcher kills what is left when the first one has failed
+        if isinstance(error, OutOfTime):
             fail_together(str(error))
         return _stopped(stopped, stopped.status)
     except Exception:  # a defect: its traceback is shown, and the other ranks end too

@@ -64,10 +64,8 @@ def _ida(options: argparse.Namespace) -> str:
         intensity=options.im,
         limits=options.fragility,
     )
-    for signum in (
-        signal.SIGINT,
-        signal.SIGTERM,
-    ):  # a scheduler's end of time is as Ctrl-C, also in the background
+    # a scheduler's end of time is as Ctrl-C, also in the background
+    for signum in (signal.SIGINT, signal.SIGTERM):
         signal.signal(signum, signal.default_int_handler)
     try:
         rows = run_ida(

@@ -102,10 +102,8 @@ def output_file(
         with suppress(FileNotFoundError):
             out.stat()  # is_dir alone hides from Python 3.14 on what OSError says
         fits = out.parent.is_dir() and not out.is_dir()
-    except (
-        OSError,
-        ValueError,
-    ):  # a name that is too long or holds NUL, a folder that may not be looked into
+    except (OSError, ValueError):
+        # a name that is too long or holds NUL, a folder that may not be looked into
         fits = False
     if not fits:
         raise InputError(

@@ -13,6 +13,7 @@ from .algebra import Array
 from .checks import at
 
 NAMED = 3  # places of a kind that are named
+# kind -> what that means for the conditions
 MEANINGS = {
     "shared by both sides": "joined there",
     "clamped": "left out",
@@ -22,7 +23,7 @@ MEANINGS = {
     "in front of nothing": "left out",
     "partly covered": "carried by their neighbours",
     "hardly covered": "pressures left out of the largest",
-}  # kind -> what that means for the conditions
+}
 
 
 @dataclass(frozen=True)

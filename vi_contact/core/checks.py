@@ -301,9 +301,8 @@ def shown(value: Any) -> str:
         return f"the class {value.__name__}"
     try:
         text = " ".join(repr(value).split())
-    except (
-        Exception
-    ):  # of a foreign repr, which may raise anything; and numbers of more digits than Python prints
+    except Exception:
+        # of a foreign repr, which may raise anything; and numbers of more digits than Python prints
         text = f"an object of type {type(value).__name__}"
     return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
 

@@ -28,16 +28,13 @@ from .errors import InputError, StepFailure, ViContactError
 
 T = TypeVar("T")
 
-KINDS: tuple[type[ViContactError], ...] = (
-    InputError,
-    StepFailure,
-)  # what other ranks may raise as it is
+# what other ranks may raise as it is
+KINDS: tuple[type[ViContactError], ...] = (InputError, StepFailure)
 DEPTH = 6  # how deep arguments are compared: laws within laws within lists
 LONG = 64  # members of a list, from which on it is seen as an array
 LOCAL = ("indices", "mesh")  # of groups of cells and facets: each rank has its own
-_OPEN: list[
-    list[ViContactError]
-] = []  # what ``users`` kept in each of the frames that this process is in
+# what ``users`` kept in each of the frames that this process is in
+_OPEN: list[list[ViContactError]] = []
 
 
 @contextmanager
@@ -169,9 +166,8 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
     }
     # One reduction of two numbers tells whether all are alike: the largest digest is the smallest
     # one, too.
-    whole = sha256(repr(tuple(own.items())).encode()).digest()[
-        :6
-    ]  # 48 bits: a whole number that a float holds
+    # 48 bits: a whole number that a float holds
+    whole = sha256(repr(tuple(own.items())).encode()).digest()[:6]
     digest_of_all = float(int.from_bytes(whole, "big"))
     highest, lowest = comm.max(np.array([digest_of_all, -digest_of_all]))
     if highest == -lowest:

@@ -72,11 +72,8 @@ def _loops() -> Any:
     """
     try:
         found = ctypes.CDLL(str(compiled(LOOPS, [])))
-    except (
-        OSError,
-        RuntimeError,
-        subprocess.SubprocessError,
-    ) as problem:  # RuntimeError: nobody's home is known
+    except (OSError, RuntimeError, subprocess.SubprocessError) as problem:
+        # RuntimeError: nobody's home is known
         log.info(
             "numpy does what compiled loops would do faster, because they need a C compiler: %s",
             _said(problem),

@@ -14,9 +14,8 @@ from .checks import at
 from .errors import InputError
 from .surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 
-FEATURE_ANGLE = (
-    np.pi / 6
-)  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
+# CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
+FEATURE_ANGLE = np.pi / 6
 # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
 PARALLEL = 1e-9
 
@@ -38,9 +37,8 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
     for direction in directions:
         order = np.argsort(-np.abs(direction), kind="stable")
         columns.append(next(int(c) for c in order if c not in columns))
-    if (
-        not square
-    ):  # columns in which no direction vanishes: components that are prescribed keep theirs
+    # columns in which no direction vanishes: components that are prescribed keep theirs
+    if not square:
         choices = list(permutations(range(d), len(directions)))
         sizes = [
             np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)])

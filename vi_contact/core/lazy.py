@@ -27,9 +27,8 @@ def lazy(
     room and hands on all its names.
     """
     home: dict[str, str] = {}
-    with open(
-        splitext(file)[0] + ".pyi", encoding="utf-8"
-    ) as stub:  # importing pathlib takes longer than all stubs
+    # importing pathlib takes longer than all stubs
+    with open(splitext(file)[0] + ".pyi", encoding="utf-8") as stub:
         listed = ast.parse(stub.read()).body
     for node in listed:
         if isinstance(node, ast.ImportFrom):

@@ -30,15 +30,11 @@ _KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-_SAFE = (
-    os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-)  # nonblocking: to open a pipe would wait for its other end
+# nonblocking: to open a pipe would wait for its other end
+_SAFE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 TRIES = 10  # to make a file anew, while somebody else makes one of that name
-DEVICES = (
-    Path("/dev"),
-    Path("/dev/fd"),
-    Path("/proc/self/fd"),
-)  # where users name a stream as an output
+# where users name a stream as an output
+DEVICES = (Path("/dev"), Path("/dev/fd"), Path("/proc/self/fd"))
 
 
 def is_own(path: Path) -> bool:
@@ -190,9 +186,8 @@ def _mode(path: Path) -> int | None:
 
 def _opened(path: Path, flags: int) -> int:
     """Return the descriptor of a regular file."""
-    is_own(
-        path
-    )  # the sentence says what it is; a link that is made after this is not followed either
+    # the sentence says what it is; a link that is made after this is not followed either
+    is_own(path)
     descriptor = os.open(path, flags | _SAFE, 0o666)
     mode = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(mode):

@@ -8,11 +8,8 @@ Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on 
 import sys
 
 PETSC = "petsc4py.PETSc"
-OF_SUITESPARSE = (
-    "amd",
-    "cholmod",
-    "umfpack",
-)  # one package to PETSc before 3.22, and from then on each by itself
+# one package to PETSc before 3.22, and from then on each by itself
+OF_SUITESPARSE = ("amd", "cholmod", "umfpack")
 
 
 def petsc_is_here() -> bool:

@@ -148,9 +148,8 @@ class ContactProblem:
         load, turned = known[basis, dual]
         if load is system.load:
             return turned
-        return turned.loaded(
-            system.load.in_basis(basis)
-        )  # the matrices are shared with systems of other loads
+        # the matrices are shared with systems of other loads
+        return turned.loaded(system.load.in_basis(basis))
 
     def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
         return (

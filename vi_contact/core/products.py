@@ -23,9 +23,8 @@ class Remembered:
 
     def __init__(self, function: Callable[[Any], Array], kept: int) -> None:
         self._function, self._kept = function, kept
-        self._known: dict[
-            Any, tuple[Any, Array | Callable[[], Array]]
-        ] = {}  # with the vectors, so that ids are theirs
+        # with the vectors, so that ids are theirs
+        self._known: dict[Any, tuple[Any, Array | Callable[[], Array]]] = {}
 
     def __call__(self, x: Any) -> Array:
         """Return the value at x."""

@@ -429,9 +429,8 @@ def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     size = np.abs(directions)
     normal = np.argmax(size, axis=1)
     size[every, normal] = np.inf
-    others = np.argsort(size, axis=1, kind="stable")[
-        :, :-1
-    ]  # the first tangent is made of the axis least aligned
+    # the first tangent is made of the axis least aligned
+    others = np.argsort(size, axis=1, kind="stable")[:, :-1]
     blocks = np.tile(np.eye(d), (k, 1, 1))
     turned = np.count_nonzero(directions, axis=1) > 1
     blocks[every[turned, None], :, others[turned]] = frames[turned, :, 1:].swapaxes(1, 2)

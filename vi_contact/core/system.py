@@ -75,12 +75,8 @@ class Space(Protocol):
 
 
 OTHERS = 4  # surfaces and the like of which factors are kept
-KEPT = {
-    "M": 6,
-    "C": 4,
-    "K": 2,
-    "load": 2,
-}  # products with each: what a step and the next one may ask for again
+# products with each: what a step and the next one may ask for again
+KEPT = {"M": 6, "C": 4, "K": 2, "load": 2}
 PAIR = "give pairs of a vector [N] and a function of the time"
 
 

@@ -52,9 +52,8 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     if len(t) < 3:
         raise InputError(f"the history has {len(t)} rows: give one of three or more")
     ground = np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float)
-    ground = np.append(
-        ground[:1], 0.5 * (ground[1:] + ground[:-1])
-    )  # mean over the step, as probes have it
+    # mean over the step, as probes have it
+    ground = np.append(ground[:1], 0.5 * (ground[1:] + ground[:-1]))
     if kind == "v":
         values = np.append(0.0, np.diff(values) / np.diff(t)) + ground
     elif column == f"a_g_{axis}":

@@ -7,10 +7,8 @@ from ..core.checks import instance, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 
-SHIFT, RIGID = (
-    1e-6,
-    1e-13,
-)  # of the largest K_ii / M_ii: added to K; below the other a motion is rigid
+# of the largest K_ii / M_ii: added to K; below the other a motion is rigid
+SHIFT, RIGID = (1e-6, 1e-13)
 
 
 def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:

@@ -107,9 +107,8 @@ class Part:
             points[chosen] - self.centre,
         )
         self.normal, self.whole = self._direction(name, normal), self.weights.sum()
-        places = np.unique(points, axis=0, return_inverse=True)[
-            1
-        ].ravel()  # run folders do not tell of nodes
+        # run folders do not tell of nodes
+        places = np.unique(points, axis=0, return_inverse=True)[1].ravel()
         self.tangents = tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
         self.fit, self.ends = self._fit().T, self._ends(box).T
         lowest, self.tall = float(box[:, -1].min() - self.centre[-1]), float(np.ptp(box[:, -1]))
@@ -227,9 +226,8 @@ def _ratio(one: Array, other: Array) -> Array:
     return np.divide(one, other, out=np.full(one.shape, np.nan), where=other != 0.0)
 
 
-_MEANING = tomllib.loads(
-    files(__package__).joinpath("resultants.toml").read_text(encoding="utf-8")
-)  # unit, meaning
+# unit, meaning
+_MEANING = tomllib.loads(files(__package__).joinpath("resultants.toml").read_text(encoding="utf-8"))
 
 
 @dataclass

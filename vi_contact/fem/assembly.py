@@ -152,14 +152,12 @@ def assemble(
     acting = [one.dashpots.loads(one, body) for one in absorbers]
     load = assemble_loads(space, section, as_tuple(loads))
     rigid = np.column_stack([space.restrict(one) for one in space.translations])
-    K, pull = _reduced(
-        body.matrix("K"), space, algebra, 0
-    )  # one after the other: each is large before it is reduced
+    # one after the other: each is large before it is reduced
+    K, pull = _reduced(body.matrix("K"), space, algebra, 0)
     damper = _damper(body, absorbers)
     C, viscous = _reduced(damper, space, algebra, 1) if damper is not None else (None, ())
-    mass = body.matrix(
-        "M"
-    )  # momenta, less M r: what accelerated prescribed nodes pull on the free ones
+    # momenta, less M r: what accelerated prescribed nodes pull on the free ones
+    mass = body.matrix("M")
     momenta = (
         [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
     )

@@ -20,10 +20,8 @@ from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra, as_pet
 from .petsc_rows import aij_of, rows_of
 
 COMPACT = 20_000  # unknowns in space from which on it pays: those that are solved iteratively
-WASTE, SAMPLE = (
-    1.8,
-    1000,
-)  # entries of blocks over those that are not zero, at so many nodes: with more, no blocks
+# entries of blocks over those that are not zero, at so many nodes: with more, no blocks
+WASTE, SAMPLE = (1.8, 1000)
 
 
 class Half(PetscMatrix):
@@ -135,9 +133,8 @@ class CompactAlgebra(PetscAlgebra):
         )
         if odd or wasted > 0.0:
             width, kept, every = 1, rows.data != 0.0, np.arange(n, dtype=kind)
-            row = np.append(
-                np.repeat(every, np.diff(rows.indptr))[kept], every
-            )  # and the diagonal, as PETSc expects
+            # and the diagonal, as PETSc expects
+            row = np.append(np.repeat(every, np.diff(rows.indptr))[kept], every)
             values, columns = (
                 np.append(rows.data[kept], np.zeros(n)),
                 np.append(rows.indices[kept], first + every),

@@ -28,14 +28,12 @@ from ..core.errors import InputError
 
 Indices = npt.NDArray[np.int32]
 
-fem: Any = (
-    dolfinx.fem
-)  # untyped on purpose: names missing from the installed version are not errors here
+# untyped on purpose: names missing from the installed version are not errors here
+fem: Any = dolfinx.fem
 _mesh: Any = dolfinx.mesh
 
-VERSION: tuple[int, ...] = tuple(
-    int(part) for part in dolfinx.__version__.split(".")[:2]
-)  # DOLFINx's (major, minor)
+# DOLFINx's (major, minor)
+VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 
 _BASIX_ELEMENTS = VERSION >= (0, 7)
 _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
@@ -104,9 +102,8 @@ def create_mesh(
     and no rows. Collective.
     """
 
-    def told(
-        *_: Any,
-    ) -> Any:  # the arguments of a partitioner changed twice, what it returns did not
+    # the arguments of a partitioner changed twice, what it returns did not
+    def told(*_: Any) -> Any:
         return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
 
     gdim = x.shape[1]
@@ -119,9 +116,8 @@ def create_mesh(
     domain = ufl.Mesh(
         ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), degree)
     )
-    rows = dolfinx.cpp.graph.AdjacencyList_int64(
-        cells
-    )  # it tries an array first, and its error prints all arguments
+    # it tries an array first, and its error prints all arguments
+    rows = dolfinx.cpp.graph.AdjacencyList_int64(cells)
     return _mesh.create_mesh(
         comm, rows, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told
     )
@@ -182,9 +178,8 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     if not len(entities):  # 0.9 divides by their number
         return np.empty((0, count), dtype=np.int32)
     if _BASIX_ELEMENTS:
-        return _mesh.entities_to_geometry(mesh, dim, entities)[
-            :, :count
-        ]  # since 0.8 mid-points follow
+        # since 0.8 mid-points follow
+        return _mesh.entities_to_geometry(mesh, dim, entities)[:, :count]
     return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)
 
 

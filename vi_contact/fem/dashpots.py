@@ -148,9 +148,8 @@ class DashpotMatrix:
                 "forms"
             )
         cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
-        moduli = (
-            0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho")
-        )  # times thickness
+        # times thickness
+        moduli = (0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho"))
         cellwise = []
         for values in impedances(dashpots, forms.section, *moduli):
             cellwise.append(compat.function(cells))

@@ -87,9 +87,8 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
             "take "
             "Iterative(), which factorises nothing, or more memory"
         )
-    no_diagonal = (
-        "missing diagonal" in said
-    )  # a row of a symmetric matrix without one: no positive definite matrix
+    # a row of a symmetric matrix without one: no positive definite matrix
+    no_diagonal = "missing diagonal" in said
     if code in ZERO_PIVOT or no_diagonal or reason == "singular":
         return InputError(
             "the effective matrix cannot be factorised: it is singular or contains NaN: check the "

@@ -96,11 +96,8 @@ def refuse_not_linear(said: str, form: Any) -> None:
     """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
     try:
         compute_form_data(form)
-    except (
-        ArityMismatch,
-        TypeError,
-        ValueError,
-    ):  # the first is no Exception; others where UFL words it and fails
+    except (ArityMismatch, TypeError, ValueError):
+        # the first is no Exception; others where UFL words it and fails
         raise InputError(
             f"{said} is not linear in u or in v; return a sum of products of one and the other"
         ) from None

@@ -81,9 +81,8 @@ class ElasticForms:
         damped = self.viscous is not None or any(
             np.any(one) for each in values for one in damping.coefficients(each)
         )
-        self.damped = bool(
-            largest(space.comm, damped)
-        )  # a ratio may be zero in all cells of some ranks
+        # a ratio may be zero in all cells of some ranks
+        self.damped = bool(largest(space.comm, damped))
         ratios = [
             _largest_ratio(cells, where, one)
             for (where, _), one in zip(materials, values, strict=True)

@@ -113,10 +113,8 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
 
     def at_points(x: Array) -> Array:
         values = np.positive(value(x), dtype=float)  # an error for complex numbers
-        if values.shape not in (
-            x.shape[1:],
-            (1, *x.shape[1:]),
-        ):  # DOLFINx reads beyond values that are too few
+        # DOLFINx reads beyond values that are too few
+        if values.shape not in (x.shape[1:], (1, *x.shape[1:])):
             raise InputError(
                 f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} "
                 "points; give "

@@ -53,9 +53,8 @@ class LinearForm:
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None
     update: Callable[[float], Any] | None = None
-    _once: Any = field(
-        default_factory=WeakKeyDictionary, init=False, repr=False, compare=False
-    )  # space -> forces
+    # space -> forces
+    _once: Any = field(default_factory=WeakKeyDictionary, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         function(

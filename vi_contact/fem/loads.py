@@ -48,9 +48,8 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
             if callable(value)
             else np.tile(np.asarray(value), (len(points), 1))
         )
-    except (
-        Exception
-    ) as error:  # of a user's function, at the points of one rank: the others must not wait for it
+    except Exception as error:
+        # of a user's function, at the points of one rank: the others must not wait for it
         return np.zeros_like(points), ended(f"{name} at t = {t:g} s", error)
     if result.dtype.kind not in "iuf":
         defect = f"{name} returned {shown(result)}: return real numbers"

@@ -145,9 +145,8 @@ def own_system(
         matrices = {name: algebra.block(A, free) for name, A in matrices.items()}
         load = load.in_basis(SerialMatrix(sp.identity(n, format="csc")[:, free]))
     M, K = matrices["M"], matrices["K"]
-    momenta = [
-        (every @ r)[free] - M @ r[free] for r in influence.T
-    ]  # of rows that stand still, when all move
+    # of rows that stand still, when all move
+    momenta = [(every @ r)[free] - M @ r[free] for r in influence.T]
     massless = M.diagonal() == 0.0
     space = MatrixSpace(algebra, points, block[free], component[free], K)
     return floating(

@@ -22,11 +22,8 @@ from .petsc_rows import aij_of, rows_of
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {"ksp_type": "preonly", "pc_factor_mat_solver_type": "petsc"}
-TUNING = (
-    "redundant_",
-    "mat_mumps_icntl_14",
-    "mat_mumps_icntl_20",
-)  # options that choose no other factor
+# options that choose no other factor
+TUNING = ("redundant_", "mat_mumps_icntl_14", "mat_mumps_icntl_20")
 _ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its column
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
@@ -145,9 +142,8 @@ class PetscFactor:
         try:
             self._pc.setUp()
             self._b.set(1.0)
-            self._pc.apply(
-                self._b, self._x
-            )  # PETSc fills it with infinity when the factorisation failed
+            # PETSc fills it with infinity when the factorisation failed
+            self._pc.apply(self._b, self._x)
             found = finite(self._x)
         except PETSc.Error as error:
             raise failure(self._pc, self._mat, error) from error
@@ -162,9 +158,8 @@ class PetscFactor:
         """
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
-        count = self._pc.getFactorMatrix().getInfo()[
-            "nz_used"
-        ]  # MUMPS counts many in millions, below zero
+        # MUMPS counts many in millions, below zero
+        count = self._pc.getFactorMatrix().getInfo()["nz_used"]
         return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
@@ -293,9 +288,8 @@ class PetscAlgebra:
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         """Return A with the rows and columns of masked unknowns replaced by the identity's."""
         every = np.arange(len(mask))
-        ones = self.local(
-            every, every, mask.astype(float), len(mask)
-        )  # a row of zeros may have no diagonal entry
+        # a row of zeros may have no diagonal entry
+        ones = self.local(every, every, mask.astype(float), len(mask))
         mat = as_petsc(self.combine([(1.0, A), (1.0, ones)])).mat
         rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
         mat.zeroRowsColumns(rows, diag=1.0)
@@ -315,9 +309,8 @@ class PetscAlgebra:
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
         """Return a factor with these unknowns last, or None where there is none."""
         mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
-        chosen = any(
-            not name.startswith(TUNING) for name in given
-        )  # options of the user choose the factor
+        # options of the user choose the factor
+        chosen = any(not name.startswith(TUNING) for name in given)
         serves = not chosen and (self.comm.size == 1 or own_serves(mat))
         return contact_last(self.comm, mat, last) if serves else None
 

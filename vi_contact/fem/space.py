@@ -38,9 +38,8 @@ def body_numbers(mesh: Any) -> Indices:
     """
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    ghosts = numbers[
-        mesh.geometry.index_map().size_local :
-    ]  # there are such also where there are no ghost cells
+    # there are such also where there are no ghost cells
+    ghosts = numbers[mesh.geometry.index_map().size_local :]
     shared = np.flatnonzero(np.isin(numbers, np.concatenate(mesh.comm.allgather(ghosts))))
     return parts_of(MpiComm(mesh.comm), first.ravel(), cells[:, 1:].ravel(), numbers, shared)
 

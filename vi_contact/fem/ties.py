@@ -26,9 +26,8 @@ from .mesh import Facets
 PLACE_TOLERANCE = (
     1e-6  # of the body's size: nodes farther from the place of their partner have none
 )
-NodesOf = Callable[
-    [Facets], tuple[Indices, Array]
-]  # original numbers, ascending, and points of nodes, on every rank
+# original numbers, ascending, and points of nodes, on every rank
+NodesOf = Callable[[Facets], tuple[Indices, Array]]
 
 
 @dataclass(frozen=True)

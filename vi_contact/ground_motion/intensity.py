@@ -103,9 +103,8 @@ def cav(record: Record) -> float:
     It is exact for straight lines between samples.
     """
     a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
-    change = (
-        record.acceleration[:-1] * record.acceleration[1:] < 0.0
-    )  # two triangles where the sign changes
+    # two triangles where the sign changes
+    change = record.acceleration[:-1] * record.acceleration[1:] < 0.0
     total = np.where(change, a + b, 1.0)
     return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
 
@@ -116,12 +115,10 @@ def rms(record: Record) -> float:
     return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
 
 
-HOUSNER_PERIODS = np.linspace(
-    0.1, 2.5, 241
-)  # periods [s] of the trapezoidal rule in `housner_intensity`
-PREDOMINANT_PERIODS = np.geomspace(
-    0.02, 10.0, 400
-)  # periods [s] among which `predominant_period` looks, 1.6 % apart
+# periods [s] of the trapezoidal rule in `housner_intensity`
+HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)
+# periods [s] among which `predominant_period` looks, 1.6 % apart
+PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)
 
 
 @checked

@@ -48,9 +48,8 @@ def resampled(record: Record, dt: float) -> Record:
     """
     dt = number("resampled", "dt", dt, positive=True, unit="seconds")
     counted("resampled", f"dt={dt!r} s", record.duration / dt)
-    from scipy.signal import (
-        resample_poly,
-    )  # late: it takes longer to import than the rest of the package
+    # late: it takes longer to import than the rest of the package
+    from scipy.signal import resample_poly
 
     ratio = Fraction(record.dt / dt).limit_denominator(LARGEST_RATIO)
     exact = math.isclose(ratio.numerator * dt, ratio.denominator * record.dt, rel_tol=1e-9)
@@ -212,10 +211,8 @@ def filtered(
         )
     if order not in range(1, 11):
         raise InputError(f"filtered: order is {order!r}; give a whole number from 1 to 10")
-    from scipy.signal import (
-        butter,
-        sosfilt,
-    )  # late: it takes longer to import than the rest of the package
+    # late: it takes longer to import than the rest of the package
+    from scipy.signal import butter, sosfilt
 
     stages = [
         butter(order, corner, kind, fs=1.0 / record.dt, output="sos")
@@ -226,9 +223,8 @@ def filtered(
     if causal:
         samples = sosfilt(sections, record.acceleration)
     else:
-        ringing = 6.0 / (
-            min(corners) * record.dt
-        )  # samples in which the slowest filter dies away: six of its periods
+        # samples in which the slowest filter dies away: six of its periods
+        ringing = 6.0 / (min(corners) * record.dt)
         counted(
             "filtered", f"a corner of {min(corners):g} Hz", 3.0 * ringing + record.acceleration.size
         )
@@ -268,12 +264,10 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
     ends = np.array([[motion[k][-1] for motion in motions] for k in (0, 1)])
     scale = np.array([[record.duration], [record.duration**2]])
     wanted = np.array([[part[-1]] for part in integrated(record)]) / scale
-    coefficients = np.linalg.lstsq(ends / scale, wanted, rcond=None)[0][
-        :, 0
-    ]  # one that ends at rest, and
-    free = np.linalg.svd(ends / scale)[2][
-        2:
-    ].T  # combinations of those that change nothing at the end
+    # one that ends at rest, and
+    coefficients = np.linalg.lstsq(ends / scale, wanted, rcond=None)[0][:, 0]
+    # combinations of those that change nothing at the end
+    free = np.linalg.svd(ends / scale)[2][2:].T
     if free.shape[1]:
         rest = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)[0]
         coefficients = coefficients + free @ rest

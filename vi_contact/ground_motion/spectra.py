@@ -32,10 +32,8 @@ SHORTEST, MOST = 1000, 10**10
 The second number is that of samples times periods, at most.
 """
 
-_SMALL, _TERMS = (
-    0.3,
-    14,
-)  # below this omega t the closed forms lose digits; the series of so many terms does not
+# below this omega t the closed forms lose digits; the series of so many terms does not
+_SMALL, _TERMS = (0.3, 14)
 
 _BLOCK = 512  # samples marched before their peaks are taken: bounds the memory
 
@@ -79,13 +77,11 @@ def _factors(time: Array | float, length: Array | float, omega: Array, zeta: flo
     of_u = decay * np.array([cosine + zeta / root * sine, -omega / root * sine])
     of_v = decay * np.array([sine / (root * omega), cosine - zeta / root * sine])
     one, zero = np.ones_like(omega), np.zeros_like(omega)
-    constant = np.array(
-        [-one / omega**2, zero]
-    )  # particular motion under a = 1, at 0 and at `time`
+    # particular motion under a = 1, at 0 and at `time`
+    constant = np.array([-one / omega**2, zero])
     ramp0 = np.array([2.0 * zeta / omega**3, -one / omega**2])  # under a = t, at 0
-    ramp = np.array(
-        [2.0 * zeta / omega**3 - time / omega**2, -one / omega**2]
-    )  # under a = t, at `time`
+    # under a = t, at `time`
+    ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -one / omega**2])
     of_one = constant - of_u * constant[0] - of_v * constant[1]
     of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
     small = omega * time < _SMALL
@@ -151,9 +147,8 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     )
     parts = np.maximum(PER_STEP, 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))).astype(int)
     peaks = np.zeros((3, row.size))
-    for count in np.unique(
-        parts
-    ):  # oscillators that need the same number of looks a step go together
+    # oscillators that need the same number of looks a step go together
+    for count in np.unique(parts):
         same = parts == count
         peaks[:, same] = _peaks(record, 2.0 * math.pi / row[same], damping, int(count))
     return ResponseSpectrum(row, damping, *peaks)

@@ -9,9 +9,8 @@ from ..core.algebra import Array, Comm, Factor, Indices, Mask, largest
 from ..core.system import SemiDiscreteSystem
 from .mass_transfer import rigid_motions
 
-ROUNDED = 16.0 * float(
-    np.finfo(float).eps
-)  # wᵀKw over Σ K_ii w_i² that is round-off: 1.1 eps at most on meshes
+# wᵀKw over Σ K_ii w_i² that is round-off: 1.1 eps at most on meshes
+ROUNDED = 16.0 * float(np.finfo(float).eps)
 NOWHERE = 1e300  # [m], where bodies are that are held everywhere
 SOFT = 1e-12  # of a diagonal entry: lets unknowns be solved for that nothing holds
 

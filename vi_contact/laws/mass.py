@@ -76,9 +76,8 @@ class Redistributed:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         algebra, own = system.algebra, system.M.diagonal()
-        nodal = np.asarray(
-            sum(r * (system.M @ r) for r in system.influence.T)
-        )  # row sums, in any nodal frames
+        # row sums, in any nodal frames
+        nodal = np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
         still = (own > 0.0) & ~system.influence.any(axis=1)  # no translation moves them
         lumping = self.lumping
         if system.space.hierarchy is not None:
@@ -89,9 +88,8 @@ class Redistributed:
                 "or of "
                 "other unknowns: give the problem mass=ConsistentMass()"
             )
-        wrong = int(
-            total(algebra.comm, np.sum(nodal < -LIGHT * own))
-        )  # as of elements of higher order
+        # as of elements of higher order
+        wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))
         if wrong and lumping:
             raise InputError(
                 f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have "
@@ -134,12 +132,10 @@ def _contact_unknowns(
     contact[surface.owned] = True
     massless = contact.copy()
     contact[surface.tangents[surface.tangents >= 0]] = True
-    if (
-        surface.coupling is not None
-    ):  # relative unknowns: nodes of both sides lose their inertia as a whole
-        faced = system.algebra.entries(
-            surface.coupling, np.flatnonzero(contact)
-        )  # side 2, which would ring with mass
+    # relative unknowns: nodes of both sides lose their inertia as a whole
+    if surface.coupling is not None:
+        # side 2, which would ring with mass
+        faced = system.algebra.entries(surface.coupling, np.flatnonzero(contact))
         contact[named(system, faced.indices)] = True
     return (contact.copy() if tangential or surface.coupling is not None else massless), contact
 

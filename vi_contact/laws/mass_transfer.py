@@ -49,10 +49,8 @@ def from_neighbours(
             left[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
-            exact, donors = (
-                False,
-                donors | (tied & ~contact),
-            )  # too few to tell a rotation: translations will do
+            # too few to tell a rotation: translations will do
+            exact, donors = (False, donors | (tied & ~contact))
         else:
             raise InputError(
                 "the mass of some contact nodes cannot be moved, as no node behind them has mass: "
@@ -164,9 +162,8 @@ class _Neighbours:
         U, values, V = np.linalg.svd(root[:, :, None] * R, full_matrices=False)
         kept = values > 1e-8 * values[:, :1]
         share = np.where(kept, (V @ target[:, :, None])[:, :, 0] / np.where(kept, values, 1.0), 0.0)
-        by_columns = np.ascontiguousarray(U.swapaxes(1, 2)).swapaxes(
-            1, 2
-        )  # one order of sums, whatever the batch
+        # one order of sums, whatever the batch
+        by_columns = np.ascontiguousarray(U.swapaxes(1, 2)).swapaxes(1, 2)
         row = root * (by_columns @ share[:, :, None])[:, :, 0]
         return row, np.max(np.abs((row[:, None, :] @ R)[:, 0] - target), axis=1)
 

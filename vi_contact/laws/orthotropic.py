@@ -124,9 +124,8 @@ class Orthotropic:
             )
         C = self.stiffness
         if dimension == 2:
-            out = np.abs(C[:, :, :2, 2])[
-                [0, 1, 0, 2], [0, 1, 1, 2]
-            ]  # shear across the plane by strains in it
+            # shear across the plane by strains in it
+            out = np.abs(C[:, :, :2, 2])[[0, 1, 0, 2], [0, 1, 1, 2]]
             if out.max() > ROUND_OFF * C.max():
                 raise InputError(
                     "Orthotropic: z is not one of the material axes, so the body would leave its "

@@ -113,9 +113,8 @@ class ChannelMesh:
             *["channel_inside"] * 3,
             "channel_top",
         ]
-        shared = [
-            max(round(math.dist(one, two) / size), 1) for one, two in pairwise(u)
-        ]  # on both bodies
+        # on both bodies
+        shared = [max(round(math.dist(one, two) / size), 1) for one, two in pairwise(u)]
         add_outline(gmsh.model, "channel", u + inside, names, [size] * 8, shared)
         layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
         names = [

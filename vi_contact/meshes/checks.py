@@ -27,9 +27,8 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     det = np.linalg.det(edges)
     d = points.shape[1]
     longest = np.sqrt((edges**2).sum(axis=-1)).max(axis=(1, 2))
-    noise = (
-        _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)
-    )  # error of det from the rounding of coordinates
+    # error of det from the rounding of coordinates
+    noise = _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)
     flat = np.abs(det).min(axis=1) <= noise
     twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
     refuse_cells(flat, "no volume", points, cells, source)

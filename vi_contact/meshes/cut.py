@@ -301,9 +301,8 @@ def _doubled(
     part = connected(len(key), *links)
     _, first = np.unique(node, return_index=True)
     keeps = np.isin(part, part[first])  # the part of the first cell around a node keeps it
-    _, number = np.unique(
-        node[~keeps] * len(key) + part[~keeps], return_inverse=True
-    )  # new nodes in order of the old
+    # new nodes in order of the old
+    _, number = np.unique(node[~keeps] * len(key) + part[~keeps], return_inverse=True)
     cells = arrays.cells.copy()
     cells[around[~keeps], column[~keeps]] = n + number
     origin = np.zeros(int(number.max(initial=-1)) + 1, dtype=np.int64)

@@ -113,9 +113,8 @@ class GeoFile:
                 said = (
                     done.stderr.strip().splitlines() or [f"it ended without a word, with {how}"]
                 )[-1]
-                if said.strip().startswith(
-                    ("terminate called", "what()")
-                ):  # for a text that Gmsh throws
+                # for a text that Gmsh throws
+                if said.strip().startswith(("terminate called", "what()")):
                     said = (
                         "it stopped at a formula or size: check Field[…].F, and that "
                         "Mesh.MeshSize… is positive"
@@ -136,10 +135,8 @@ def mesh_here(refine: int, time_limit: float) -> None:
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         resource.setrlimit(limit, (memory, memory))
-    with (
-        session() as gmsh,
-        options(gmsh, {"General.AbortOnError": 0}),
-    ):  # errors are read from Gmsh's log
+    # errors are read from Gmsh's log
+    with session() as gmsh, options(gmsh, {"General.AbortOnError": 0}):
         gmsh.logger.start()
         try:
             gmsh.merge("script.geo")
@@ -165,9 +162,8 @@ def _tell_errors(lines: Sequence[str]) -> None:
     At any other error of its log, the process ends.
     """
     for before, line in pairwise(["", *lines]):
-        if match := _NOT_TRANSFINITE.match(
-            line
-        ):  # Gmsh itself goes on with a free mesh; from 4.14 on it only warns
+        # Gmsh itself goes on with a free mesh; from 4.14 on it only warns
+        if match := _NOT_TRANSFINITE.match(line):
             print(f"{match[1]} is meshed freely, not transfinite: {match[2]}")
             continue
         if not line.startswith("Error"):

@@ -34,9 +34,8 @@ _UNSEEN_OF_MESH = frozenset(_LISTS["unseen_of_mesh"].split())
 _UNSEEN_OF_GEOMETRY = frozenset(_LISTS["unseen_of_geometry"].split())
 _UNSEEN_OPTIONS = frozenset(("General", "Print", "PostProcessing", "View"))  # all options of these
 _UNSEEN_COMMANDS = frozenset(("Printf", "Print", "Save", "Draw"))  # up to their semicolon
-_UNSEEN_BRACES = frozenset(
-    ("Color", "Show", "Hide")
-)  # up to their semicolon, or the brace that ends them
+# up to their semicolon, or the brace that ends them
+_UNSEEN_BRACES = frozenset(("Color", "Show", "Hide"))
 _PARAMETERS = frozenset(_LISTS["parameters"].split())
 
 _TOKEN = re.compile(

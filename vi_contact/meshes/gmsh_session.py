@@ -45,9 +45,8 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
     borrowed = _is_initialised(gmsh)
     if not borrowed:
         known = inspect.signature(gmsh.initialize).parameters
-        keep_signals = (
-            {"interruptible": False} if "interruptible" in known else {}
-        )  # or newer Gmsh takes over SIGINT
+        # or newer Gmsh takes over SIGINT
+        keep_signals = {"interruptible": False} if "interruptible" in known else {}
         gmsh.initialize([], readConfigFiles=False, **keep_signals)
     current = gmsh.model.getCurrent()
     try:
@@ -99,9 +98,8 @@ def _is_initialised(gmsh: Any) -> bool:
     """
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    perturb = getattr(
-        ctypes.CDLL(None), "mallopt", lambda option, value: 0
-    )  # of glibc: 0xFF fills with about 0
+    # of glibc: 0xFF fills with about 0
+    perturb = getattr(ctypes.CDLL(None), "mallopt", lambda option, value: 0)
     kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, 2)
     perturb(M_PERTURB, 0xFF)

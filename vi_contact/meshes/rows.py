@@ -13,9 +13,8 @@ from scipy.sparse import coo_matrix
 Rows = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
-_CELLS = tomllib.loads(
-    Path(__file__).with_name("cells.toml").read_text(encoding="utf-8")
-)  # which says what they are
+# which says what they are
+_CELLS = tomllib.loads(Path(__file__).with_name("cells.toml").read_text(encoding="utf-8"))
 GMSH_NUMBERS, SECOND_ORDER, SIDES, CORNERS = (
     {name: one[key] for name, one in _CELLS.items()}
     for key in ("first_order", "second_order", "sides", "corners")

@@ -37,9 +37,8 @@ from .histories import STYLE, plain, require_matplotlib, save, scale, scaled, sh
 DRAWN = 0.1
 FILM_FRAMES = 48  # at most: a film of two megabytes
 BODIES = ("0.35", "tab:blue", "tab:green", "tab:purple")  # edges of their elements
-LIGHT = np.array(
-    [0.3, -0.5, 0.81]
-)  # from where it comes; sides along it have 0.6 of their brightness
+# from where it comes; sides along it have 0.6 of their brightness
+LIGHT = np.array([0.3, -0.5, 0.81])
 # of the size of the bodies: how far inside the dots are that show the contact in the plane
 INWARDS = 0.015
 
@@ -279,9 +278,8 @@ def film(
                     )
                     if k == 0:
                         figure.draw_without_rendering()
-                        figure.set_layout_engine(
-                            "none"
-                        )  # the same places in every frame, laid out once
+                        # the same places in every frame, laid out once
+                        figure.set_layout_engine("none")
                     writer.grab_frame()
             write_output(path, draft.read_bytes())
     return Path(path)

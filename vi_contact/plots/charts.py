@@ -245,9 +245,8 @@ def draw_chart(axis: Any, chart: Chart) -> None:
         axis.set_ylim(bottom=0.0)
     if chart.log_y and any(np.any(line.y > 0.0) for line in chart.lines):
         axis.set_yscale("log")
-        axis.yaxis.set_major_formatter(
-            "{x:.0e}"
-        )  # powers of ten are formulas, which the page does not read
+        # powers of ten are formulas, which the page does not read
+        axis.yaxis.set_major_formatter("{x:.0e}")
     if chart.bound is not None:
         axis.axhline(
             chart.bound, color="tab:red", ls="--", lw=0.8, label=f"tolerance {chart.bound:g}"

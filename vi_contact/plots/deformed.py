@@ -29,12 +29,8 @@ from ..run.files.reading import RunFolder, read_run
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane
 FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
-CELLS = {
-    (2, 3): "triangle",
-    (2, 4): "quadrilateral",
-    (3, 4): "tetrahedron",
-    (3, 8): "hexahedron",
-}  # dimension, corners
+# dimension, corners
+CELLS = {(2, 3): "triangle", (2, 4): "quadrilateral", (3, 4): "tetrahedron", (3, 8): "hexahedron"}
 
 
 @dataclass(frozen=True)
@@ -72,10 +68,8 @@ class StoredFrames:
         Cells that share nodes are of one body.
         """
         count, corners = self.cells.shape
-        links = (
-            np.repeat(np.arange(count), corners),
-            count + self.cells.ravel(),
-        )  # from cells to their nodes
+        # from cells to their nodes
+        links = (np.repeat(np.arange(count), corners), count + self.cells.ravel())
         return connected(count + len(self.points), *links)[:count]
 
     @cached_property
@@ -101,9 +95,8 @@ class StoredFrames:
         reach = SAME * float(np.ptp(self.points, axis=0).max())
         tree = cKDTree(contact.points)
         _, near = tree.query(self.points[nodes], k=[1, 2, 3, 4], distance_upper_bound=reach)
-        candidates = near[place.ravel()].reshape(
-            *sides.shape, 4
-        )  # those of all faces at this place; m: none
+        # those of all faces at this place; m: none
+        candidates = near[place.ravel()].reshape(*sides.shape, 4)
         corners = self.points[sides]
         away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
         outwards = plane_normals(corners)
@@ -183,9 +176,8 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     if places:
         history = run.history if isinstance(run, RunFolder) else read_run(folder).history
         times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
-        places = {
-            k: places[k] for k in sorted(places) if k in times
-        }  # not those whose rows a killed run has lost
+        # not those whose rows a killed run has lost
+        places = {k: places[k] for k in sorted(places) if k in times}
     if not places:
         raise InputError(
             f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)"
@@ -206,9 +198,8 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
             or cells.max() >= len(points)
         ):
             raise ValueError("a cell has a point that is not there")
-    cells = cells[
-        :, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])
-    ]  # of second order: the vertices
+    # of second order: the vertices
+    cells = cells[:, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])]
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
     return StoredFrames(
         points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values())

@@ -163,9 +163,8 @@ class Painter:
             self.dots(axis, face.seen(face.points), values[face.conditions])
         names = AXES if face.axes is None else [direction(way) for way in face.axes.T]
         seen = face.seen(face.points)
-        limit(
-            axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW
-        )  # with room for arrows
+        # with room for arrows
+        limit(axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW)
 
     def dots(self, axis: Any, places: Array, values: Array) -> None:
         """Draw values (k,) as dots at places (k, d)."""
@@ -211,9 +210,8 @@ def limit(
                 f"{letter}label": f"{name if len(name) == 1 else f'along {name}'} [m]",
             }
         )
-        share = (b - a) / (
-            float((high - low).max() + 2.0 * room) or 1.0
-        )  # narrow panels have room for few numbers
+        # narrow panels have room for few numbers
+        share = (b - a) / (float((high - low).max() + 2.0 * room) or 1.0)
         axis.locator_params(
             letter, nbins=5 if len(low) == 3 else int(np.clip(6.0 * share, 1.0, 5.0)), min_n_ticks=1
         )
@@ -361,7 +359,6 @@ def name_states(figure: Any, frictional: bool, longest: float = 0.0) -> None:
                 label=f"slip of the body, the longest {longest / metres:.3g} {unit}",
             )
         )
-    figure.supxlabel(
-        " ", fontsize=16
-    )  # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    figure.supxlabel(" ", fontsize=16)
     figure.legend(handles=handles, loc="lower center", ncol=len(handles), fontsize=9, frameon=False)

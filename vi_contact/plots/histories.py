@@ -137,9 +137,8 @@ def require_matplotlib() -> None:
     """
     try:
         import matplotlib  # noqa: F401
-    except (
-        ValueError
-    ) as error:  # of MPLBACKEND, which it checks although nothing here needs a backend
+    except ValueError as error:
+        # of MPLBACKEND, which it checks although nothing here needs a backend
         reason = " ".join(str(error).split())[:120]
         place = (
             "the environment variable MPLBACKEND"
@@ -149,9 +148,8 @@ def require_matplotlib() -> None:
         raise InputError(f"matplotlib cannot be imported ({reason}): correct {place}") from error
 
 
-LEDGER = tuple(
-    (name, *look) for name, look in WORDS["curves"].items()
-)  # column, label, colour, line
+# column, label, colour, line
+LEDGER = tuple((name, *look) for name, look in WORDS["curves"].items())
 
 
 def cell_edges(centres: Array) -> Array:

@@ -87,9 +87,8 @@ def plot_spectra(
     metres, unit = length_unit(
         max(float(np.max(spectrum.displacement)) for spectrum in spectra.values())
     )
-    first = {
-        label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra
-    }  # period that is trusted
+    # period that is trusted
+    first = {label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra}
     for label, spectrum in spectra.items():
         colour = None
         for axis, values in (

@@ -214,9 +214,8 @@ def _accelerations(run: RunFolder) -> Section:
         [],
         {name: charts.smoothed(run, name) for name in names},
     )
-    corner = max(
-        (corner for _, _, corner in found.values()), default=0.0
-    )  # the same for all: they have the run's step
+    # the same for all: they have the run's step
+    corner = max((corner for _, _, corner in found.values()), default=0.0)
     for name, (raw, smooth, _) in found.items():
         low, high = (float(np.max(np.abs(one.acceleration))) for one in (smooth, raw))
         rows.append(

@@ -9,14 +9,8 @@ from ..core.algebra import Array
 from .faces import add_polygons, limit, sheet
 from .histories import plain
 
-LINES = (
-    "tab:green",
-    "tab:blue",
-    "tab:purple",
-    "tab:brown",
-    "tab:olive",
-    "tab:cyan",
-)  # what holds the bodies
+# what holds the bodies
+LINES = ("tab:green", "tab:blue", "tab:purple", "tab:brown", "tab:olive", "tab:cyan")
 MARKS = {  # kind of node of a contact boundary -> how it is marked
     "shared by both sides": ("s", "black"),
     "clamped": ("^", "black"),

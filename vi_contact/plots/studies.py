@@ -46,9 +46,8 @@ def plot_ida(
     axes[0].set_ylabel(f"{intensity} [{unit}]")
     axes[0].set_ylim(bottom=0.0)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.suptitle(
-        " ", fontsize=20
-    )  # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    figure.suptitle(" ", fontsize=20)
     columns = min(len(labels), 3 * len(demands))
     figure.legend(handles, labels, loc="upper center", ncol=columns, fontsize=8, frameon=False)
     return save(figure, path)

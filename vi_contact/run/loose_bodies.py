@@ -85,9 +85,8 @@ def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
             alone = np.zeros_like(translation)
             alone[rows] = translation[rows]
             alone = surface.in_frames(alone)
-            if (
-                surface.coupling is not None
-            ):  # relative to the other side: see SemiDiscreteSystem.in_relative
+            # relative to the other side: see SemiDiscreteSystem.in_relative
+            if surface.coupling is not None:
                 alone = 2.0 * alone - surface.coupling @ alone
             for values in (surface.normal_values(alone), surface.tangential_values(alone)):
                 moved[number] = max(moved[number], np.max(np.abs(values), initial=0.0))

@@ -98,9 +98,8 @@ def checked_method(
         method.solvers[0].check(problem)
         if state is not None:
             check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
-    if (
-        problem.system.floating and state is None
-    ):  # what continues a run was looked at when it began
+    # what continues a run was looked at when it began
+    if problem.system.floating and state is None:
         refuse_loose_bodies(problem)
     return method
 

@@ -256,10 +256,8 @@ class Contact:
         ]
         sums = sums if surface.comm.size == 1 else surface.comm.sum(np.array(sums)).tolist()
         closed, count, resultant, *vectors = sums
-        force, place = (
-            [0.0 - one for one in vectors[:d]],
-            vectors[d:],
-        )  # not -one: no negative zeros
+        # not -one: no negative zeros
+        force, place = ([0.0 - one for one in vectors[:d]], vectors[d:])
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
         depth = max([depth, *(-one.smallest(state.t) for one in surface.watched)])
         values = [

@@ -82,9 +82,8 @@ def body_springs(problem: ContactProblem) -> Matrix:
     bed = total(surface.comm, np.sum(1.0 / surface.compliance[soft])) or np.inf
     softest = min(bed, float(np.min(stiffness, where=stiffness > 0.0, initial=np.inf)))
     wanted = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
-    wanted[stiffness == 0.0] = (
-        STRONG * softest if np.isfinite(softest) else 1.0
-    )  # a mass alone: any strength will do
+    # a mass alone: any strength will do
+    wanted[stiffness == 0.0] = STRONG * softest if np.isfinite(softest) else 1.0
     root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))
     every = np.arange(system.rows)
     springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)

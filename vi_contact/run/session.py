@@ -140,17 +140,15 @@ class Session:
             self._checkpoint(writer)
             self._measure()
             linear = self._seconds_per_linear_step()
-        except (
-            BaseException
-        ) as error:  # whatever ends a run, what it has is saved; the error is raised again
+        except BaseException as error:
+            # whatever ends a run, what it has is saved; the error is raised again
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             reason = str(error) or ENDED.get(type(error), type(error).__name__)
             told = getattr(error, "on_all_ranks", False)
             status = "interrupted" if interrupted else "failed"
             self._rescue(writer, status, reason, time.perf_counter() - begin, all_ranks=told)
-            if isinstance(
-                error, Interrupted
-            ):  # on all ranks: none ends before the first has written
+            # on all ranks: none ends before the first has written
+            if isinstance(error, Interrupted):
                 self._comm.bcast(None)
             raise
         status = "stopped" if self.stopped else "finished"
@@ -255,9 +253,8 @@ class Session:
             )
         row: dict[str, Any] = {}
         nothing: Row = {}
-        with together(
-            self._comm
-        ):  # one of the user's may fail on one rank, or record what does not fit there
+        # one of the user's may fail on one rank, or record what does not fit there
+        with together(self._comm):
             for recorder in self.recorders:
                 name = (
                     f"the recorder {type(recorder).__name__} in step {state.k}, t = "
@@ -288,9 +285,8 @@ class Session:
             self.place.t_start,
             self.place.t_start + self.step_plan.length,
         )
-        with together(
-            self._comm
-        ):  # histories of the user's are asked at other times than those of steps
+        # histories of the user's are asked at other times than those of steps
+        with together(self._comm):
             known = identity(method.problem, method.scheme, method.dt, start=start, end=end)
         return {"run": known, "span": (start, end)}
 
@@ -359,9 +355,8 @@ class Session:
 
         It takes a right-hand side, one back-substitution and an update with the same A.
         """
-        if (
-            self.last is None or not self.last.step.A.factorised
-        ):  # none is made for this: it may not fit
+        # none is made for this: it may not fit
+        if self.last is None or not self.last.step.A.factorised:
             return float("nan")
         problem, scheme, dt, old, A = (
             self.method.problem,
@@ -377,9 +372,8 @@ class Session:
             result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
             scheme.finish(problem, old, step, result, dt)
 
-        return float(
-            np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:])
-        )  # the first is slower
+        # the first is slower
+        return float(np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:]))
 
 
 def _locked(value: T) -> T:

@@ -66,10 +66,8 @@ class Solution:
             raise InputError(
                 "function: the system has no mesh and so no Functions; use history and state"
             )
-        from ..fem.output.functions import (
-            as_function,
-            read_function,
-        )  # late: runs need no finite elements
+        # late: runs need no finite elements
+        from ..fem.output.functions import as_function, read_function
 
         if t is None and frame is None:
             return as_function(self.problem, self.state, name, continuous=continuous)
@@ -94,9 +92,8 @@ class Solution:
 
         It shows probes, contact force, energy ledger and certificates.
         """
-        return import_module("vi_contact.plots").plot_overview(
-            self
-        )  # by name: on a floor above, and no run needs it
+        # by name: on a floor above, and no run needs it
+        return import_module("vi_contact.plots").plot_overview(self)
 
     def _repr_html_(self) -> str:
         """Return summary and figure for a notebook, without reference to anything outside."""

@@ -131,9 +131,8 @@ class Equilibria:
         It slides from where ``old`` was.
         """
         problem = self._problem
-        with together(
-            problem.surface.comm
-        ):  # loads, motions and laws of the user's may fail on one rank
+        # loads, motions and laws of the user's may fail on one rank
+        with together(problem.surface.comm):
             problem.surface.refuse_driven(t)
             step = StepProblem(
                 A=self._K,

@@ -163,9 +163,8 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
         t, left = t + done * size, 0 if last else left - done
         if left == 0:
             return StepPlan(tuple(parts), halvings)
-        t = (
-            until if abs(t - until) <= SLACK * size else t
-        )  # the next piece begins where the plan says
+        # the next piece begins where the plan says
+        t = until if abs(t - until) <= SLACK * size else t
     rest = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
     raise InputError(
         f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {rest}: end it at "

@@ -21,10 +21,8 @@ _FORMS = (
     "minutes, minutes:seconds, hours:minutes:seconds, days-hours, days-hours:minutes or "
     "days-hours:minutes:seconds"
 )
-_UNITS = {
-    "": ((60,), (60, 1), (3600, 60, 1)),
-    "-": ((3600,), (3600, 60), (3600, 60, 1)),
-}  # without and with days [s]
+# without and with days [s]
+_UNITS = {"": ((60,), (60, 1), (3600, 60, 1)), "-": ((3600,), (3600, 60), (3600, 60, 1))}
 _IMPORTED = time.monotonic()
 
 

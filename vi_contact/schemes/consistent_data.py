@@ -66,9 +66,8 @@ def _with_contact(
     surface, rigid = problem.surface, problem.surface.rigid
     compression = surface.normal_values(state.u) - surface.gap(state.t)
     pressed = np.divide(compression, surface.compliance, out=np.zeros(surface.count), where=~rigid)
-    pressed = np.where(
-        surface.bilateral, pressed, np.maximum(pressed, 0.0)
-    )  # only bilateral springs pull
+    # only bilateral springs pull
+    pressed = np.where(surface.bilateral, pressed, np.maximum(pressed, 0.0))
     springs = surface.reaction_load(pressed, len(force))
     u_max, v_max = ROUND_OFF * surface.comm.max(np.array([max_abs(state.u), max_abs(state.v)]))
     still = (compression >= -u_max) & (np.abs(surface.normal_values(state.v)) <= v_max)
@@ -134,9 +133,8 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
         "massless block",
         lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra),
     )
-    place = np.where(
-        layer, np.cumsum(layer) - 1, -1
-    )  # among the massless unknowns, as all normal ones are
+    # among the massless unknowns, as all normal ones are
+    place = np.where(layer, np.cumsum(layer) - 1, -1)
     surface = problem.surface
     tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
     surface = replace(

@@ -145,9 +145,8 @@ class MoreauJean(SingleStep):
             state.u + 0.5 * dt * state.v
         )
         size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
-        closed = np.asarray(
-            (middle <= ROUND_OFF * size) | surface.bilateral
-        )  # if nothing stops them; and held points
+        # if nothing stops them; and held points
+        closed = np.asarray((middle <= ROUND_OFF * size) | surface.bilateral)
         sliding = surface.sliding(state.t, state.t + dt)
         slip = (
             np.zeros((surface.count, surface.tangents.shape[1]))

@@ -62,9 +62,8 @@ class CompanionRun:
                 f"run has {dt!r}: give dt as a number or a Schedule"
             )
         self._bound = scheme, dt
-        if isinstance(
-            dt, Schedule
-        ):  # the last piece does not end: only the times of a run are asked for
+        # the last piece does not end: only the times of a run are asked for
+        if isinstance(dt, Schedule):
             dt = Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf)))
         self._steps: Iterator[tuple[State, Any]] = march(
             self._problem, scheme=scheme, dt=dt, steps=LARGEST

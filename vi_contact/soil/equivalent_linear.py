@@ -31,9 +31,8 @@ from .soil_column import SoilColumn
 
 T = TypeVar("T")
 ROCK_DAMPING = 0.01
-Layer = tuple[
-    float, LinearElastic, SoilCurves
-]  # its thickness [m], its material at small strains, its curves
+# its thickness [m], its material at small strains, its curves
+Layer = tuple[float, LinearElastic, SoilCurves]
 
 
 @dataclass(frozen=True)
@@ -131,9 +130,8 @@ def equivalent_linear(
     number(owner, "ratio", ratio, positive=True)
     n = next_fast_len(2 * record.acceleration.size)
     w = 2.0 * np.pi * np.fft.rfftfreq(n, record.dt)
-    slope = (
-        np.ones_like(w) if frequency is None else w / (2.0 * np.pi * frequency)
-    )  # of xi over the frequency
+    # of xi over the frequency
+    slope = np.ones_like(w) if frequency is None else w / (2.0 * np.pi * frequency)
     motion = np.fft.rfft(record.acceleration, n)
     below = (
         None

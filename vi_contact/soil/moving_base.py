@@ -90,9 +90,8 @@ class BaseMotion(GroundFrame):
         Between two deformable bodies nothing changes: both are moved by the ground.
         """
         rigid = np.array([surface.in_frames(r) for r in system.influence.T])
-        if (
-            surface.coupling is not None
-        ):  # relative to the other side: see SemiDiscreteSystem.in_relative
+        # relative to the other side: see SemiDiscreteSystem.in_relative
+        if surface.coupling is not None:
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
         normal = np.array([surface.normal_values(r) for r in rigid])
         tangential = np.array([surface.tangential_values(r) for r in rigid])

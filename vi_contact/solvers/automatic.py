@@ -27,11 +27,8 @@ log = logging.getLogger(__name__)
 # unknowns in three dimensions from which on a few hundred steps are faster without a factor
 IN_SPACE = 20_000
 ALONE_IN_SPACE = 50_000  # the same on one rank, where CHOLMOD factorises
-DENSE = {
-    3: 4_000,
-    2: 5_000,
-    1: 5_000,
-}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
+# rows of the small problem, by dimension: 5000 take 200 MB on every rank
+DENSE = {3: 4_000, 2: 5_000, 1: 5_000}
 TOLERANCE = (
     1e-12  # of conjugate gradients beside the steps: what starts a run should not be seen in it
 )

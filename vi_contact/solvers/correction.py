@@ -31,9 +31,8 @@ from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 
-MARGIN = (
-    2.0**10
-)  # share over residual: reactions may be that much more wrong than the residual tells
+# share over residual: reactions may be that much more wrong than the residual tells
+MARGIN = 2.0**10
 LEAST = 2.0**-30
 ROUNDS = 3
 

@@ -33,9 +33,8 @@ def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
     system whose histories may be named. Collective.
     """
     bound, slip0 = step.bound, step.slip0
-    fine = isfinite(
-        step.b.dot(step.guess)
-    )  # the quickest look there is; an overflow is looked into
+    # the quickest look there is; an overflow is looked into
+    fine = isfinite(step.b.dot(step.guess))
     gaps = bound.dot(bound)  # infinite gaps are gaps that never close
     fine = fine and gaps == gaps and (slip0 is None or isfinite(np.vdot(slip0, slip0)))
     if largest(step.surface.comm, not fine):

@@ -22,11 +22,8 @@ from .cases.toml_file import toml_value, with_settings
 
 FOLDER = "refined"  # in the run folder
 NAMES = {"h": "h/2", "dt": "dt/2"}
-UNSIZED = (
-    "certificate",
-    "energy_defect",
-    "contact_active",
-)  # columns without a size that mesh and step should leave
+# columns without a size that mesh and step should leave
+UNSIZED = ("certificate", "energy_defect", "contact_active")
 NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not compared
 
 

@@ -62,9 +62,8 @@ def report(
     )
     if pages[0].suffix.lower() not in WRITERS:
         raise InputError(f"'{pages[0]}' is not an .html or .pdf file: give such a name")
-    if (
-        pages[0].suffix.lower() == ".html" and not can_write()
-    ):  # before a picture is drawn over another one
+    # before a picture is drawn over another one
+    if pages[0].suffix.lower() == ".html" and not can_write():
         raise InputError(MISSING)
     model, sketched = _model(folder, pages[0].with_name("model.png"))
     sections, drawn = (
@@ -97,13 +96,8 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
         raise
     except OSError as error:
         raise ViContactError(sentence(error)) from error
-    except (
-        KeyError,
-        TypeError,
-        ValueError,
-        IndexError,
-        AttributeError,
-    ) as error:  # of what the file says
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        # of what the file says
         reason = " ".join(str(error).split())[:200]
         raise InputError(
             f"'{folder / MODEL}' is damaged ({reason}): restore it, or delete it"

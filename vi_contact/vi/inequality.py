@@ -219,9 +219,8 @@ def curves_down(found: Found, layers: OptionLayers) -> bool:
     if best.broken or problem.constant:
         return False
     problem.put(best.x, best.left)
-    point = Judged(
-        problem, best.lower, best.upper, best.left
-    )  # its Jacobian, which later points have replaced
+    # its Jacobian, which later points have replaced
+    point = Judged(problem, best.lower, best.upper, best.left)
     if not is_symmetric(point.A, problem.comm):
         return False
     model = Model(point, layers)

@@ -107,9 +107,8 @@ class Model:
         energy = abs(self.problem.energy())
         curvature = -self.problem.dot(direction, self.J @ direction)
         length = np.sqrt(2.0 * PART * energy / curvature) * self.length(direction)
-        if (
-            length == 0.0
-        ):  # an energy of zero tells nothing: the size of the field, or of one where there is none
+        # an energy of zero tells nothing: the size of the field, or of one where there is none
+        if length == 0.0:
             length = self.length(np.full_like(self.x, self.problem.size or 1.0))
         s = direction * (share * length / self.length(direction))
         sides = [self._projected(one) for one in (s, -s)]

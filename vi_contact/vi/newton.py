@@ -29,9 +29,8 @@ ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
 HALVINGS = 24  # of a step that brings too little
 SMALL_CHANGE = 2.0  # times the natural residual of the linear step that carries the change
 STEPS_OF_A_PART = 20  # at most
-SMALLEST_PART = (
-    1.0 / 8.0
-)  # of the change that Dirichlet conditions bring, when it is taken in parts
+# of the change that Dirichlet conditions bring, when it is taken in parts
+SMALLEST_PART = 1.0 / 8.0
 REFINEMENTS = 5  # of a linear problem, at most
 
 NOT_A_NUMBER = "F or its Jacobian is not a number there: check the form and the first guess"

@@ -16,9 +16,8 @@ from ...core.checks import between, check_word, number
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
-Numbers = tuple[
-    float, float, str, Inputs
-]  # expected, found, why it does not apply, inputs taken from the run
+# expected, found, why it does not apply, inputs taken from the run
+Numbers = tuple[float, float, str, Inputs]
 _SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(
     files(__package__).joinpath("checks.toml").read_text("utf-8")
 )

@@ -37,10 +37,8 @@ def smooth_wall(nu: float, length: float, terms: int = 2000) -> tuple[float, flo
     """
     n = 2.0 * np.arange(1, terms + 1) - 1.0
     k = n * math.pi / length
-    sinh, cosh = (
-        np.sinh(np.minimum(k, 300.0)),
-        np.cosh(np.minimum(k, 300.0)),
-    )  # whose ratios change no more
+    # whose ratios change no more
+    sinh, cosh = (np.sinh(np.minimum(k, 300.0)), np.cosh(np.minimum(k, 300.0)))
     scale = -4.0 / (n * math.pi * k) / ((3.0 - 4.0 * nu) * cosh**2 + k**2 + (1.0 - 2.0 * nu) ** 2)
     shear = scale * ((1.0 - 2.0 * nu) * (2.0 * sinh * (cosh - nu) + 2.0 * k) + 2.0 * nu * k * cosh)
     vertical = scale * (k**2 + sinh**2 - 2.0 * nu * k * sinh - 4.0 * nu * (1.0 - nu) * (cosh - 1.0))
@@ -159,9 +157,8 @@ class VeletsosYounan(_Layer):
         """Return the largest Q [N/m], its height [m], and why there is none."""
         steps, lowest = len(t) - 1, 0.5 * math.pi * self.c_s / self.height
         dt = float(t[-1] - t[0]) / steps
-        count = 2 * steps + math.ceil(
-            min(8.0 / (self.damping * lowest * dt), 100.0 * steps)
-        )  # until all has died out
+        # until all has died out
+        count = 2 * steps + math.ceil(min(8.0 / (self.damping * lowest * dt), 100.0 * steps))
         motion = np.fft.rfft(np.interp(t[0] + dt * np.arange(steps + 1), t, push), count)
         w, thrust, moment = (
             2.0 * math.pi * np.fft.rfftfreq(count, dt) / lowest,

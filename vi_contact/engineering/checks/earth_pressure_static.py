@@ -79,9 +79,8 @@ class EarthPressure(Check):
         """
         factor, why = self.coefficient()
         slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
-        laden = (
-            math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
-        )  # the ground of a wedge, by its size
+        # the ground of a wedge, by its size
+        laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
         own, extra = (
             0.5 * self.rho * self.gravity * self.height**2,
             laden * self.surcharge * self.height,
@@ -130,9 +129,8 @@ class Rankine(EarthPressure):
 
     def coefficient(self) -> tuple[float, str]:
         """Return K, and why there is none."""
-        along = (
-            -self.slope if self.passive else self.slope
-        )  # the soil slides up: the same lines, friction turned round
+        # the soil slides up: the same lines, friction turned round
+        along = -self.slope if self.passive else self.slope
         found = wedge(self.phi, along, self.slope, 0.0, passive=self.passive) * math.cos(self.slope)
         return found, "the ground is steeper than the friction angle" if abs(
             self.slope

@@ -9,10 +9,8 @@ import numpy as np
 
 from .comparison import Check, History, Numbers
 
-LARGEST, SHALLOWEST = (
-    10.0,
-    1.5,
-)  # ends of Wang's curves: F, and depth of the centre over the height of the box
+# ends of Wang's curves: F, and depth of the centre over the height of the box
+LARGEST, SHALLOWEST = (10.0, 1.5)
 
 
 def flexibility(

@@ -116,9 +116,8 @@ class Housner(Check):
         alpha, angles, rate = math.atan(self.width / self.height), np.full(len(t), theta), 0.0
         inertia, kept = 1.5 / math.hypot(self.width, self.height), 1.0 - 1.5 * math.sin(alpha) ** 2
         for row, length in enumerate(np.diff(t)):
-            parts = min(
-                math.ceil(length * math.sqrt(inertia * self.gravity) / FINE), 400
-            )  # of sizes none has, fewer
+            # of sizes none has, fewer
+            parts = min(math.ceil(length * math.sqrt(inertia * self.gravity) / FINE), 400)
             share = (np.arange(parts) + 0.5) / parts
             for push, pull in (
                 ground[:, row, None] + np.diff(ground[:, row : row + 2]) * share

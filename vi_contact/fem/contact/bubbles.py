@@ -35,9 +35,8 @@ from .frames import Facing
 from .nodes import Nodes, Rows
 
 POINTS = 5  # of a rule in every direction: exact for degree 8 on flat facets
-OTHERS = np.array(
-    [[1, 2], [0, 2], [0, 1]]
-)  # vertices of the edge opposite each vertex, in DOLFINx's order of edges
+# vertices of the edge opposite each vertex, in DOLFINx's order of edges
+OTHERS = np.array([[1, 2], [0, 2], [0, 1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +81,8 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
     nodes, normals = space.node_of_block[rows], outward(mesh, local, geometry)
     found = Bubbles(nodes[:, :3], nodes[:, 3:], unknowns[:, 3:], normals, *_integrals(points[rows]))
-    corners = np.hstack(
-        [found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)]
-    )  # tied ones count there
+    # tied ones count there
+    corners = np.hstack([found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)])
     away = everywhere | ~np.isin(corners, space.nodes).all(axis=1)
     parts = from_each(space.comm, found.pick(away))
     if not everywhere:
@@ -104,15 +102,13 @@ def _integrals(x: Array) -> tuple[Array, Array]:
     """
     place, weight = np.polynomial.legendre.leggauss(POINTS)
     s, t = (one.ravel() for one in np.meshgrid(0.5 + 0.5 * place, 0.5 + 0.5 * place, indexing="ij"))
-    weights = (
-        0.25 * np.outer(weight, weight).ravel() * (1.0 - s)
-    )  # of a triangle: its point (s, (1 - s) t)
+    # of a triangle: its point (s, (1 - s) t)
+    weights = 0.25 * np.outer(weight, weight).ravel() * (1.0 - s)
     hats = np.stack([1.0 - s - (1.0 - s) * t, s, (1.0 - s) * t])
     slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     bubbles = 4.0 * hats[OTHERS].prod(axis=1)
-    bent = np.einsum(
-        "kaq,kag->kgq", 4.0 * hats[OTHERS], slopes[OTHERS[:, ::-1]]
-    )  # slopes of bubbles
+    # slopes of bubbles
+    bent = np.einsum("kaq,kag->kgq", 4.0 * hats[OTHERS], slopes[OTHERS[:, ::-1]])
     straight = x[:, :3]
     e = x[:, 3:] - straight[:, OTHERS].mean(axis=2)
     along = np.einsum("fix,ig->fxg", straight, slopes)[..., None] + np.einsum(

@@ -227,9 +227,8 @@ def _carry(
         for k, share in zip(by, shares[i], strict=True) if carried[node] else ((node, 1.0),):
             place = float(part.places(points[k]))
             D[k] += share * weight
-            psi = (
-                share * weight * _hats(place) @ inverse
-            )  # of the functions of the segment, which span (1, x)
+            # of the functions of the segment, which span (1, x)
+            psi = share * weight * _hats(place) @ inverse
             for segment, values in part.mixed.items():
                 M[k, facets2[segment]] = M[k, facets2[segment]].toarray().ravel() + psi @ values
 

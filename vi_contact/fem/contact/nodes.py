@@ -88,8 +88,7 @@ def asked(
     parts = from_each(comm, (slots, *values))
     order = np.argsort(np.concatenate([part[0] for part in parts]))
     rows = [np.concatenate([part[i] for part in parts])[order] for i in range(1, 1 + len(values))]
-    with together(
-        comm
-    ):  # a function that depends on the rank may fail on one, and not on the others
+    # a function that depends on the rank may fail on one, and not on the others
+    with together(comm):
         whole = ask(*rows)
     return tuple(one[slots] for one in whole)

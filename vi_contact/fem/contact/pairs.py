@@ -139,9 +139,8 @@ def contact_pair(
     uncovered = np.isin(nodes.numbers, little)
     census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
-    slots = np.flatnonzero(
-        space.blocks_of(nodes.numbers) >= 0
-    )  # from here on every rank has its own nodes of side 1
+    # from here on every rank has its own nodes of side 1
+    slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
     bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])

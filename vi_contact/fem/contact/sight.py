@@ -289,9 +289,8 @@ def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
     piece, other = piece[hides], other[hides]
     turn = np.arange(len(piece)) - np.searchsorted(piece, piece)
     owner, left = np.arange(len(ours.look)), ours.polygons
-    for k in range(
-        int(turn.max(initial=-1)) + 1
-    ):  # what is left of each, without the next that hides it
+    # what is left of each, without the next that hides it
+    for k in range(int(turn.max(initial=-1)) + 1):
         hider = np.full(len(ours.look), -1)
         hider[piece[turn == k]] = other[turn == k]
         cut_now = hider[owner] >= 0

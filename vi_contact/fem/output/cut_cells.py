@@ -58,9 +58,8 @@ def work_beyond(
             -(r @ (outward / np.linalg.norm(outward, axis=2, keepdims=True)).swapaxes(1, 2))
             * np.eye(d)[0]
         )
-    n = corners.shape[
-        1
-    ]  # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
+    # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
+    n = corners.shape[1]
     size = np.sqrt(np.abs(np.linalg.det(edges @ edges.swapaxes(1, 2)))) / factorial(n + 1)
     size = size * np.broadcast_to(density, len(crossed))[cells[owner]]
     shares = np.einsum("p,pnv,jpmd,nm->pvjd", size, corners, r, 1.0 + np.eye(n), optimize=True)
@@ -110,12 +109,10 @@ def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
     """
     owner = np.repeat(np.arange(len(level)), len(whole))
     corners = np.tile(whole, (len(level), 1, 1))
-    corners = np.concatenate(
-        [corners, corners @ level[owner][:, :, None]], axis=2
-    )  # their level as last share
-    for _ in range(
-        whole.shape[1] - 1
-    ):  # a cut edge leaves one corner less on the wrong side in both halves
+    # their level as last share
+    corners = np.concatenate([corners, corners @ level[owner][:, :, None]], axis=2)
+    # a cut edge leaves one corner less on the wrong side in both halves
+    for _ in range(whole.shape[1] - 1):
         low, high = corners[:, :, -1].argmin(axis=1), corners[:, :, -1].argmax(axis=1)
         every = np.arange(len(owner))
         below, above = corners[every, low], corners[every, high]

@@ -32,9 +32,8 @@ from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
 
-Beyond = Callable[
-    [Array | float, Any], Array
-]  # (density, its load or None) -> (motions, owned components)
+# (density, its load or None) -> (motions, owned components)
+Beyond = Callable[[Array | float, Any], Array]
 # (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of
 # local cells of the group, ghosts too, None for all; what is taken away of inertia, its damping and
 # loads, or None)
@@ -65,9 +64,8 @@ class NodalWork:
         space = space_of("NodalWork", problem.system)
         known_matrices("reactions and section forces", problem.system, "MCK")
         self._problem, self.space = problem, space
-        self._loads: Any = [
-            one for one in as_tuple(loads) if not isinstance(one, InitialStrain)
-        ]  # known to the body
+        # known to the body
+        self._loads: Any = [one for one in as_tuple(loads) if not isinstance(one, InitialStrain)]
         for facets in (getattr(load, "facets", None) for load in self._loads):
             if facets is not None:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
@@ -155,9 +153,8 @@ class NodalWork:
             if (made := getattr(self._problem.surface, "parts", ()))
             else []
         )
-        self._direct: list[
-            tuple[Array, Array]
-        ] = []  # how far each motion of held nodes moves obstacles
+        # how far each motion of held nodes moves obstacles
+        self._direct: list[tuple[Array, Array]] = []
         for where, centre, cells, beyond in parts:
             self._inside.x.array[:] = 1.0 if cells is None else cells
             less = [beyond and beyond(*density) for density in densities]  # type: ignore[misc]

@@ -29,9 +29,8 @@ from .nodal_work import Loads, NodalWork, Rigid, check_actions, rigid_motions
 # 90°
 ON_LINE = 1e-6
 UNCOVERED = 1e-3  # of the length of a cut in the plane: what the elements on it may miss
-_QUANTITIES = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)  # unit, meaning
+# unit, meaning
+_QUANTITIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 @dataclass
@@ -179,9 +178,8 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
             f"rectangle in space; this mesh has {space.dimension} dimensions"
         )
     axes, size = axes_of(name, corners)
-    tol = ON_LINE * min(
-        float(size.max()), space.size
-    )  # a rectangle may be much larger than the body
+    # a rectangle may be much larger than the body
+    tol = ON_LINE * min(float(size.max()), space.size)
 
     def level(x: Array) -> Array:
         away = (x - corners[0]) @ axes[0]

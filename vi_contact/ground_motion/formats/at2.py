@@ -67,9 +67,8 @@ def read(text: TextFile) -> Record:
     """
     npts, stated_dt, start = _header(text)
     told = [index for index in range(start) if text.heads[index].strip()]
-    told = [
-        index for index in told if not (text.heads[0].startswith(OURS) and index == 1)
-    ]  # the title of another file
+    # the title of another file
+    told = [index for index in told if not (text.heads[0].startswith(OURS) and index == 1)]
     header = [
         " ".join(text.heads[index].split()) for index in range(start) if text.heads[index].strip()
     ]

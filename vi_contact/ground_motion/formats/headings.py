@@ -79,15 +79,13 @@ def column_heading(text: TextFile, header: Sequence[int], width: int) -> list[Co
             for name, cell in zip(names, found, strict=True)
         ]
     columns = [_column(cell, lines[-1]) for cell in found]
-    if any(
-        one.name == "t" for one in columns
-    ):  # beside "t" small letters are quantities, and "V" is vertical
+    # beside "t" small letters are quantities, and "V" is vertical
+    if any(one.name == "t" for one in columns):
         letters = {"v": "velocity", "d": "displacement"}
         columns = [replace(one, kind=one.kind or letters.get(one.name, "")) for one in columns]
     known = [bool(one.kind) or _COMPONENT.match(one.name) is not None for one in columns]
-    sentence = (
-        len(text.heads[lines[-1]].strip(_MARKS).split()) == width
-    )  # a word for each column: may be a title
+    # a word for each column: may be a title
+    sentence = len(text.heads[lines[-1]].strip(_MARKS).split()) == width
     return columns if all(known) or any(known) and not sentence else None
 
 
@@ -119,9 +117,8 @@ def _column(cell: str, line: int) -> Column:
     if by_name == "time" and by_unit not in ("time", ""):
         by_name = ""
     if by_name == "acceleration" and unit:
-        return Column(
-            name.strip(), "acceleration", unit, line
-        )  # a unit of something else is refused with its place
+        # a unit of something else is refused with its place
+        return Column(name.strip(), "acceleration", unit, line)
     return Column(name.strip(), by_unit or by_name, unit or None, line)
 
 

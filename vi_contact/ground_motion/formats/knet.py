@@ -15,6 +15,7 @@ from ...core.errors import InputError
 from ..record import Record, canonical_units
 from .text import NUMBER, TextFile
 
+# header entries used here; the last one ends the header
 KEYS = (
     "Origin Time",
     "Station Code",
@@ -25,7 +26,7 @@ KEYS = (
     "Scale Factor",
     "Max. Acc. (gal)",
     "Memo.",
-)  # header entries used here; the last one ends the header
+)
 
 _SCALE = re.compile(rf"({NUMBER})\s*+\(([^()]*+)\)\s*+/\s*+({NUMBER})\s*+$")
 _FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)

@@ -19,22 +19,12 @@ from . import afad, at2, columns, cosmos, cwa, esm, geonet, knet, smc, unam, vol
 from .text import load_text
 from .unread import refuse_unread
 
-SEVERAL = (
-    geonet,
-    volume1,
-    cosmos,
-    afad,
-    unam,
-    cwa,
-)  # formats whose files may hold several components
-DOUBTED = (
-    1e-3 * STANDARD_GRAVITY,
-    3.0 * STANDARD_GRAVITY,
-)  # a peak outside of these is rare in a record that is used
-STEPS = (
-    1e-6,
-    100.0,
-)  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
+# formats whose files may hold several components
+SEVERAL = (geonet, volume1, cosmos, afad, unam, cwa)
+# a peak outside of these is rare in a record that is used
+DOUBTED = (1e-3 * STANDARD_GRAVITY, 3.0 * STANDARD_GRAVITY)
+# shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
+STEPS = (1e-6, 100.0)
 
 
 @checked

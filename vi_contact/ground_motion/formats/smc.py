@@ -16,13 +16,8 @@ from .text import TextFile
 
 TEXT_LINES, INTEGER_LINES, REAL_LINES = 11, 6, 10
 INTEGER_WIDTH, REAL_WIDTH, SAMPLE_WIDTH = 10, 15, 10
-VERTICAL, AZIMUTH, COMMENTS, SAMPLES, PROBLEM = (
-    12,
-    13,
-    15,
-    16,
-    17,
-)  # places among the 48 integers, from 0
+# places among the 48 integers, from 0
+VERTICAL, AZIMUTH, COMMENTS, SAMPLES, PROBLEM = (12, 13, 15, 16, 17)
 SAMPLING_RATE = 1  # place among the 50 reals
 UNDEFINED = 1e38  # any real at least this large is the mark of an undefined value
 

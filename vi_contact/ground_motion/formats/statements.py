@@ -73,9 +73,8 @@ _NO_MOTION = re.compile(
 )
 _SERIES = re.compile(r"\b(?:histor(?:y|ies)|series|units?|data|record|trace|time)\b", re.IGNORECASE)
 
-_BEFORE_G = re.compile(
-    r"(?:\b(?:of|in|are|is|and)|[:=(\[,])\s*+$", re.IGNORECASE
-)  # a lone "g" is a unit only behind these
+# a lone "g" is a unit only behind these
+_BEFORE_G = re.compile(r"(?:\b(?:of|in|are|is|and)|[:=(\[,])\s*+$", re.IGNORECASE)
 
 Found = tuple[int, float]  # index of a line, and what it says
 TIME_UNITS = {

@@ -297,9 +297,8 @@ class TextFile:
         ):
             written = word.replace(",", ".") if decimal_commas else word
             parts = _NUMBER.findall(written)
-            whole_after_decimal = (
-                len({"." in part for part in parts}) > 1
-            )  # "1.234-105": the exponent lost its letter
+            # "1.234-105": the exponent lost its letter
+            whole_after_decimal = len({"." in part for part in parts}) > 1
             if (
                 "".join(parts) != written
                 or whole_after_decimal

@@ -99,6 +99,7 @@ def write_checkpoint(
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
+    # json keeps floats to the last bit
     about = json.dumps(
         {
             "format": FORMAT,
@@ -112,7 +113,7 @@ def write_checkpoint(
             "base": place.base,
             "halved": place.halved,
         }
-    )  # json keeps floats to the last bit
+    )
 
     def write() -> None:
         parts = gathered or []
@@ -174,9 +175,8 @@ def read_checkpoint(
     about = comm.bcast(whole and whole[0])
     other = _compare(file, problem, scheme, dt, about, changed)
     arrays: Arrays = {"r_t": None} | _own(problem, about["vectors"], whole and whole[1])
-    known = (
-        {} if other else arrays
-    )  # what a scheme keeps in mind was made of the old problem's matrices and loads
+    # what a scheme keeps in mind was made of the old problem's matrices and loads
+    known = {} if other else arrays
     memory = {
         name.removeprefix(MEMORY): array for name, array in known.items() if name.startswith(MEMORY)
     }

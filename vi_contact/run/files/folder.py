@@ -68,6 +68,7 @@ MESH = "mesh.h5"
 STAGES = "stages"  # the folder of the runs of stages before the last one
 MODEL = "model.json"
 SUMMARY = "summary.json"
+# of a run
 FILES = (
     ABOUT,
     CHECKPOINT,
@@ -79,14 +80,9 @@ FILES = (
     LOG,
     MODEL,
     SUMMARY,
-)  # of a run
-_OF_CASES = (
-    COPY,
-    FOLLOWS,
-    "strain_compatible.json",
-    "row.json",
-    "failure.txt",
-)  # beside them, by cases and studies
+)
+# beside them, by cases and studies
+_OF_CASES = (COPY, FOLLOWS, "strain_compatible.json", "row.json", "failure.txt")
 _OF_REPORTS = (
     "report.pdf",
     "report.html",
@@ -227,12 +223,8 @@ def check_folder_format(folder: Path) -> None:
         found = json.loads(read_text(folder / ABOUT))["format"]
     except OSError as error:
         raise InputError(sentence(error)) from error
-    except (
-        ValueError,
-        TypeError,
-        KeyError,
-        RecursionError,
-    ) as error:  # of json, and of what it has read
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        # of json, and of what it has read
         raise InputError(
             f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it"
         ) from error
@@ -346,9 +338,8 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
     try:
         yield
     finally:
-        if (
-            mine is not None and folder is not None
-        ):  # removed while locked: who opens it meanwhile makes a new one
+        # removed while locked: who opens it meanwhile makes a new one
+        if mine is not None and folder is not None:
             _held.pop(folder.resolve() / name, None)
             remove(folder / name)
             mine.close()

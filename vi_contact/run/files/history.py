@@ -38,17 +38,10 @@ from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
 from .table import Block, Table
 
-GEOMETRY = {
-    "points": "m",
-    "normals": "-",
-    "weights": "m²",
-    "gap0": "m",
-    "bilateral": "-",
-}  # of contact points, units
-PUSH, SAVE = (
-    1.0,
-    10.0,
-)  # seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
+# of contact points, units
+GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}
+# seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
+PUSH, SAVE = (1.0, 10.0)
 # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 GROWTH = 1.25
 

@@ -203,9 +203,8 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
         [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
     )
     found, d = _columns(surface, arrays), surface.points.shape[1]
-    round_off = ROUND_OFF * max(
-        size for _, size in found[: 3 * d]
-    )  # of points, which gaps are differences of
+    # of points, which gaps are differences of
+    round_off = ROUND_OFF * max(size for _, size in found[: 3 * d])
     gaps = {2 * d + 1, *range(2 * d + 4, len(arrays))}
     return [
         (value, max(size, round_off) if i // 3 in gaps else size)

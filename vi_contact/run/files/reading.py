@@ -109,14 +109,8 @@ def _of(path: Path, read: Callable[[Path], T]) -> T:
         return read(path)
     except InputError:
         raise
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        RuntimeError,
-        AttributeError,
-    ) as error:  # of json and h5py
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
+        # of json and h5py
         if of_machine(error):
             raise
         raise InputError(

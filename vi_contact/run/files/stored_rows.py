@@ -194,14 +194,8 @@ class StoredArrays:
             return n if fit and np.array_equal(held[first : first + n], steps[:n]) else 0
         except InputError:
             raise
-        except (
-            TypeError,
-            KeyError,
-            AttributeError,
-            ValueError,
-            OSError,
-            RuntimeError,
-        ) as error:  # h5py's, of damage
+        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError) as error:
+            # h5py's, of damage
             if of_machine(error):
                 raise
             return 0
@@ -212,12 +206,8 @@ class StoredArrays:
                 name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
                 for name, one in self._samples.items()
             }
-        except (
-            TypeError,
-            ValueError,
-            OSError,
-            RuntimeError,
-        ) as error:  # h5py's, of a file that is damaged
+        except (TypeError, ValueError, OSError, RuntimeError) as error:
+            # h5py's, of a file that is damaged
             if of_machine(error):
                 raise
             raise InputError(

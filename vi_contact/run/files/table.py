@@ -23,14 +23,12 @@ BYTES = 16 * 2**20
 KEPT = 64 * 2**20  # bytes of histories that stay in memory of a run with a folder, on each rank
 SHARED = 10_000  # rows of an array (contact points) up to which every rank gets it at the end
 
-WORDS = tomllib.loads(
-    Path(__file__).with_name("ledger.toml").read_text(encoding="utf-8")
-)  # of the energy ledger
+# of the energy ledger
+WORDS = tomllib.loads(Path(__file__).with_name("ledger.toml").read_text(encoding="utf-8"))
 LEDGER = tuple(WORDS["titles"].items())
 
-Block = dict[
-    str, Array
-]  # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
+# column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
+Block = dict[str, Array]
 
 
 class Table:
@@ -161,9 +159,8 @@ class Table:
             if name in kept and self.arrays[name].shape[:1] <= (SHARED,)
         ]
         pieces = self._comm.bcast({name: 1 + kept[name].nbytes // BYTES for name in shared})
-        for name, count in (
-            pieces.items() if self._comm.size > 1 else ()
-        ):  # messages of MPI hold 2 GB at most
+        # messages of MPI hold 2 GB at most
+        for name, count in pieces.items() if self._comm.size > 1 else ():
             parts: list[Any] = (
                 [None] * count if self._comm.rank else np.array_split(kept[name], count)
             )

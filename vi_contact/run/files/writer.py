@@ -184,9 +184,8 @@ class Writer:
 
         It is not collective, as others might not come; no error hides the first.
         """
-        with suppress(
-            Exception
-        ):  # of any kind: the first error is told, and this one comes of it or after it
+        # of any kind: the first error is told, and this one comes of it or after it
+        with suppress(Exception):
             self._close(facts)
 
     def _close(self, facts: Mapping[str, Any]) -> None:

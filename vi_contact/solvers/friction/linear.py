@@ -184,9 +184,8 @@ class Factored:
         if self._H is None:
             return np.asarray(lapack.dgetrs(*self._lu, right)[0]) if self.reduced.size else right
         r = self._whole(self._H, right)
-        r += self._whole(
-            self._H, right - self._delassus.product(r)[self.reduced.plain]
-        )  # H is less exact than factors
+        # H is less exact than factors
+        r += self._whole(self._H, right - self._delassus.product(r)[self.reduced.plain])
         return np.asarray(r[self.reduced.plain])
 
     def _whole(self, H: Array, v: Array) -> Array:

@@ -66,9 +66,8 @@ class FrictionNewton(Settings):
         Answers depend on their right-hand side alone, not on steps before.
         """
         delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
-        compiled = (
-            library(SerialComm()) if delassus.symmetric else None
-        )  # its sweeps read half of G
+        # its sweeps read half of G
+        compiled = library(SerialComm()) if delassus.symmetric else None
         if compiled and delassus.count:
             delassus.short  # noqa: B018  a part of set-up
         return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, compiled, {}))
@@ -88,9 +87,8 @@ class FrictionNewton(Settings):
             sweep, r, w = sweeper(step), step.admissible(r), None
             for _ in range(FIRST_SWEEPS * 2**attempt):
                 r, swept = sweep(r), swept + 1
-                if (
-                    not step.delassus.symmetric and not step.rounding(r) <= step.unit
-                ):  # they lead nowhere
+                # they lead nowhere
+                if not step.delassus.symmetric and not step.rounding(r) <= step.unit:
                     r = np.zeros_like(r)
                     break
         return r, len(history) + swept, history

@@ -24,14 +24,10 @@ from .preconditioners import Masked
 
 Watch = Callable[[int, Array, Callable[[], Array]], int]
 SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
-STAGNATED, NOT_A_NUMBER, INDEFINITE = (
-    -3,
-    -9,
-    -10,
-)  # too many iterations; not a number; indefinite matrix
-SAID = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)  # what happened, what helps
+# too many iterations; not a number; indefinite matrix
+STAGNATED, NOT_A_NUMBER, INDEFINITE = (-3, -9, -10)
+# what happened, what helps
+SAID = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 SHOWN = 6  # residuals
 
 

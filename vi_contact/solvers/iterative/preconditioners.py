@@ -230,9 +230,8 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
                 ones.set(1.0)
                 pc.apply(ones, image)
             if pc.getType() in ("gamg", "mg") and pc.getMGLevels() < FEW_LEVELS:
-                layers.read.update(
-                    key for key in layers.own if key.startswith("mg_levels_")
-                )  # of none that is there
+                # of none that is there
+                layers.read.update(key for key in layers.own if key.startswith("mg_levels_"))
         except PETSc.Error as error:
             raise InputError(
                 f"PETSc makes no preconditioner of the options under {layers.prefix} "

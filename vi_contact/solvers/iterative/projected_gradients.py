@@ -42,9 +42,8 @@ class Projected:
         self._one_sided = contact.reach & ~contact.soft & ~contact.bilateral
         self._rows, self._bound = contact.rows[self._one_sided], contact.bound[self._one_sided]
         contact.closed = contact.closed & ~self._one_sided
-        self._weights = (
-            contact.weights()
-        )  # 0 where held on both sides, and where there is no unknown
+        # 0 where held on both sides, and where there is no unknown
+        self._weights = contact.weights()
         self._fixed: Mask = self._weights == 0.0
         self.lower = np.full(len(diagonal), -np.inf)
         self.lower[self._rows] = -self._root[self._rows] * self._bound

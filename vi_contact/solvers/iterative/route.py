@@ -186,9 +186,8 @@ class PreparedIterative:
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # of factors that are not positive definite
+            # of factors that are not positive definite
+            with np.errstate(over="ignore", invalid="ignore"):
                 return self._attempt(step)
         except StepFailure as error:
             if self._surface.comm.rank == 0:

@@ -78,9 +78,8 @@ class _Sweeps:
                 and sweeps < method.max_sweeps
             ):
                 continue
-            gradient = self._gradient(
-                x, gap
-            )  # afresh: the updates of a sweep accumulate rounding errors
+            # afresh: the updates of a sweep accumulate rounding errors
+            gradient = self._gradient(x, gap)
             r = self._reaction(np.array(x), np.array(lower), gradient)
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
@@ -119,9 +118,8 @@ class _Sweeps:
 
     def _objective(self, x: list[float], gap: Array) -> float:
         at = np.array(x)
-        linear = (
-            0.0 if self.method.primal else float(at[at != 0.0] @ gap[at != 0.0])
-        )  # q = inf where r = 0
+        # q = inf where r = 0
+        linear = 0.0 if self.method.primal else float(at[at != 0.0] @ gap[at != 0.0])
         return 0.5 * float(at @ (self._H @ at)) + linear
 
     def _rounding(self, x: list[float], r: Array) -> float:

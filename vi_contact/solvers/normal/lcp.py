@@ -31,9 +31,8 @@ from ...core.algebra import Array, Mask, lowest, max_abs
 from ...core.errors import InputError, StepFailure
 
 EPS = float(np.finfo(float).eps)
-Found = tuple[
-    Array, float, int, Sequence[float]
-]  # scaled r, residual over the unit, iterations, history
+# scaled r, residual over the unit, iterations, history
+Found = tuple[Array, float, int, Sequence[float]]
 
 
 @dataclass(frozen=True)

@@ -80,9 +80,8 @@ class _Pivots:
         """Try the guessed set, or that of guessed reactions; where it is wrong, pivot."""
         history: list[float] = []
         r, residual = self._on_set(gap < 0.0 if guess is None else guess > 0, gap)
-        if residual > min(
-            self._scaled.rounding(r), self.method.tolerance * unit
-        ):  # huge r round to anything
+        # huge r round to anything
+        if residual > min(self._scaled.rounding(r), self.method.tolerance * unit):
             r, residual = self._on_set(self._closed(gap, unit, history), gap)
         if not residual <= self.method.tolerance * unit:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
@@ -113,9 +112,8 @@ class _Pivots:
         if not (q < 0.0).any():
             return closed
         basis, z = np.arange(m), 2 * m  # numbers of w, then of r, then of z
-        d = 1.5 + probe(
-            np.arange(m), 0
-        )  # covers q, and is parallel to none that a model would have
+        # covers q, and is parallel to none that a model would have
+        d = 1.5 + probe(np.arange(m), 0)
         tableau = np.column_stack([np.eye(m), -self._matrix[np.ix_(rows, rows)], -d, q])
         row, entering, left = m - 1 - int(np.argmin((q / d)[::-1])), z, -1
         while left != z:

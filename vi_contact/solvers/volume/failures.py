@@ -11,9 +11,8 @@ from typing import Any
 
 from ...core.errors import StepFailure
 
-NOT_A_NUMBER = (
-    -4
-)  # SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
+# SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
+NOT_A_NUMBER = -4
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
 ADVICE = {
@@ -67,9 +66,8 @@ def raised(method: str, error: Any) -> StepFailure:
     said = last_line(error)
     code: Any = getattr(error, "ierr", "unknown")
     advice = ERRORS.get(code, UNKNOWN)
-    if re.search(
-        r"\bnan\b", said, re.IGNORECASE
-    ):  # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
+    # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
+    if re.search(r"\bnan\b", said, re.IGNORECASE):
         said, advice = f"not a number: {said}", CHECK_NUMBERS
     return StepFailure(f"{method} stopped with PETSc error {code} ({said}): {advice}")
 

@@ -33,9 +33,8 @@ class FrictionJacobian:
             (np.arange(1.0, 1.0 + len(rows)), (rows, columns)), shape=(self._system.size, total)
         )
         places.sort_indices()
-        self._order = (
-            places.data.astype(np.int64) - 1
-        )  # of the entries of all parts, none of which is given twice
+        # of the entries of all parts, none of which is given twice
+        self._order = places.data.astype(np.int64) - 1
         self._values = {name: values for name, (_, _, values) in parts.items()}
         self._A, self._inverse = parts["A"][2], 1.0 / self._system.stiffness[self._system.line]
         self.mat = aij(places, self._system.body.comm)

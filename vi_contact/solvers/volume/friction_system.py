@@ -166,9 +166,8 @@ class ScaledFrictionStep(ScaledStep):
         still[line] += (
             body[friction.tangent[line]] * (self.r_ref / self.x_ref) / friction.stiffness[line]
         )
-        held = (
-            self.limit == 0.0
-        )  # lambda and gamma on both their bounds, where any F but zero keeps them
+        # lambda and gamma on both their bounds, where any F but zero keeps them
+        held = self.limit == 0.0
         still[held[friction.point]], room[held[friction.disk]] = 1.0, 1.0
         return np.concatenate([body, still, room])
 

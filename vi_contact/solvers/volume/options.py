@@ -74,9 +74,8 @@ class OptionLayers:
         values = {**self._defaults, **self.own}
         pc = database.getString(self.prefix + "pc_type", str(values.get("pc_type", "")))
         if pc not in DIRECT and "pc_factor_mat_solver_type" not in self.own:
-            values.pop(
-                "pc_factor_mat_solver_type", None
-            )  # the default is for our own direct solver
+            # the default is for our own direct solver
+            values.pop("pc_factor_mat_solver_type", None)
         added = [key for key in values if not database.hasName(self.prefix + key)]
         for key in added:
             database.setValue(self.prefix + key, "" if values[key] is None else values[key])

@@ -36,9 +36,8 @@ class ScaledStep:
         system = self.system
         self.b = system.load(step.b)
         lower, upper = system.bounds(step)
-        reach = upper[
-            np.isfinite(upper) & (step.lower is None)
-        ]  # boxes may be wider than anything in them
+        # boxes may be wider than anything in them
+        reach = upper[np.isfinite(upper) & (step.lower is None)]
         z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
             z_max = self._along(self.b, b_max)
@@ -123,9 +122,8 @@ class ScaledStep:
         ]
         force = F.copy()
         force[i[active]] = 0.0
-        force[system.feet] += force[
-            system.rows :
-        ]  # the body feels what is left over on its springs
+        # the body feels what is left over on its springs
+        force[system.feet] += force[system.rows :]
         Ax = F + self.b / self.r_ref
         Ax[system.feet] += F[system.rows :]
         local = (

@@ -72,9 +72,8 @@ class TaoDriver:
             failed = reason == PETSc.TAO.Reason.DIVERGED_LS_FAILURE and not scaled.accepts(y, F)
             if not (failed and scaled.worst <= 0.9 * before):  # NaN ends it too
                 return y, F, reason, iterations
-            before = (
-                scaled.worst
-            )  # the values compared were round-off: measured from here they have all digits again
+            # the values compared were round-off: measured from here they have all digits again
+            before = scaled.worst
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""

@@ -57,9 +57,8 @@ from .toml_file import read_toml, with_settings
 from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
-_TABLES: dict[
-    str, Any
-] = {  # in the order in which they are read: type of what a table makes, or the one call it is
+# in the order in which they are read: type of what a table makes, or the one call it is
+_TABLES: dict[str, Any] = {
     "title": str,
     "mesh": MeshScript | MeshFile,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
@@ -131,9 +130,8 @@ class Case:
                 self._made(table)
         if not needs_body(self.nodes["run"]):
             own = self._made("run")
-            steps = (
-                own.get("steps") if "steps" in own or "t_end" in own else 1
-            )  # else as long as the excitation
+            # else as long as the excitation
+            steps = own.get("steps") if "steps" in own or "t_end" in own else 1
             try:
                 step_plan(own["dt"], steps, own.get("t_end"))
             except InputError as error:
@@ -203,9 +201,8 @@ class Case:
         """
         self.check()
         folder = self.out if out is None else Path(out)
-        if (
-            folder is not None
-        ):  # before any work; ``simulate`` looks once more, with the folder's lock
+        # before any work; ``simulate`` looks once more, with the folder's lock
+        if folder is not None:
             on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
         if "strain_compatible" in self.nodes:
             return iterate(
@@ -293,9 +290,8 @@ class Case:
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         mesh, tags = self.meshed(comm)
-        early = "excitation" not in self.nodes or not needs_body(
-            self.nodes["excitation"]
-        )  # else they need the system
+        # else they need the system
+        early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])
         shaking = {"excitations": self.excitations()} if early else {}
         body = (
             with_known_damping(self.nodes["system"])
@@ -442,9 +438,8 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
         materials = (
             list(tables.get("material", {})) if name == "system" and "material" not in value else []
         )
-        if (
-            materials
-        ):  # those that [system] does not name: one for the whole body, or each for its cell group
+        # those that [system] does not name: one for the whole body, or each for its cell group
+        if materials:
             value = {
                 "material": materials[0]
                 if len(materials) == 1

@@ -103,9 +103,8 @@ def describe(
     }
     for sentence, refused in judge_loose_bodies(problem) if problem.system.floating else ():
         model["defects" if refused else "warnings"].append(sentence)
-    if not any(
-        run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]
-    ):  # that is a defect
+    # that is a defect
+    if not any(run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]):
         model["warnings"] += filter(
             None, [sampling_warning(problem, max(dt for dt, _ in plan.parts))]
         )

@@ -55,9 +55,8 @@ class Expression:
 
     text: str
     variables: str = ""
-    program: tuple[Any, ...] = field(
-        init=False, repr=False, compare=False
-    )  # numbers, variables, (function, count)
+    # numbers, variables, (function, count)
+    program: tuple[Any, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if len(self.text) > LENGTH:
@@ -67,11 +66,8 @@ class Expression:
         words = " ".join(word[0] for word in _WORD.finditer(self.text))
         try:
             tree = ast.parse(words.replace("^", "**").strip(), mode="eval").body
-        except (
-            SyntaxError,
-            RecursionError,
-            MemoryError,
-        ):  # MemoryError: the parser's stack is full
+        except (SyntaxError, RecursionError, MemoryError):
+            # MemoryError: the parser's stack is full
             raise InputError("its brackets, signs or commas are not arithmetic") from None
         object.__setattr__(self, "program", tuple(self._program(tree, 0)))
 

@@ -111,9 +111,8 @@ def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> 
     made += f"{_FROM}{base_folder(path).resolve()}\n"
 
     def copy() -> None:
-        text = re.sub(
-            rb"(?m)^# (set|its paths) ", rb"# once \1 ", path.read_bytes()
-        )  # of the run this is a copy of
+        # of the run this is a copy of
+        text = re.sub(rb"(?m)^# (set|its paths) ", rb"# once \1 ", path.read_bytes())
         if not _is_the_copy(path, folder):
             write_atomically(folder / COPY, made.encode() + text)
 

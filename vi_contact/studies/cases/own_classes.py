@@ -200,10 +200,8 @@ def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
         )
     except TypeError:
         return False
-    except (
-        ValueError,
-        NameError,
-    ):  # compiled, and without a signature; type hints that Python 3.14 cannot resolve
+    except (ValueError, NameError):
+        # compiled, and without a signature; type hints that Python 3.14 cannot resolve
         pass
     return True
 

@@ -42,18 +42,16 @@ def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     InputError when it does not fit.
     """
     members = members_of(hint)
-    if any(
-        is_path(member) for member in members
-    ):  # a text is the path then, and belongs to the case file's folder
+    # a text is the path then, and belongs to the case file's folder
+    if any(is_path(member) for member in members):
         members = [member for member in members if member is not str]
     if isinstance(value, dict):
         return _table(value, members, spot, words)
     if isinstance(value, list):
         field = list_node(value, members, spot)
         return _list(value, members, spot, words) if field is None else field
-    if {str, *words.groups} & {*members} > {str} and value in words.named.get(
-        "contact", ()
-    ):  # a group, or such a name
+    # a group, or such a name
+    if {str, *words.groups} & {*members} > {str} and value in words.named.get("contact", ()):
         return replace(words.named["contact"][value], alias=value, spot=spot)
     for member in members:
         node = _scalar(value, member, spot, words)
@@ -173,9 +171,8 @@ def _items(
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
     found: list[Any] = [one for one in (choices_of(member, words) for member in members) if one]
     if found:
-        choices = ChainMap(
-            *found[::-1]
-        )  # in which words come in the order of ``found``, and are looked up one by one
+        # in which words come in the order of ``found``, and are looked up one by one
+        choices = ChainMap(*found[::-1])
         word = value.get(
             "type",
             next((words.default[member] for member in members if member in words.default), None),

@@ -17,18 +17,13 @@ from .stage_tables import refuse_own
 from .table_calls import Spot
 from .toml_file import toml_value, with_settings
 
-ROLLERS = [
-    {"facets": side, "components": [1]} for side in ("left_side", "right_side")
-]  # of a layer shaken sideways
-TIED = [
-    "system.prescribed=",
-    'system.tied={first="left_side", second="right_side"}',
-]  # of one shaken both ways
+# of a layer shaken sideways
+ROLLERS = [{"facets": side, "components": [1]} for side in ("left_side", "right_side")]
+# of one shaken both ways
+TIED = ["system.prescribed=", 'system.tied={first="left_side", second="right_side"}']
 REFERENCE = {"type": "Volume", "method": {"type": "ReducedNewton"}}
-IMPULSIVE = (
-    "ZienkiewiczWoodTaylor",
-    "SS22",
-)  # whose contact points have mass: they take an impact law
+# whose contact points have mass: they take an impact law
+IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")
 
 
 @dataclass(frozen=True)
@@ -115,9 +110,9 @@ class ShortOptions:
         from ...core.step import Scheme
         from ...solvers.condensed import SmallMethod
         from ...solvers.volume.route import Method
-        from .vocabulary import (
-            names_of,
-        )  # late: it needs the finite elements, which not every case does
+
+        # late: it needs the finite elements, which not every case does
+        from .vocabulary import names_of
 
         found = []
         if self.scheme is not None:

@@ -29,13 +29,8 @@ WHOLE = (
     "fields",
 )
 KEYS = ("name", "type", "release", *BY_KEY, *WHOLE)
-OF_MOTION = (
-    "excitation",
-    "scheme",
-    "impact",
-    "mass",
-    "escalation",
-)  # what a static stage has no use for
+# what a static stage has no use for
+OF_MOTION = ("excitation", "scheme", "impact", "mass", "escalation")
 AT_REST = {"dt": 1.0, "steps": 0}  # [run] of a static stage: a row at t = 0
 _NAME = re.compile(r"\w{1,40}", re.ASCII)
 
@@ -102,9 +97,8 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
             raise InputError(
                 f"{where}: {key} is {shown(given[key])}: give a table, here and in the case"
             )
-        lasts = (
-            {"steps", "t_end"} if {"steps", "t_end"} & given[key].keys() else set()
-        )  # one of them ends a run
+        # one of them ends a run
+        lasts = {"steps", "t_end"} if {"steps", "t_end"} & given[key].keys() else set()
         whole[key] = {
             name: one for name, one in whole.get(key, {}).items() if name not in lasts
         } | given[key]

@@ -166,9 +166,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
     surfaces = part.calls("contact")
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
-        own = (
-            table == "mass" and laws and laws[0].callee.name not in MASSES
-        )  # may change all masses
+        # may change all masses
+        own = table == "mass" and laws and laws[0].callee.name not in MASSES
         if laws and not surfaces and not own:
             yield (
                 table,

@@ -292,9 +292,8 @@ class Parts:
         return not (self.system.companions or self.surface.companions or self.moved)
 
 
-_FUNCTIONS: Mapping[
-    Any, Mapping[str, Callable[[], Any]]
-] = {  # kind -> word -> what it calls, when asked
+# kind -> word -> what it calls, when asked
+_FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     MeshFile: {"read_mesh": lambda: MeshFile},
     Dashpots: {"CompliantBase": lambda: compliant_base, "FreeField": lambda: free_field},
     CompliantBase: {"CompliantBase": lambda: compliant_base},

@@ -84,9 +84,8 @@ def intensity(text: str, first_period: Callable[[], float] | None = None) -> Int
                 f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5"
             )
         meaning = f"pseudo-acceleration at {seconds:g} s, 5 % damping"
-        return Intensity(
-            f"sa_{seconds:g}", "m/s²", meaning, 1, cache(partial(psa, period=seconds))
-        )  # asked often
+        # asked often
+        return Intensity(f"sa_{seconds:g}", "m/s²", meaning, 1, cache(partial(psa, period=seconds)))
     if period or word not in _MEASURES:
         raise InputError(
             f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in "

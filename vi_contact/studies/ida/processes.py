@@ -29,11 +29,8 @@ ATTEMPTS = 5
 PATIENCE = 20.0  # seconds for a run to save its state
 ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
 AGAIN = "ended the study: give the same command again to go on"
-_MPI = (
-    "OMPI_COMM_WORLD_SIZE",
-    "PMI_SIZE",
-    "PMIX_RANK",
-)  # in the environment of what mpirun has started
+# in the environment of what mpirun has started
+_MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")
 
 
 def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
@@ -84,10 +81,8 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-    except (
-        FileNotFoundError,
-        PermissionError,
-    ) as error:  # of a program; others tell of the machine
+    except (FileNotFoundError, PermissionError) as error:
+        # of a program; others tell of the machine
         raise InputError(
             f"'{error.filename}' cannot be started ({error.strerror}): correct --launch"
         ) from None
@@ -183,9 +178,8 @@ def executed(
             for row in processes.rows(batch):
                 # The sum of now, as others go on before it is read.
                 told.put(float(sum(list(processes.shares.values()))) if row is None else row)
-        except (
-            BaseException
-        ) as error:  # of any kind: it is raised again by the thread that waits for this one
+        except BaseException as error:
+            # of any kind: it is raised again by the thread that waits for this one
             told.put(error)
 
     wrong = [run for run in runs if run.wrong]
