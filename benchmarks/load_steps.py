@@ -271,10 +271,8 @@ def main(arguments: list[str] | None = None) -> int:
             if COMM.rank == 0:
                 print(
                     f"{cells:>5} {step:>5} | {one['solved']:>4} {one['iterations']:>4} "
-                    f"{one['linear']:>4} "
-                    f"{one['certificate']:.0e} | {one['snes_solved']:>4} "
-                    f"{one['snes_factorisations']:>4} | "
-                    f"{one['ratio']:.2f}",
+                    f"{one['linear']:>4} {one['certificate']:.0e} | {one['snes_solved']:>4} "
+                    f"{one['snes_factorisations']:>4} | {one['ratio']:.2f}",
                     flush=True,
                 )
     if COMM.rank == 0 and given.json:

@@ -183,8 +183,7 @@ def print_bars(rows: dict[str, Any], count: int) -> None:
             )
             print(
                 f"| {name} | {courant} | {found['oscillation']:.1e} | {energies} | "
-                f"{found['force_error']:.2f} | "
-                f"{number(found['peak'])} |",
+                f"{found['force_error']:.2f} | {number(found['peak'])} |",
                 flush=True,
             )
 
@@ -199,8 +198,8 @@ def print_blocks(rows: dict[str, Any]) -> None:
         for found in row:
             print(
                 f"| {name} | {found['unknowns']} | {number(found['energy'])} | "
-                f"{found['speed']:.3f} | "
-                f"{number(found['force'])} | {found['ms']:.2f} | {found['ratio']:.1f} |",
+                f"{found['speed']:.3f} | {number(found['force'])} | {found['ms']:.2f} | "
+                f"{found['ratio']:.1f} |",
                 flush=True,
             )
 

@@ -187,8 +187,7 @@ def shaken_wall(
         if MPI.COMM_WORLD.rank == 0:
             print(
                 f"wall, b = {1e6 * width:g} µm: rms distance to the exact inequality "
-                f"{1e6 * errors[-1]:.3f} µm, "
-                f"into it {1e6 * found.max():.3f} µm (amplitude "
+                f"{1e6 * errors[-1]:.3f} µm, into it {1e6 * found.max():.3f} µm (amplitude "
                 f"{1e6 * np.max(np.abs(reference)):.1f} µm)"
             )
     if MPI.COMM_WORLD.rank == 0:

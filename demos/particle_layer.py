@@ -89,8 +89,7 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
             )
             print(
                 f"{k:6g} {c:6g} {one.restitution:10.6f} {one.poisson_covector:9.6f} "
-                f"{one.compression_time:9.6f} "
-                f"{one.duration:10.6f} {one.deepest:10.6f}"
+                f"{one.compression_time:9.6f} {one.duration:10.6f} {one.deepest:10.6f}"
             )
             numbers |= {f"e {k:g} {c:g}": one.restitution, f"t_f {k:g} {c:g}": one.duration}
     print(f"largest difference between closed form and integration: {worst:.1e}")

@@ -220,8 +220,7 @@ def table(numbers: dict[str, float], shown: Shown) -> str:
         f"beam off the ground over {', '.join(f'{value:g}' for value in off.values())} m, exact "
         f"{posed.HEAVY.length:g} m",
         f"disk on the ground up to r = {', '.join(f'{value:.4f}' for value in radii.values())} m, "
-        "exact "
-        f"{numbers['ground: exact radius'] * 0.5 * posed.SIDE:.4f} m",
+        f"exact {numbers['ground: exact radius'] * 0.5 * posed.SIDE:.4f} m",
         "",
     ]
     for name in ("beam", "plate"):
@@ -232,9 +231,8 @@ def table(numbers: dict[str, float], shown: Shown) -> str:
         }
         lines.append(
             f"thrown {name}: touches at {1e3 * told['touches']:.3f} ms, free motion "
-            f"{1e3 * told['exact']:.3f} "
-            f"ms, step {1e3 * told['step']:.3f} ms; energy left {told['left']:.4f}, largest rise "
-            f"{told['rise']:.0e}, ledger {told['defect']:.0e}"
+            f"{1e3 * told['exact']:.3f} ms, step {1e3 * told['step']:.3f} ms; energy left "
+            f"{told['left']:.4f}, largest rise {told['rise']:.0e}, ledger {told['defect']:.0e}"
         )
     worst = {
         word: max(value for name, value in numbers.items() if name.endswith(word))

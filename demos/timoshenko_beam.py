@@ -163,8 +163,8 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
     errors = np.array([np.max(np.abs(run["u_tip"] - law["u_tip"])) for run in runs.values()])
     stuck = int(np.sum(law["slip"][1:] == 0.0))
     print(
-        f"\nThe friction inequality, mu = {MU:g}, r_n = {FORCE:g} N: {stuck} of {steps} steps "
-        "stick; "
+        "\n"
+        f"The friction inequality, mu = {MU:g}, r_n = {FORCE:g} N: {stuck} of {steps} steps stick; "
         f"two routes differ by {apart:.1e} m"
     )
     for eps, error in zip(EPS, errors, strict=True):

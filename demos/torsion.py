@@ -177,8 +177,7 @@ def table(numbers: dict[str, float]) -> str:
     """Return torques beside the known ones."""
     lines = [
         f"{'twist':>6} {'disk: torque':>13} {'exact':>9} {'error of u':>11} {'plastic from':>13} "
-        f"{'exact':>7} "
-        f"{'square: torque':>15} {'elastic':>9} {'limit':>7}"
+        f"{'exact':>7} {'square: torque':>15} {'elastic':>9} {'limit':>7}"
     ]
     for w in TWISTS:
         torque, error, inner = (
@@ -187,9 +186,8 @@ def table(numbers: dict[str, float]) -> str:
         zone = f"{inner:.4f}" if inner < 2.0 else "none"
         lines.append(
             f"{w:>6g} {torque:>13.5f} {float(disk_torque(w)):>9.5f} {error:>11.1e} {zone:>13} "
-            f"{1.0 / w:>7.4f} "
-            f"{numbers[f'square {w:g}: torque']:>15.5f} {square_elastic()[0] * w:>9.5f} "
-            f"{SQUARE_LIMIT:>7.4f}"
+            f"{1.0 / w:>7.4f} {numbers[f'square {w:g}: torque']:>15.5f} "
+            f"{square_elastic()[0] * w:>9.5f} {SQUARE_LIMIT:>7.4f}"
         )
     lines += [
         "",

@@ -60,18 +60,15 @@ class RaftMesh:
         if not (thick > 0.0 and inside and min(self.storeys, default=0.0) > self.slab):
             raise InputError(
                 f"a core {cx} x {cy} m at ({x}, {y}), walls {self.wall}, storeys {self.storeys}, "
-                "slabs "
-                f"{self.slab} m on a raft {lx} x {ly} x {thick} m: it needs room inside, storeys "
-                "higher "
-                "than their slabs, and the raft under all of it"
+                f"slabs {self.slab} m on a raft {lx} x {ly} x {thick} m: it needs room inside, "
+                "storeys higher than their slabs, and the raft under all of it"
             )
         if not (
             depth > 0.0 and lx + 4.0 * self.soil_size < wide and ly + 4.0 * self.soil_size < deep
         ):
             raise InputError(
                 f"soil {wide} x {deep} x {depth} m: give depth, and two cells of {self.soil_size} "
-                "m more "
-                f"than a raft {lx} x {ly} m on every side"
+                f"m more than a raft {lx} x {ly} m on every side"
             )
         cells = 6.0 * lx * ly * (thick / self.size**3 + min(depth, lx) / self.soil_size**3)
         counted(

@@ -238,9 +238,8 @@ def summary(about: dict[str, Any], rows: list[dict[str, Any]]) -> str:
     """Return date, machine and versions of a run as a sentence and a list."""
     cpu = about["cpu"].removesuffix(" Processor")
     lines = [
-        f"The run of {about['date']}: {cpu}, {about['cores']} cores, "
-        f"load {about['load']} at the end, "
-        f"{about['system']}, Python {about['python']}, numpy {about['numpy']}.",
+        f"The run of {about['date']}: {cpu}, {about['cores']} cores, load {about['load']} at the "
+        f"end, {about['system']}, Python {about['python']}, numpy {about['numpy']}.",
         "",
     ]
     versions = dict.fromkeys((row["peer"], row.get("version", "not installed")) for row in rows)

@@ -214,8 +214,7 @@ def _states(
         if not np.isfinite(kinetic + strain + work):
             raise StepFailure(
                 f"{at}: the beam's motion or its energy is no finite number; check the loads and "
-                "the "
-                "state at the start"
+                "the state at the start"
             )
         yield (
             (

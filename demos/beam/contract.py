@@ -107,8 +107,7 @@ def rubbing_problem(
     if rod.length != beam.length:
         raise InputError(
             f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, "
-            "give "
-            "one length"
+            "give one length"
         )
     x = elements.nodes(beam.length)
     bar = _Part.of_rod(rod, elements, rod_start or Start())

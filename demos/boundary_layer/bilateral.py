@@ -68,8 +68,7 @@ def bilateral_motion(
     if not systems or any(system.rates is not None for system in systems):
         raise InputError(
             f"{owner}: bilateral constraints need at least one system, whose velocities are the "
-            "rates of "
-            "q; give one for each constraint"
+            "rates of q; give one for each constraint"
         )
     q, v, times = (
         array(owner, name, value, (None,))
@@ -99,8 +98,7 @@ def bilateral_motion(
         if not np.all(np.isfinite(rates(float(times[0]), y0))):
             raise StepFailure(
                 f"the accelerations at t = {times[0]:.6g} s are not finite: check what the "
-                "systems' "
-                "functions return there, and that the constraints are independent"
+                "systems' functions return there, and that the constraints are independent"
             )
         found = solve_ivp(
             rates, (times[0], times[-1]), y0, t_eval=times, rtol=rtol, atol=atol, method="DOP853"

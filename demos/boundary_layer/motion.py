@@ -170,8 +170,7 @@ def one_sentence() -> Iterator[None]:
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise StepFailure(
             f"the motion could not be integrated, its numbers left their range ({error}): check "
-            "forces, "
-            "masses and the state at the start"
+            "forces, masses and the state at the start"
         ) from error
 
 

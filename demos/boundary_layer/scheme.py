@@ -92,9 +92,8 @@ class BoundaryLayer(Midpoint):
             where = int(np.argmin(gap))
             raise InputError(
                 f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible "
-                "set of "
-                "the layer, gap > 0: move the obstacle back by the layer's width, for example with "
-                "ContactLayer.set_back(surface)"
+                "set of the layer, gap > 0: move the obstacle back by the layer's width, for "
+                "example with ContactLayer.set_back(surface)"
             )
         return state
 
@@ -113,8 +112,7 @@ class BoundaryLayer(Midpoint):
         if not closed < 0.0:
             raise StepFailure(
                 f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a "
-                "rounding "
-                f"error beside displacements of {away:.1e} m: make the layer wider"
+                f"rounding error beside displacements of {away:.1e} m: make the layer wider"
             )
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
         rate = self._rate(problem, state, old)

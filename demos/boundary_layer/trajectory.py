@@ -200,8 +200,7 @@ class _Passages:
         if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
             raise StepFailure(
                 f"the velocities or accelerations at t = {start:.6g} s are not finite: check what "
-                "the "
-                "system's functions return there"
+                "the system's functions return there"
             )
         most = float(np.max(np.abs(self._acceleration(start, q, v, layer, inside)[0])))
         # the speed over the width; 1 where nothing moves
@@ -221,8 +220,7 @@ class _Passages:
         if found.status < 0:
             raise StepFailure(
                 f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho "
-                "= "
-                f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
+                f"= {system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
             )
         places, speeds = q + found.y[:n].T, found.y[n:].T
         t = np.interp(

@@ -64,8 +64,7 @@ class BouncingBar(UprightBar):
         if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 3:
             raise InputError(
                 f"BouncingBar: fall time over crossing time is {ratio:.6g}, which gives no known "
-                "period; "
-                "choose a height for which it is an integer of at least 3"
+                "period; choose a height for which it is an integer of at least 3"
             )
         return 4.0 * (self.crossing + self.fall_time)
 

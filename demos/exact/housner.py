@@ -41,8 +41,7 @@ class HousnerBlock:
         if self.restitution <= 0.0:
             raise InputError(
                 f"HousnerBlock: width {self.width} is too large for height {self.height}, the "
-                "first "
-                "impact stops the block; give a width below sqrt(2) times the height"
+                "first impact stops the block; give a width below sqrt(2) times the height"
             )
 
     @property
@@ -127,8 +126,7 @@ class HousnerBlock:
         if not excess > 1.0:
             raise InputError(
                 f"HousnerBlock: an acceleration of {acceleration!r} does not lift the block; give "
-                "more "
-                f"than {self.gravity * self.alpha:.6g}"
+                f"more than {self.gravity * self.alpha:.6g}"
             )
         return -math.log1p(-1.0 / excess) / self.p
 

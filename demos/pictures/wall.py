@@ -205,8 +205,8 @@ def plot_decomposition(found: Decomposition, wall: Wall, path: str | Path) -> Pa
     return save(
         figure,
         path,
-        f"A step at t = {found.t:.4f} s: displacements x {magnified:g}, "
-        f"reactions up to {push * factor:.3g} {unit}",
+        f"A step at t = {found.t:.4f} s: displacements x {magnified:g}, reactions up to "
+        f"{push * factor:.3g} {unit}",
     )
 
 

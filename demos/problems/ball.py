@@ -57,8 +57,7 @@ class Ball:
         if not self.cells >= 3.0 or not self.height >= 0.0:
             raise InputError(
                 f"Ball: {self.cells!r} cells in the contact radius, {self.height!r} m above the "
-                "plane; "
-                "give at least 3 cells and a height >= 0"
+                "plane; give at least 3 cells and a height >= 0"
             )
 
     def impact(self, mass: float) -> HertzImpact:

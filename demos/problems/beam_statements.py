@@ -93,10 +93,9 @@ class Row:
 
 HEAD = (
     "| reading | a2 [s] | turning points, force x 0.01, 0.1, 1, 10 | swings above eps, same forces "
-    "| peak contact "
-    "force [N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | statement 2 |\n|"
-    + "---|"
-    * 10
+    "| peak contact force [N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | "
+    "statement 2 |\n"
+    "|" + "---|" * 10
 )
 
 

@@ -187,8 +187,7 @@ class SoilProbe(Probe):
         if not faced.keys() >= set(nodes):
             raise InputError(
                 "a soil probe is not at the interface with the channel: give points of the "
-                "channel's "
-                "outline"
+                "channel's outline"
             )
         return np.array([faced[node] for node in nodes], dtype=np.int64)
 

@@ -53,8 +53,7 @@ def ledger(
     if len(run.times) != len(motion.times):
         raise InputError(
             f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give "
-            "the "
-            "motion of this run, BoundaryProblem.solve(run.forces)"
+            "the motion of this run, BoundaryProblem.solve(run.forces)"
         )
     optional(mask, "ledger", "supported", supported, motion.displacement.shape[1:])
     held = np.zeros(loads.shape[1:], bool) if supported is None else supported

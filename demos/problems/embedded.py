@@ -75,8 +75,7 @@ class Embedded:
         if self.box.confined:
             raise InputError(
                 "Embedded: the box is on rollers; give a box with confined=False, the notch is "
-                "what "
-                "confines it"
+                "what confines it"
             )
 
     def blocks(self) -> Blocks:

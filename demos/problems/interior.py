@@ -136,6 +136,6 @@ def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
     if bad.any():
         raise InputError(
             f"interior_displacement: the point {x[int(bad.argmax())].tolist()} lies on the "
-            "boundary or "
-            "outside the body; give points inside and take boundary values from the motion"
+            "boundary or outside the body; give points inside and take boundary values from the "
+            "motion"
         )

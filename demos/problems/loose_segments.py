@@ -54,8 +54,7 @@ def ordered_loops(
         bad = int(np.argmax((ends != 2) & (ends > 0)))
         raise InputError(
             f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), "
-            "where "
-            f"{int(ends[bad])} segments meet; give every segment of closed curves"
+            f"where {int(ends[bad])} segments meet; give every segment of closed curves"
         )
     at_point: dict[int, list[int]] = {}
     for number, pair in enumerate(segments.tolist()):

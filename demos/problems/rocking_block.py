@@ -66,8 +66,7 @@ class RockingBlock:
         if least > self.material.E:
             raise InputError(
                 f"RockingBlock: E = {self.material.E:g} Pa is too soft for a rigid block of this "
-                "size: "
-                f"give at least {least:.2g} Pa"
+                f"size: give at least {least:.2g} Pa"
             )
         if self.divisions[1] < 4:
             raise InputError(

@@ -56,8 +56,7 @@ def stored_blocks(
     except OSError as error:
         raise InputError(
             f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file "
-            "in a "
-            "folder with room that may be written to"
+            "in a folder with room that may be written to"
         ) from error
     return blocks
 

@@ -110,8 +110,7 @@ class RunComparison:
         ):
             raise InputError(
                 f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; "
-                "give "
-                f"finite ones, {mine.shape[1]} components each, at times of the run"
+                f"give finite ones, {mine.shape[1]} components each, at times of the run"
             )
         at = np.array([np.interp(t[common], self.times, column) for column in mine.T]).T
         off = float(np.linalg.norm(at - theirs[common], axis=1).max())

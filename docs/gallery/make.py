@@ -243,8 +243,7 @@ def cell(entry: Entry) -> str:
     others = f" and [{len(more)} more commands]({page})" if more else ""
     return (
         f"[![{entry['title']}](../figures/{picture})]({page}) **[{entry['title']}]({page}).** "
-        f"{entry['sentence']} "
-        f"`{first}`{others}"
+        f"{entry['sentence']} `{first}`{others}"
     )
 
 

@@ -362,21 +362,18 @@ def claims(rows: list[dict[str, Any]]) -> list[str]:
         f"overlap of {100.0 * of('calculix', 'signorini', 'default', 'penetration'):.1f} %",
         f"force is then {1.0 + min(peaks):.1f} to {1.0 + max(peaks):.1f} times the exact one",
         f"overshoot ({over[0]}), before CalculiX by default ({over[1]}), scikit-fem ({over[2]}) "
-        "and `vi_contact` "
-        f"({over[3]})",
+        f"and `vi_contact` ({over[3]})",
         f"`vi_contact` gains {percent('vi_contact', 'thrown', 'best', 2)}, GetFEM's best way "
         f"{percent('getfem', 'thrown', 'best', 2)}, and scikit-fem's "
         f"{percent('scikit_fem', 'thrown', 'best', 2)}",
         f"of `vi_contact` loses {percent('vi_contact', 'thrown', 'never gains')}",
         f"force error {first['getfem']}, followed by `ContactStabilisedNewmark` ({never:.3f}), "
-        "Siconos "
-        f"{first['siconos']} and the default of `vi_contact` {first['vi_contact']}",
+        f"Siconos {first['siconos']} and the default of `vi_contact` {first['vi_contact']}",
         f"NGSolve ({close['ngsolve']:.3f})", f"CalculiX ({close['calculix']:.3f})",
         f"`vi_contact` has {close['vi_contact']:.3f}",
         f"`ContactStabilisedNewmark` loses {percent('vi_contact', 'bar', 'never gains')}, CalculiX "
         f"{percent('calculix', 'bar', 'best')} and {percent('calculix', 'bar', 'default')}, "
-        "OpenSeesPy's TRBDF2 "
-        f"{percent('opensees', 'bar', 'best')} and Kratos with Bossak's scheme "
+        f"OpenSeesPy's TRBDF2 {percent('opensees', 'bar', 'best')} and Kratos with Bossak's scheme "
         f"{percent('kratos', 'bar', 'best')}",
         f"Siconos with projected positions gains {percent('siconos', 'bar', 'best')}",
     ]  # fmt: skip

@@ -185,8 +185,7 @@ def test_the_loops_need_no_library_of_the_machine() -> None:
     """What every process loads names no CHOLMOD, and brings none."""
     script = (
         "from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import "
-        "cholmod, library; "
-        "print(library(SerialComm()) is not None, cholmod(SerialComm()), "
+        "cholmod, library; print(library(SerialComm()) is not None, cholmod(SerialComm()), "
         "'cholmod' in open('/proc/self/maps').read())"
     )
     told = subprocess.run(
@@ -236,8 +235,7 @@ def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> 
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
     script = (
         "import pathlib; from vi_contact.core import compiled; source = "
-        f"pathlib.Path({str(small)!r}); "
-        "print(compiled.compiled(source, []))"
+        f"pathlib.Path({str(small)!r}); print(compiled.compiled(source, []))"
     )
     runs = [
         subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)

@@ -291,8 +291,7 @@ def test_lists_that_differ_between_ranks_are_refused():
     given = bcs[: 1 if COMM.rank == COMM.size - 1 else 2]
     assert refusal(COMM, lambda: fem.assemble(mesh, CONCRETE, bcs=given)) == (
         "assemble: bcs has 2 items on one rank and 1 on another; give all ranks the same list, "
-        "also where a rank has "
-        "none of its unknowns"
+        "also where a rank has none of its unknowns"
     )
 
 

@@ -718,8 +718,7 @@ def test_refused_pairs():
             group(tags, ["upper_bottom", "lower_top"]), lower
         ),
         "on several contact surfaces with one contact direction: list every boundary and every "
-        "pair once, and "
-        "join boundaries that continue one another": lambda: joined_surfaces(
+        "pair once, and join boundaries that continue one another": lambda: joined_surfaces(
             pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)
         ),
         "is on side 1 of one contact pair and on side 2 of another: where cracks cross, give .* "

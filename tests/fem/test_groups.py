@@ -277,8 +277,7 @@ def test_what_is_refused():
     said = refusal(COMM, lambda: fem.Facets.tagged("base", whole, 7, mesh))
     assert said == (
         "Facets.tagged: the tags of 'base' are of dimension 2 and facets of this mesh have "
-        "dimension 1; "
-        "give the tags of its facets"
+        "dimension 1; give the tags of its facets"
     )
     assert "cells of this mesh have dimension 2" in refusal(
         COMM, lambda: fem.Cells.tagged("all", tags, 7, mesh)

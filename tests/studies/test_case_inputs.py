@@ -174,8 +174,7 @@ def test_a_boundary_saved_without_its_body(
     sentence = said(capsys, ["run", case(folder), "--check"])
     assert (
         "a cell group: give the name of a boundary group, or, if it bounds the body, the mesh has "
-        "no 2D cells: "
-        "add a Physical Surface in Gmsh" in sentence
+        "no 2D cells: add a Physical Surface in Gmsh" in sentence
     )
 
 

@@ -390,8 +390,8 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
     (contact,) = model["contact"]
     assert contact["nodes"] == (
         "6 points of 14 nodes; 7 nodes in front of nothing (left out), at (0, 6), (1.53846, 6), "
-        "(3.07692, 6) and 4 "
-        "more places; 1 node partly covered (carried by their neighbours), at (15.3846, 6)"
+        "(3.07692, 6) and 4 more places; 1 node partly covered (carried by their neighbours), at "
+        "(15.3846, 6)"
     )
     assert f"  base: {contact['nodes']}" in in_words(model)
     assert {kind: len(places) for kind, places in contact["others"].items()} == {

@@ -174,8 +174,7 @@ def test_a_case_file_alone_imports_nothing(
     )
     assert (
         "[friction] has the type 'pack:Law' of the package 'pack', and a case file imports nothing "
-        "by itself: "
-        "give --allow pack if you trust it" in capsys.readouterr().err
+        "by itself: give --allow pack if you trust it" in capsys.readouterr().err
     )
     assert not imported() and not (folder / "harm").exists()
 

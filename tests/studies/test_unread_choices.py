@@ -80,8 +80,7 @@ VAIN: dict[str, tuple[str, str, str]] = {
     "law without ratios": (
         added("system", 'damping = {type = "DampingRatio", frequency = 5.0}'),
         ": [system.damping] DampingRatio damps by the ratios of the materials, and none has one: "
-        "give [material.lower] "
-        "xi = 0.05, or another type of damping",
+        "give [material.lower] xi = 0.05, or another type of damping",
         added(
             "system",
             'damping = {type = "DampingRatio", frequency = 5.0}',

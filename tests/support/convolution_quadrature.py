@@ -120,8 +120,7 @@ class Frequencies:
         if not shape_of(fine) or len(fine) != self.steps * 3:
             raise InputError(
                 f"substep_means: forces(dt, {self.steps * 3}) has shape {shape_of(fine)}; return "
-                "one "
-                "mean for each step"
+                "one mean for each step"
             )
         first, second, third = np.moveaxis(fine.reshape(self.steps, 3, *fine.shape[1:]), 1, 0)
         return np.stack([first, (second + third) / 2.0], axis=1)

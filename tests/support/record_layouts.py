@@ -122,10 +122,12 @@ def at2_head(count: int) -> str:
 
 def begin_head(count: int) -> str:
     return (
-        f"Made motion, north south\n{count} points at equal spacing of 0.02 sec\nPoints are listed "
-        "in the format of "
-        "8F10.3, i.e., 8 points across in\na row with 3 decimal places\nThe units are (g)\n*** "
-        "Begin data ***\n"
+        "Made motion, north south\n"
+        f"{count} points at equal spacing of 0.02 sec\n"
+        "Points are listed in the format of 8F10.3, i.e., 8 points across in\n"
+        "a row with 3 decimal places\n"
+        "The units are (g)\n"
+        "*** Begin data ***\n"
         f"NPTS= {count:6d}, DT= .02000 SEC\n"
     )
 

@@ -46,8 +46,8 @@ class SlidingBody:
         if self.lengths[0] <= self.law.mu * self.lengths[1]:
             raise InputError(
                 f"SlidingBody: a block of {self.lengths[0]:g} m x {self.lengths[1]:g} m rocks "
-                "before it "
-                f"slides with mu = {self.law.mu:g}: make it wider than mu times its height"
+                f"before it slides with mu = {self.law.mu:g}: make it wider than mu times its "
+                "height"
             )
 
 

@@ -45,8 +45,8 @@ class TwoBars:
         if min(first, second)[1] > max(first, second)[1]:
             raise InputError(
                 "TwoBars: the bar crossed first has the larger impedance, so that contact outlives "
-                "the "
-                "first reflection; give it an impedance (z1 or z2) that is not above the other's"
+                "the first reflection; give it an impedance (z1 or z2) that is not above the "
+                "other's"
             )
 
     @property

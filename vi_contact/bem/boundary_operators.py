@@ -46,8 +46,7 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
     if material.xi:
         raise InputError(
             f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are "
-            "elastic "
-            "without damping; leave xi out"
+            "elastic without damping; leave xi out"
         )
 
 

@@ -172,8 +172,7 @@ class BoundaryContact:
             if self.conditions.nodes.max(initial=0) >= self.count:
                 raise InputError(
                     f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} "
-                    "contact "
-                    "nodes; make them with conditions_on for this compliance"
+                    "contact nodes; make them with conditions_on for this compliance"
                 )
         self._refuse_corners()
 
@@ -195,10 +194,8 @@ class BoundaryContact:
         if np.max(np.abs(directions - normals)) <= 1e-9:
             raise InputError(
                 f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} "
-                "degrees "
-                f"at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, one "
-                "side, "
-                "other side), a condition on each"
+                f"degrees at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, "
+                "one side, other side), a condition on each"
             )
 
     @property
@@ -270,8 +267,7 @@ class BoundaryContact:
         if (owned < 0).any():
             raise InputError(
                 "BoundaryContact: a support holds a contact node in its contact direction; leave "
-                "the node "
-                "out of the contact boundary, or free that direction"
+                "the node out of the contact boundary, or free that direction"
             )
         tangents = np.where(
             np.isin(rows.nodes, rows.nodes[second]), -1, number[rows.nodes + self.count]
@@ -336,8 +332,8 @@ class BoundaryContact:
         if np.linalg.eigvalsh(first)[0] <= SUPPORTED * first.max():
             raise InputError(
                 "BoundaryContact: the compliance of one step is not positive definite; use the "
-                "symmetric "
-                "Poincaré-Steklov operator, and supports along contact directions or tangents only"
+                "symmetric Poincaré-Steklov operator, and supports along contact directions or "
+                "tangents only"
             )
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
 

@@ -51,8 +51,8 @@ def march_contact(
         if not certificate.worst <= tolerance:
             raise StepFailure(
                 f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the "
-                "certificate "
-                f"tolerance {tolerance:g} ({certificate}): try Condensed() with another method"
+                f"certificate tolerance {tolerance:g} ({certificate}): try Condensed() with "
+                "another method"
             )
         return result
 

@@ -97,8 +97,7 @@ class ElementPairs:
         raise InputError(
             f"boundary elements: the boundary {near} at {at(mesh.points[second])}, where elements "
             f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the "
-            "longer "
-            f"one; {remedy}"
+            f"longer one; {remedy}"
         )
 
     def where(self, chosen: Mask) -> "ElementPairs":

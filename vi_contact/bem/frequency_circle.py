@@ -137,8 +137,8 @@ def _refusal(what: str, symmetric: bool) -> str:
     """Return the sentence that names the fault and the remedies."""
     return (
         f"boundary elements: the compressed operator {what}, and {SHARE:.0e} is the limit; "
-        "assemble with "
-        "compressed=False, take fewer steps" + ("" if symmetric else " or the symmetric form")
+        "assemble with compressed=False, take fewer "
+        "steps" + ("" if symmetric else " or the symmetric form")
     )
 
 
@@ -161,6 +161,5 @@ def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
     if force * steps * blocks.dt**2 > DRIFT * abs(blocks.mesh.area):
         raise InputError(
             f"boundary elements: in {steps} steps rounding errors move a free body; take fewer "
-            "steps, "
-            "hold the body, or take the unsymmetric form"
+            "steps, hold the body, or take the unsymmetric form"
         )

@@ -50,8 +50,7 @@ def check_speeds(kernels: Any) -> None:
     if kernels.c_p <= kernels.c_s:
         raise InputError(
             f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; "
-            "give "
-            "c_p above c_s: pressure waves are faster than shear waves"
+            "give c_p above c_s: pressure waves are faster than shear waves"
         )
 
 

@@ -238,8 +238,7 @@ def matching(points: Array, others: Array) -> Indices:
     if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
         raise InputError(
             f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give "
-            "both "
-            "interfaces the same nodes"
+            "both interfaces the same nodes"
         )
     return nearest
 

@@ -45,8 +45,7 @@ def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) 
         if (signed_area(loop) > 0.0) != forward:
             raise InputError(
                 f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the "
-                "body; "
-                f"reverse its points or set exterior={not exterior}"
+                f"body; reverse its points or set exterior={not exterior}"
             )
 
 
@@ -62,8 +61,8 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
         if not (smallest > 0.0 and np.isfinite(largest)):
             raise InputError(
                 f"BoundaryMesh: loop {i} is {extent[0]:.3g} m wide and {extent[1]:.3g} m high, "
-                "which "
-                "leaves no area to compute with; give points of a plane body, in units of its size"
+                "which leaves no area to compute with; give points of a plane body, in units of "
+                "its size"
             )
 
 

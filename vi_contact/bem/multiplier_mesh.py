@@ -105,8 +105,8 @@ class MultiplierMesh:
         if least < np.cos(FEATURE_ANGLE * (1.0 + 1e-9)):
             raise InputError(
                 f"{owner}: patch is {self.patch}, and one turns by "
-                f"{np.degrees(np.arccos(least)):.3g} "
-                "degrees, more than 30, under one mean normal; give fewer elements, or a finer mesh"
+                f"{np.degrees(np.arccos(least)):.3g} degrees, more than 30, under one mean normal; "
+                "give fewer elements, or a finer mesh"
             )
         if (steps := len(self.compliance.W)) % self.interval:
             raise InputError(
@@ -203,8 +203,8 @@ class MultiplierMesh:
         if growth > SWING ** (1.0 / intervals):
             raise InputError(
                 f"MultiplierMesh: with sigma = {self.sigma:g} 1/s the means swing {growth:.3g} "
-                "times as "
-                f"far in each of {intervals} intervals; reduce sigma, or take testing='end'"
+                f"times as far in each of {intervals} intervals; reduce sigma, or take "
+                "testing='end'"
             )
         both = np.kron(np.eye(2), B)
         held = np.cumsum(both.T @ fine.W @ both, axis=0)

@@ -131,10 +131,9 @@ class PoincareSteklov:
         if not missed <= MISSED:
             raise StepFailure(
                 f"boundary elements: after {len(u)} steps the motion of the unsymmetric form "
-                "misses the "
-                f"other integral equation by {missed:.1e} of the largest force, and {MISSED:g} is "
-                "the "
-                "limit; take the symmetric form, fewer steps, another time step, or a finer mesh"
+                f"misses the other integral equation by {missed:.1e} of the largest force, and "
+                f"{MISSED:g} is the limit; take the symmetric form, fewer steps, another time "
+                "step, or a finer mesh"
             )
         return u, self.rho * p, self.rho * total
 
@@ -190,8 +189,7 @@ def _refuse_growth(moved: Array) -> None:
         raise StepFailure(
             f"boundary elements: in {len(size)} steps after unit forces the unsymmetric form lets "
             f"rounding errors grow to {share:.1e} of the motion, and {GROWN:.0e} is the limit; "
-            "take the "
-            "symmetric form, fewer steps, or another time step"
+            "take the symmetric form, fewer steps, or another time step"
         )
 
 

@@ -84,8 +84,7 @@ class SpaceTimeUzawa:
         if not run.worst <= LOOSE * self.tolerance:
             raise StepFailure(
                 f"{self}: the worst certificate is {run.worst:.1e}, of the run's largest numbers, "
-                "and "
-                f"{LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or "
+                f"and {LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or "
                 "march_contact"
             )
         return run

@@ -91,8 +91,7 @@ def _run(options: argparse.Namespace) -> str:
         if vain is not None:
             raise InputError(
                 f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of "
-                "the "
-                "two out"
+                "the two out"
             )
         return _checked(case, comm, Path(out))
     found = case.run(

@@ -21,8 +21,7 @@ PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
 OUT_OF_MEMORY = (
     "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a "
-    "run "
-    "keeps what it has written, and --restart continues it"
+    "run keeps what it has written, and --restart continues it"
 )
 
 

@@ -87,7 +87,6 @@ def _ida(options: argparse.Namespace) -> str:
     if failed:
         raise ViContactError(
             f"{len(failed)} of {len(rows)} runs have failed, the first because: {failed[0]}; all "
-            "rows "
-            f"with their reasons are in {options.out}/ida.csv"
+            f"rows with their reasons are in {options.out}/ida.csv"
         )
     return f"{len(rows)} runs, 0 of them failed: {options.out}/ida.csv, ida.png"

@@ -123,14 +123,12 @@ def _convert(options: argparse.Namespace) -> str:
     )
     lines = [
         f"{options.out}: {form}, {record.acceleration.size} samples, dt = {record.dt:.10g} s, in "
-        f"{units}, "
-        f"PGA = {pga(record):.4g} m/s2"
+        f"{units}, PGA = {pga(record):.4g} m/s2"
     ]
     if form == "path":
         lines.append(
             f"OpenSees: timeSeries Path 1 -dt {record.dt:.10g} -filePath {options.out} -factor 1.0 "
-            " "
-            f"# -factor: your unit of acceleration per {units}"
+            f" # -factor: your unit of acceleration per {units}"
         )
     lines += [f"doubt: {doubt}" for doubt in record.doubts]
     return "\n".join(lines + [f"note: {note}" for note in record.notes])

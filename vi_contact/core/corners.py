@@ -87,9 +87,9 @@ def refuse_rubbing(surface: ContactSurface) -> None:
         where = at(min(every, key=lambda one: one[0])[1])
         raise InputError(
             f"{len(every)} contact nodes, the first at {where}, have several contact directions, "
-            "and "
-            "friction on two faces at once is not modelled: let them slide freely (surface."
-            "with_frictionless_corners()), or treat the corner as smooth (a larger feature_angle=)"
+            "and friction on two faces at once is not modelled: let them slide freely "
+            "(surface.with_frictionless_corners()), or treat the corner as smooth (a larger "
+            "feature_angle=)"
         )
 
 

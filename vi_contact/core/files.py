@@ -91,8 +91,7 @@ def sentence(error: OSError) -> str:
     if error.errno in _FULL:
         return (
             f"the disk is full: {path} could not be written; what was written before is kept, free "
-            "some space "
-            "and restart from the last checkpoint"
+            "some space and restart from the last checkpoint"
         )
     if error.errno in _REFUSED:
         return (

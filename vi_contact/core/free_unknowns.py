@@ -43,6 +43,6 @@ def solve_free(algebra: Algebra, A: Matrix, b: Array, held: Mask, x: Array) -> A
         before, size = size, algebra.dot(r, z)
     raise StepFailure(
         f"conjugate gradients on a mass matrix did not end within {PATIENCE} iterations: check "
-        "loads and "
-        "velocities for NaN, and materials for densities a million times as large as others"
+        "loads and velocities for NaN, and materials for densities a million times as large as "
+        "others"
     )

@@ -65,8 +65,7 @@ class StoredGroup:
     def _wrong(self, name: str, what: str) -> InputError:
         return InputError(
             f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, "
-            "or "
-            "run again"
+            "or run again"
         )
 
     def __contains__(self, name: str) -> bool:

@@ -61,6 +61,6 @@ def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix)
         yield f"{owner}: M has a diagonal entry below zero; give masses that are positive, or zero"
     if largest(comm, np.any((own == 0.0) & (M @ probe(numbers, 0) != 0.0))):
         yield (
-            f"{owner}: M has a zero on its diagonal beside other entries; "
-            "give positive masses, or empty rows"
+            f"{owner}: M has a zero on its diagonal beside other entries; give positive masses, or "
+            "empty rows"
         )

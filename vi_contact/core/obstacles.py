@@ -17,8 +17,7 @@ ROUND_OFF = 1e-9  # cosine of a right angle
 BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
 REMEDY = (
     "give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the "
-    "body: turn "
-    "its sign)"
+    "body: turn its sign)"
 )
 
 
@@ -77,8 +76,7 @@ class HalfSpace:
         if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
             raise InputError(
                 f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero "
-                "normal "
-                "with the same number of components"
+                "normal with the same number of components"
             )
 
     @property
@@ -174,8 +172,7 @@ def facing(
     if gap.shape != (m,) or gap.dtype.kind not in "iuf":
         raise InputError(
             f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one "
-            "real gap "
-            "per point"
+            "real gap per point"
         )
     cosines, places = np.sum(directions * normals, axis=1) / length, alike(points)
     towards = cosines >= -ROUND_OFF
@@ -188,10 +185,8 @@ def facing(
         turn = np.degrees(np.arccos(np.clip(cosines[wrong], -1.0, 1.0)).mean())
         raise InputError(
             f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the "
-            "body at "
-            f"{turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} points; leave "
-            "the "
-            f"face there out of the boundary, or {REMEDY}"
+            f"body at {turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} "
+            f"points; leave the face there out of the boundary, or {REMEDY}"
         )
     return directions, gap.astype(float)
 
@@ -214,10 +209,8 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
     what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
     raise InputError(
         f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} "
-        "degrees to "
-        f"its mean outward normal {at(normal.round(6))}; choose the boundary that looks towards "
-        "the "
-        f"obstacle, or {REMEDY}"
+        f"degrees to its mean outward normal {at(normal.round(6))}; choose the boundary that looks "
+        f"towards the obstacle, or {REMEDY}"
     )
 
 
@@ -257,7 +250,6 @@ def admissible_gap(gap: Array, points: Array, size: float) -> Array:
         worst = int(np.argmin(gap))
         raise InputError(
             f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} "
-            "before the "
-            "first step: move the obstacle or the mesh so that every initial gap is >= 0"
+            "before the first step: move the obstacle or the mesh so that every initial gap is >= 0"
         )
     return np.maximum(gap, 0.0)

@@ -220,6 +220,5 @@ def _foreign(path: Path, mode: int, wanted: str) -> InputError:
     )
     return InputError(
         f"'{path}' is {kind}, and a run reads and writes only files of its own folder: put a "
-        f"{wanted} in "
-        "its place, remove it, or choose another folder"
+        f"{wanted} in its place, remove it, or choose another folder"
     )

@@ -251,8 +251,7 @@ def check_parts(problem: Any) -> None:
     if surface.space is not None and surface.space is not system.space:
         raise InputError(
             "ContactProblem: the contact surface was made for another system with other unknowns: "
-            "make "
-            "it for this one by fem.contact_surface(system, …)"
+            "make it for this one by fem.contact_surface(system, …)"
         )
     if surface.comm.size != system.algebra.comm.size:
         raise InputError(
@@ -271,8 +270,7 @@ def _refuse_repeated(excitations: Sequence[Any]) -> None:
         if one is other:
             raise InputError(
                 f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: "
-                "leave it "
-                "out once, or scale it"
+                "leave it out once, or scale it"
             )
 
 
@@ -283,8 +281,8 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
     if len(excitation.direction) != system.influence.shape[1]:
         raise InputError(
             f"excitation direction {excitation.direction} has {len(excitation.direction)} "
-            "components but "
-            f"the body has {system.influence.shape[1]}: give one component per dimension"
+            f"components but the body has {system.influence.shape[1]}: give one component per "
+            "dimension"
         )
 
 
@@ -335,13 +333,13 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < most):
             yield (
                 f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, "
-                f"outside {least} to "
-                f"{most - 1}: make the surface for this system, which has another size"
+                f"outside {least} to {most - 1}: make the surface for this system, which has "
+                "another size"
             )
     if np.any(np.diff(surface.slots) <= 0):
         yield (
-            "the contact surface has slots that do not ascend: "
-            "number its conditions in the order of their rows"
+            "the contact surface has slots that do not ascend: number its conditions in the order "
+            "of their rows"
         )
     if np.isnan(np.sum(surface.gap0)):
         yield "the contact surface has NaN in gap0: check the obstacle's gap function"

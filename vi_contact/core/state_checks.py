@@ -79,10 +79,8 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     if behind > 1e-9 * max(size):
         raise InputError(
             f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or "
-            "enlarge "
-            "the gap; a press fit begins in touch, and quasi_static closes it on a surface that "
-            "moves, "
-            "surface.moving(towards=…)"
+            "enlarge the gap; a press fit begins in touch, and quasi_static closes it on a surface "
+            "that moves, surface.moving(towards=…)"
         )
     none = np.zeros(surface.count)
     return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

@@ -105,8 +105,8 @@ class StepProblem:
         ):
             raise InputError(
                 f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} "
-                "bounds and a "
-                f"contact set of {len(self.active)} for {conditions} conditions: give one of each"
+                f"bounds and a contact set of {len(self.active)} for {conditions} conditions: give "
+                "one of each"
             )
 
     def friction_at(self, slip: Array) -> FrictionLaw:
@@ -143,15 +143,14 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
         if found.dtype.kind not in "iuf" or found.shape != (surface.count,):
             raise InputError(
                 f"{type(law).__name__}: {name} is {shown(values)} at t = {t:g} s; return "
-                f"{surface.count} "
-                "real numbers, one for each contact condition"
+                f"{surface.count} real numbers, one for each contact condition"
             )
         wrong = np.flatnonzero(~((found >= 0.0) & (found < np.inf)))
         if len(wrong):
             raise InputError(
                 f"{type(law).__name__}: {name} is {found[wrong[0]]:g} at "
-                f"{at(surface.points[wrong[0]])} "
-                f"and t = {t:g} s; a friction limit is zero or a positive finite number"
+                f"{at(surface.points[wrong[0]])} and t = {t:g} s; a friction limit is zero or a "
+                "positive finite number"
             )
 
 

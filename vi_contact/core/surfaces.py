@@ -375,8 +375,7 @@ def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
     if found.dtype.kind not in "iuf" or not alike or not np.all(np.isfinite(found)):
         raise InputError(
             f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one "
-            "number or "
-            f"an array of shape {shape}"
+            f"number or an array of shape {shape}"
         )
     return np.broadcast_to(found.astype(float), shape)
 

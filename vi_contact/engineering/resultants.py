@@ -321,8 +321,7 @@ class Resultants:
             if not largest(self._surface.comm, touching.all(axis=1).any()):
                 raise InputError(
                     f"part '{self.name}': its group has no whole facet in contact: give a group of "
-                    "the "
-                    "contact, or a box"
+                    "the contact, or a box"
                 )
             alone = found.copy()
             for rows in whole.corners:

@@ -18,10 +18,9 @@ from ..core.lazy import lazy
 if find_spec("dolfinx") is None:
     raise ModuleNotFoundError(
         "vi_contact.fem needs DOLFINx, which is missing here and which pip does not have: install "
-        "it by apt (on Debian "
-        "python3-dolfinx-real, and make virtual environments with --system-site-packages) or by "
-        "conda (fenics-dolfinx "
-        "of conda-forge), see docs/start/install.md",
+        "it by apt (on Debian python3-dolfinx-real, and make virtual environments with "
+        "--system-site-packages) or by conda (fenics-dolfinx of conda-forge), see "
+        "docs/start/install.md",
         name="dolfinx",
     )
 

@@ -44,8 +44,7 @@ Initial = Field | Sequence[tuple[Cells, Field]] | None
 
 LIGHTER = (
     "inertia load of the ground motion: the convention of the catalogue's reference numbers, which "
-    "leave out "
-    "the mass that elements share with the base"
+    "leave out the mass that elements share with the base"
 )
 
 

@@ -123,8 +123,7 @@ def _check_section(section: Any, dimension: int) -> None:
     if dimension == 3 and isinstance(section, PlaneStrain | PlaneStress):
         raise InputError(
             f"assemble: {section} is a section of a plane body and this one has three dimensions; "
-            "give "
-            "Solid(), or leave it out"
+            "give Solid(), or leave it out"
         )
     if dimension == 2 and isinstance(section, Solid):
         raise InputError(
@@ -152,8 +151,7 @@ def _check_damping(damping: Any, section: Any, forms: Any) -> None:
     if isinstance(section, PlaneStress) and any(getattr(damping, "viscosities", ())):
         raise InputError(
             f"assemble: {damping} does not go with PlaneStress, where the strain across the panel "
-            "would "
-            "need its own motion; give Rayleigh(0, beta), or another section"
+            "would need its own motion; give Rayleigh(0, beta), or another section"
         )
 
 
@@ -171,22 +169,19 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
     ):
         raise InputError(
             f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; "
-            "give "
-            "LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)"
+            "give LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)"
         )
     rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
     damps = body.damped if of_materials else rayleigh or body.viscous is not None
     if not isinstance(law, NoDamping | DampingRatio) and not damps:
         raise InputError(
             f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above "
-            "zero, "
-            "or leave damping out"
+            "zero, or leave damping out"
         )
     if ratio and isinstance(law, BLIND_TO_RATIOS):
         raise InputError(
             f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not "
-            "read; give "
-            "damping=DampingRatio(frequency), or leave xi out"
+            "read; give damping=DampingRatio(frequency), or leave xi out"
         )
     _refuse_ratio_behind(body)
 
@@ -202,8 +197,8 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
         if behind is not None and behind.xi and behind not in inside:
             raise InputError(
                 f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' "
-                "has the "
-                f"damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out there"
+                f"has the damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out "
+                "there"
             )
 
 
@@ -217,8 +212,7 @@ def _refuse_lonely_nodes(mesh: Mesh) -> None:
     if lonely:
         raise InputError(
             f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, "
-            "as "
-            "create_submesh may leave them; write the part to a file and read it, or use fewer "
+            "as create_submesh may leave them; write the part to a file and read it, or use fewer "
             "ranks"
         )
 
@@ -244,8 +238,7 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
     ):
         raise InputError(
             "assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it "
-            "with "
-            "complete cells of first or second order"
+            "with complete cells of first or second order"
         )
     size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
     signed, whole = (
@@ -256,8 +249,7 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
     if folded:
         raise InputError(
             f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its "
-            "sign; "
-            "mesh them finer, or with straight sides"
+            "sign; mesh them finer, or with straight sides"
         )
 
 
@@ -279,14 +271,12 @@ def _check_integration(
     if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
         raise InputError(
             "assemble: integration='selective' needs quadrilaterals or hexahedra, because other "
-            "cells "
-            "lock with it too; take degree=2"
+            "cells lock with it too; take degree=2"
         )
     if degree == 2 or isinstance(section, PlaneStress):
         raise InputError(
             "assemble: integration='selective' is for degree=1 in plane strain or in space: "
-            "neither "
-            "degree=2 nor plane stress locks; leave it out"
+            "neither degree=2 nor plane stress locks; leave it out"
         )
     if any(getattr(damping, "viscosities", ())) or not all(
         isinstance(one, LinearElastic) for one in materials
@@ -303,8 +293,7 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     if stiff > LOCKING:
         log.warning(
             "Poisson's ratio %.10g locks first-order cells, so displacements are too small: give "
-            "at most %g, "
-            "integration='selective' (quadrilaterals and hexahedra) or degree=2",
+            "at most %g, integration='selective' (quadrilaterals and hexahedra) or degree=2",
             stiff,
             LOCKING,
         )
@@ -347,8 +336,7 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
             if one is other:
                 raise InputError(
                     f"assemble: {name} names one {type(one).__name__} twice, which would act "
-                    "twice; leave "
-                    "it out once, or give one of twice the size"
+                    "twice; leave it out once, or give one of twice the size"
                 )
 
 
@@ -380,8 +368,7 @@ def _refuse_empty(
         if not count:
             raise InputError(
                 f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has "
-                "no "
-                "effect; correct the group, or leave it out"
+                "no effect; correct the group, or leave it out"
             )
 
 
@@ -396,16 +383,14 @@ def _contradictions(
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
             yield (
                 f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share "
-                "facets on which "
-                "different displacements are prescribed: leave out one of the two"
+                "facets on which different displacements are prescribed: leave out one of the two"
             )
     sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]
     for side, absorbing in product(sides, damped):
         if len(np.intersect1d(side.indices, absorbing.facets.indices)):
             yield (
                 f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the "
-                "waves through "
-                "the ties: leave out one of the two"
+                "waves through the ties: leave out one of the two"
             )
 
 

@@ -75,10 +75,8 @@ def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
         found = said.split("Error: ", 1)[1].strip().splitlines()[0]
         raise InputError(
             f"DOLFINx cannot compile a finite element form ({found}): it needs a C compiler and "
-            "the headers of Python "
-            "and of the C library; install them (Debian: gcc libc6-dev python3-dev), or name the "
-            "compiler by the "
-            "environment variable CC"
+            "the headers of Python and of the C library; install them (Debian: gcc libc6-dev "
+            "python3-dev), or name the compiler by the environment variable CC"
         ) from error
 
 

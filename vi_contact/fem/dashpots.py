@@ -143,9 +143,8 @@ class DashpotMatrix:
         if not own and not forms.fields:
             raise InputError(
                 f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… "
-                "have "
-                f"none: give {type(dashpots).__name__}(…, material=), or a material beside the "
-                "forms"
+                f"have none: give {type(dashpots).__name__}(…, material=), or a material beside "
+                "the forms"
             )
         cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
         # times thickness
@@ -177,14 +176,12 @@ class DashpotMatrix:
         if np.isnan(total):
             raise InputError(
                 f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several "
-                "speeds: "
-                f"give {type(self.dashpots).__name__}(…, material=)"
+                f"speeds: give {type(self.dashpots).__name__}(…, material=)"
             )
         if total == 0.0:
             raise InputError(
                 f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a "
-                "positive "
-                "factor"
+                "positive factor"
             )
         for condition in self.space.prescribed:
             for both, held in condition.on_facets(self.space, self.dashpots.facets.indices):

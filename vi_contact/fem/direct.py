@@ -84,8 +84,7 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
     if code in MEMORY or reason == "memory":
         return InputError(
             f"there is not enough memory to factorise the effective matrix of {rows} unknowns: "
-            "take "
-            "Iterative(), which factorises nothing, or more memory"
+            "take Iterative(), which factorises nothing, or more memory"
         )
     # a row of a symmetric matrix without one: no positive definite matrix
     no_diagonal = "missing diagonal" in said

@@ -62,8 +62,7 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
     if min(counts) < max(counts):
         raise InputError(
             f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give "
-            "all "
-            "ranks the same list, also where a rank has none of its unknowns"
+            "all ranks the same list, also where a rank has none of its unknowns"
         )
     for bc in bcs:
         provides("assemble", "bcs", bc, ("dof_indices", "function_space", "g"), REMEDY)
@@ -100,8 +99,7 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
             return V, k
     raise InputError(
         f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 "
-        "with "
-        f"{mesh.geometry.dim} components, not a part of another space"
+        f"with {mesh.geometry.dim} components, not a part of another space"
     )
 
 

@@ -32,8 +32,7 @@ def refuse_complex(owner: str) -> None:
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
         raise InputError(
             f"{owner}: this PETSc computes with complex numbers, of which none is less than "
-            "another; use "
-            "DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)"
+            "another; use DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)"
         )
 
 
@@ -68,8 +67,7 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     if set(on_all(space.comm, said, form.arguments)) != set(arguments):
         raise InputError(
             f"{said} is not a form in the given trial and test functions; return one that is not "
-            "zero and "
-            "is linear in each of them"
+            "zero and is linear in each of them"
         )
     on_all(space.comm, said, lambda: refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
@@ -86,8 +84,7 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
         if nodes and not cells:  # no rank knows both cells of a facet between ranks
             raise InputError(
                 f"{said} integrates over interior facets (dS), which on several ranks needs a mesh "
-                "with "
-                "ghost_mode=shared_facet"
+                "with ghost_mode=shared_facet"
             )
     return form
 

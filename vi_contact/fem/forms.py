@@ -331,8 +331,7 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
         if not count:
             raise InputError(
                 f"the cell group '{cells.name}' of a material has no cells: correct the group, or "
-                "leave "
-                "its (cells, material) pair out"
+                "leave its (cells, material) pair out"
             )
     if twice:
         raise InputError(

@@ -55,8 +55,7 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
         )
     raise InputError(
         f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of "
-        "fem.read_mesh or "
-        f"fem.{wanted.__name__}(name, numbers, mesh)"
+        f"fem.read_mesh or fem.{wanted.__name__}(name, numbers, mesh)"
     )
 
 

@@ -64,8 +64,7 @@ class Heterogeneous:
                 if value.ufl_shape:
                     raise InputError(
                         f"Heterogeneous: {words} has values of shape {value.ufl_shape}; give one "
-                        "that is "
-                        "scalar"
+                        "that is scalar"
                     )
                 continue
             given = callable(value) and not isinstance(value, type)
@@ -117,8 +116,7 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
         if values.shape not in (x.shape[1:], (1, *x.shape[1:])):
             raise InputError(
                 f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} "
-                "points; give "
-                "a function of points x (3, k) that returns (k,)"
+                "points; give a function of points x (3, k) that returns (k,)"
             )
         return np.asarray(values)
 

@@ -82,8 +82,7 @@ class InitialStrain(ActingLoad):
         if points.shape[1] == 2 and (whole + whole.swapaxes(1, 2))[:, 2, :2].any():
             raise InputError(
                 "InitialStrain: value shears across the plane (xz or yz), where a body in the "
-                "plane does "
-                "not move; give zero there, or a body in space"
+                "plane does not move; give zero there, or a body in space"
             )
         return whole.reshape(room.shape)
 

@@ -58,8 +58,8 @@ class Group:
         elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
             defect = (
                 f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but "
-                "the mesh has "
-                f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh"
+                f"the mesh has {count} {owner.lower()} here, counted from 0: give numbers of this "
+                "mesh"
             )
         refuse([defect], MpiComm(mesh.comm))
         object.__setattr__(self, "indices", np.unique(numbers).astype(np.int32))
@@ -88,8 +88,7 @@ class Group:
         elif meshtags.dim != dim:
             defect = (
                 f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of "
-                "this mesh have "
-                f"dimension {dim}; give the tags of its {things}"
+                f"this mesh have dimension {dim}; give the tags of its {things}"
             )
         refuse([defect], MpiComm(mesh.comm))
         if not mesh.comm.allreduce(len(chosen)):
@@ -132,8 +131,7 @@ class Group:
             of = "facets of the boundary" if cls.codimension else "cells"
             raise InputError(
                 f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some "
-                f"{things}, "
-                "coordinates compared with np.isclose"
+                f"{things}, coordinates compared with np.isclose"
             )
         return cls(name, chosen, mesh)
 
@@ -185,10 +183,8 @@ class Tags(dict[str, Any]):
         near = " or ".join(get_close_matches(str(name), self, cutoff=0.5))
         raise InputError(
             f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, "
-            "its cell "
-            f"groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it in Gmsh "
-            "as a "
-            "physical group"
+            f"its cell groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it "
+            "in Gmsh as a physical group"
         )
 
 

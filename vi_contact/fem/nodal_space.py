@@ -111,8 +111,7 @@ class NodalSpace:
             if nearest > MEANT * self.size:
                 raise InputError(
                     f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a "
-                    "point of "
-                    "the body"
+                    "point of the body"
                 )
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
             found[i] = -int(

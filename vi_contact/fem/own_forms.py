@@ -127,8 +127,7 @@ class OwnForms(ElasticForms):
         )
         notes = [
             f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave "
-            "speeds at "
-            f"boundaries by {waves}"
+            f"speeds at boundaries by {waves}"
         ]
         if not self.symmetric:
             notes.append(

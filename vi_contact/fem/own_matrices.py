@@ -86,8 +86,7 @@ def system_from_arrays(
         if one.csr.shape != (n, n):
             raise InputError(
                 f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square "
-                "matrices of "
-                "one size"
+                "matrices of one size"
             )
     given = {
         "coordinates": coordinates,
@@ -182,8 +181,7 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     if given["unknowns"] is None and n != k * d:
         raise InputError(
             f"{owner}: K has {n} rows, and {k} nodes have {k * d} components; give unknowns=, the "
-            "node "
-            "and the component of every row"
+            "node and the component of every row"
         )
     table = np.column_stack(np.divmod(np.arange(n), d))
     if given["unknowns"] is not None:
@@ -193,8 +191,7 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     if wrong.any():
         raise InputError(
             f"{owner}: row {np.argmax(wrong)} of unknowns is {table[wrong][0].tolist()}; give a "
-            "node from "
-            f"0 to {k - 1} and a component from -1 to {d - 1}"
+            f"node from 0 to {k - 1} and a component from -1 to {d - 1}"
         )
     places, counts = np.unique((block * d + component)[component >= 0], return_counts=True)
     if (counts > 1).any():

@@ -76,8 +76,7 @@ def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, 
     if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
         raise InputError(
             "the static stage and the problem have different contact points, perhaps because "
-            "clamped "
-            "nodes are left out: name the same points for both (points=)"
+            "clamped nodes are left out: name the same points for both (points=)"
         )
     return before, after
 
@@ -132,8 +131,7 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
     if missing[0] > BALANCED * max(missing[1:]):
         raise InputError(
             f"{missing[0]:.3g} N are missing where no support was released: give both stages the "
-            "same "
-            "materials, loads and friction, and a motion that starts from rest"
+            "same materials, loads and friction, and a motion that starts from rest"
         )
     log.info(
         "supports released: their reactions remain as nodal forces, the largest %.4g N", missing[2]
@@ -206,8 +204,7 @@ def _refuse_moved(
     if distance > BALANCED * size:
         raise InputError(
             f"a support or tie of the problem is {distance:.3g} m away from where the static stage "
-            "has "
-            "left the body: hold or tie it there in both stages, or free it in both"
+            "has left the body: hold or tie it there in both stages, or free it in both"
         )
 
 

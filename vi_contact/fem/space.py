@@ -75,8 +75,7 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     if np.isin(mine, rest).any():
         raise InputError(
             f"bodies_of: the cell group '{cells.name}' is a part of a body and shares nodes with "
-            "other "
-            "cells; give a group of whole bodies"
+            "other cells; give a group of whole bodies"
         )
     return tuple(mine.tolist())
 
@@ -92,8 +91,7 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     if found and system.algebra.comm.rank == 0:
         log.warning(
             "%s: %s of the system is not the one that fem.assemble made: this output uses the "
-            "materials, "
-            "section and damping given there",
+            "materials, section and damping given there",
             owner,
             " and ".join(found),
         )
@@ -244,8 +242,7 @@ class FemSpace(NodalSpace):
         for number in links.followers[held[0] != held[1]]:
             raise InputError(
                 f"component {number % self.dimension} of a tied node is prescribed on one side "
-                "only: "
-                "prescribe both sides alike, or tie the other components (components=)"
+                "only: prescribe both sides alike, or tie the other components (components=)"
             )
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         return np.isin(ids, links.followers[~held[0]])

@@ -116,8 +116,7 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indi
     if distance[worst] > near or len(set(partner)) < len(partner):
         raise InputError(
             f"node {at(first[1][worst])} of tied boundaries {names} has no partner opposite it on "
-            "the "
-            "other: mesh both sides alike"
+            "the other: mesh both sides alike"
         )
     components = np.array(components_of("tied", tie.components, dimension))
     one, two = (

@@ -58,15 +58,13 @@ def resampled(record: Record, dt: float) -> Record:
         near = record.dt / whole if dt < record.dt else record.dt * whole
         raise InputError(
             f"resampled: {dt!r} s and the record's step {record.dt!r} s have no ratio of whole "
-            "numbers "
-            f"up to {LARGEST_RATIO}; choose a step such as {near!r} s"
+            f"numbers up to {LARGEST_RATIO}; choose a step such as {near!r} s"
         )
     count = (record.acceleration.size - 1) * ratio.numerator // ratio.denominator + 1
     if count < 2:
         raise InputError(
             f"resampled: a step of {dt!r} s leaves one sample of a record of {record.duration!r} "
-            "s; "
-            "choose a shorter step"
+            "s; choose a shorter step"
         )
     samples = resample_poly(record.acceleration, ratio.numerator, ratio.denominator)[:count]
     return record.changed(samples, f"resampled from {record.dt:g} s to {dt:g} s", dt=float(dt))
@@ -206,8 +204,7 @@ def filtered(
     ):
         raise InputError(
             f"filtered: corners low={low!r} and high={high!r} Hz; give one or both, rising, "
-            "between 0 and "
-            f"the Nyquist frequency {nyquist:g} Hz"
+            f"between 0 and the Nyquist frequency {nyquist:g} Hz"
         )
     if order not in range(1, 11):
         raise InputError(f"filtered: order is {order!r}; give a whole number from 1 to 10")
@@ -254,8 +251,7 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
     if degree not in range(1, min(HIGHEST, record.acceleration.size - 1) + 1):
         raise InputError(
             f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, "
-            "below "
-            "the number of samples"
+            "below the number of samples"
         )
     powers = (record.times / record.duration)[:, None] ** np.arange(degree + 1)
     motions = [integrated(replace(record, acceleration=column)) for column in powers.T]

@@ -139,7 +139,6 @@ def canonical_units(source: str, units: str) -> str:
     if text is None:
         raise InputError(
             f"{source}: {units!r} is not a unit of acceleration known here; use a file of "
-            "accelerations "
-            f"in one of {', '.join(UNITS)}"
+            f"accelerations in one of {', '.join(UNITS)}"
         )
     return text

@@ -165,8 +165,7 @@ class Tabulated:
             if after <= before:
                 raise InputError(
                     f"Tabulated: times[{k + 1}] = {after!r} does not come after times[{k}] = "
-                    f"{before!r}; "
-                    "give strictly increasing times"
+                    f"{before!r}; give strictly increasing times"
                 )
 
     @property

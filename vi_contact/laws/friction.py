@@ -117,16 +117,14 @@ class SlipRateCoulomb:
         if found.dtype.kind not in "iuf" or found.shape not in ((), speed.shape):
             raise InputError(
                 f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for "
-                f"{len(speed)} "
-                "slip rates; return one real coefficient per rate"
+                f"{len(speed)} slip rates; return one real coefficient per rate"
             )
         found = np.broadcast_to(found.astype(float), speed.shape)
         wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
         if len(wrong):
             raise InputError(
                 f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it "
-                "return "
-                "zero or a positive finite number for every slip rate from 0 on"
+                "return zero or a positive finite number for every slip rate from 0 on"
             )
         return Coulomb(found)
 
@@ -233,8 +231,8 @@ def project(r_t: Array, limit: Array) -> Array:
     """
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
         raise InputError(
-            f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
-            "give one row of tangential components and one limit per node"
+            f"project: r_t has shape {r_t.shape} and limit {limit.shape}; give one row of "
+            "tangential components and one limit per node"
         )
     size = np.abs(r_t[:, 0]) if r_t.shape[1] == 1 else np.linalg.norm(r_t, axis=1)
     factor = np.divide(limit, size, out=np.ones(len(size)), where=size > limit)
@@ -248,8 +246,7 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
         if not 0.0 <= real(one) < math.inf:
             raise InputError(
                 f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one "
-                "per "
-                "point"
+                "per point"
             )
     return tuple(float(one) for one in value) if field else value
 

@@ -85,16 +85,14 @@ class Redistributed:
         elif largest(algebra.comm, still.any()):
             raise InputError(
                 "redistributed mass is for displacements only, and M has the inertia of rotations "
-                "or of "
-                "other unknowns: give the problem mass=ConsistentMass()"
+                "or of other unknowns: give the problem mass=ConsistentMass()"
             )
         # as of elements of higher order
         wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))
         if wrong and lumping:
             raise InputError(
                 f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have "
-                "them: "
-                "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()"
+                "them: give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()"
             )
         nodal = own if wrong else np.maximum(nodal, 0.0)
         inner = ~(contact | still)

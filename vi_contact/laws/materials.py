@@ -44,8 +44,7 @@ class LinearElastic:
         ):
             raise InputError(
                 "LinearElastic: E, nu, rho and xi are numbers; give fem.Heterogeneous(E, nu, rho, "
-                "xi) "
-                "where they change from place to place"
+                "xi) where they change from place to place"
             )
         number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
         number("LinearElastic", "Poisson's ratio nu", self.nu)
@@ -53,14 +52,12 @@ class LinearElastic:
         if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= self.rho <= EXTREME):
             raise InputError(
                 f"LinearElastic: no material has E = {self.E:g} Pa and rho = {self.rho:g} kg/m³; "
-                "give "
-                f"numbers between {1.0 / EXTREME:g} and {EXTREME:g}"
+                f"give numbers between {1.0 / EXTREME:g} and {EXTREME:g}"
             )
         if not -1.0 < self.nu < 0.5:
             raise InputError(
                 f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and "
-                "0.5, "
-                "both excluded (nearly incompressible materials need a mixed method)"
+                "0.5, both excluded (nearly incompressible materials need a mixed method)"
             )
         check_ratio("LinearElastic", self.xi)
 
@@ -277,8 +274,7 @@ class Rayleigh:
         if min(mass, stiffness) < -round_off:
             raise InputError(
                 f"Rayleigh.from_frequencies: ratios {xi1!r} at {f1!r} Hz and {xi2!r} at {f2!r} Hz "
-                "would "
-                "need a negative coefficient; keep xi2/xi1 between f1/f2 and f2/f1"
+                "would need a negative coefficient; keep xi2/xi1 between f1/f2 and f2/f1"
             )
         factor = 2.0 / (w2**2 - w1**2)
         return cls(alpha=factor * w1 * w2 * max(mass, 0.0), beta=factor * max(stiffness, 0.0))

@@ -69,16 +69,14 @@ class Orthotropic:
         if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
             raise InputError(
                 f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = "
-                f"{self.nu23:g} "
-                "some strain has no positive energy at these moduli; give ratios nu_ij well below "
-                "sqrt(E_i / E_j)"
+                f"{self.nu23:g} some strain has no positive energy at these moduli; give ratios "
+                "nu_ij well below sqrt(E_i / E_j)"
             )
         Q = self._rotation
         if not np.allclose(Q.T @ Q, np.eye(3), atol=1e-9) or np.linalg.det(Q) < 0.0:
             raise InputError(
                 "Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose "
-                "columns are "
-                "right-handed unit vectors at right angles"
+                "columns are right-handed unit vectors at right angles"
             )
 
     @property
@@ -129,8 +127,7 @@ class Orthotropic:
             if out.max() > ROUND_OFF * C.max():
                 raise InputError(
                     "Orthotropic: z is not one of the material axes, so the body would leave its "
-                    "plane; "
-                    "give the angle of axis 1 in the plane"
+                    "plane; give the angle of axis 1 in the plane"
                 )
             if isinstance(section, PlaneStress):
                 C = C - np.einsum("ij,kl->ijkl", C[:, :, 2, 2], C[2, 2]) / C[2, 2, 2, 2]

@@ -76,8 +76,7 @@ def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
     if not size:
         raise InputError(
             "with_weight: no unknown feels the weight, as its acceleration is zero or its bodies "
-            "are held "
-            "everywhere; leave it out"
+            "are held everywhere; leave it out"
         )
     # Body by body: of how many unknowns the constant load is the weight. Tractions touch few, a
     # weight nearly all.
@@ -91,6 +90,6 @@ def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
     if np.any((doubled > 0.0) & (doubled >= SHARE * having)):
         raise InputError(
             "with_weight: the system has this weight already among its constant loads, as a "
-            "BodyForce or "
-            "from an earlier with_weight, and would weigh twice as much; leave one of the two out"
+            "BodyForce or from an earlier with_weight, and would weigh twice as much; leave one of "
+            "the two out"
         )

@@ -58,10 +58,8 @@ class ChannelMesh:
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
             raise InputError(
                 f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a "
-                "slab of "
-                f"{self.slab} m does not fit a layer {self.depth} m deep: leave room inside it, "
-                "and soil "
-                "below it"
+                f"slab of {self.slab} m does not fit a layer {self.depth} m deep: leave room "
+                "inside it, and soil below it"
             )
         if not 0.0 < self.x[1] < self.x[4] < self.width:
             ends = f"from x = {self.x[1]} to {self.x[4]} m"

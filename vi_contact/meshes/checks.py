@@ -59,8 +59,7 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
             facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
             raise InputError(
                 f"boundary group '{name}' of {source} has {facets} no side of a cell: remove "
-                "duplicate "
-                "nodes, and curves or surfaces that do not bound the named cells"
+                "duplicate nodes, and curves or surfaces that do not bound the named cells"
             )
 
 

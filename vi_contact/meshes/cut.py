@@ -94,8 +94,7 @@ def cut_open(
         if name in arrays.facet_groups or name in arrays.cell_groups:
             raise InputError(
                 f"cut of '{group}': the mesh has a group '{name}' already, the name of a side of "
-                "the cut: "
-                "give one of them another name"
+                "the cut: give one of them another name"
             )
     if (inside is None) == (towards is None):
         raise InputError(
@@ -155,16 +154,14 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     for node in two[there > 1][:1]:
         raise InputError(
             f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet "
-            "there, "
-            f"and '{second}' can be welded to one only: weld these bodies first, or give "
+            f"there, and '{second}' can be welded to one only: weld these bodies first, or give "
             f"'{second}' first"
         )
     if distance.max(initial=0.0) > 1e-9 * size:
         where = at(arrays.points[two[np.argmax(distance)]])
         raise InputError(
             f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node "
-            "of "
-            f"'{first}': weld only sides that are divided alike"
+            f"of '{first}': weld only sides that are divided alike"
         )
     target = np.arange(len(arrays.points))
     target[two] = one[nearest]
@@ -215,8 +212,7 @@ def _joint(
     if np.any(first & second):
         raise InputError(
             f"cell groups '{names[0]}' and '{names[1]}' have common cells, so that nothing lies "
-            "between "
-            "them: give groups without common cells"
+            "between them: give groups without common cells"
         )
     joint = "_".join(names)
     if joint in arrays.facet_groups or joint in arrays.cell_groups:
@@ -232,8 +228,8 @@ def _joint(
     if not across.any():
         raise InputError(
             f"cell groups '{names[0]}' and '{names[1]}' have no common facet, so that there is "
-            "nothing to "
-            "cut: bodies with nodes of their own touch by their boundaries, contact_pair(…)"
+            "nothing to cut: bodies with nodes of their own touch by their boundaries, "
+            "contact_pair(…)"
         )
     return (
         replace(arrays, facet_groups=arrays.facet_groups | {joint: sides[one[across]]}),

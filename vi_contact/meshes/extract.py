@@ -217,8 +217,8 @@ def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, 
     if high:
         raise InputError(
             f"{source} has cells of an order above 2, or without all mid-points "
-            f"({names[high[0]]}): mesh "
-            "it with Mesh.ElementOrder = 1, or with 2 and Mesh.SecondOrderIncomplete = 0"
+            f"({names[high[0]]}): mesh it with Mesh.ElementOrder = 1, or with 2 and "
+            "Mesh.SecondOrderIncomplete = 0"
         )
     if len(elements) > 1:
         raise InputError(
@@ -272,8 +272,7 @@ def _flat(points: Array, d: int, source: str) -> Array:
         plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
         raise InputError(
             f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: "
-            "move it "
-            f"there, or name the {missing} as a physical group so that Gmsh saves its cells"
+            f"move it there, or name the {missing} as a physical group so that Gmsh saves its cells"
         )
     return np.ascontiguousarray(points[:, :d])
 

@@ -84,8 +84,7 @@ class GeoFile:
             Path(folder, "script.geo").write_text(script.text, encoding="utf-8")
             code = (
                 "import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import "
-                "mesh_here; "
-                f"mesh_here({self.refine}, {self.time_limit})"
+                f"mesh_here; mesh_here({self.refine}, {self.time_limit})"
             )
             command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
             try:
@@ -101,8 +100,7 @@ class GeoFile:
             except subprocess.TimeoutExpired:
                 raise InputError(
                     f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger "
-                    "cells, "
-                    "or give a longer time_limit"
+                    "cells, or give a longer time_limit"
                 ) from None
             if done.returncode:
                 how = (

@@ -367,8 +367,7 @@ def _sentence(refused: Sequence[tuple[Token, bool]]) -> str:
         them = "them" if len(others) > 1 else "it"
         parts.append(
             f"{places}{more}, and only words of geometry, sizes, groups and arithmetic are meshed "
-            "here: "
-            f"leave {them} out, or mesh the script yourself and give the .msh"
+            f"here: leave {them} out, or mesh the script yourself and give the .msh"
         )
     if values:
         first = {token.word: token.line for token, is_value in reversed(refused) if is_value}

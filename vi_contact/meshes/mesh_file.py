@@ -53,10 +53,8 @@ def _check_magic(data: mmap.mmap, file: Path) -> None:
     if data[: len(MAGIC)] != MAGIC:
         raise InputError(
             f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format "
-            "and "
-            "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of "
-            "geometry "
-            "alone as meshes.GeoFile"
+            "and may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo "
+            "of geometry alone as meshes.GeoFile"
         )
 
 

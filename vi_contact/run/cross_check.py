@@ -69,8 +69,7 @@ class CrossChecked:
         if not len(self.others):
             raise InputError(
                 "CrossChecked: others names no solver, so that nothing is compared; give one or "
-                "more, or "
-                "the first solver alone"
+                "more, or the first solver alone"
             )
         self.found = [Disagreement() for _ in self.others]
         self._earlier, self._last = self.found, (-1, 0.0)

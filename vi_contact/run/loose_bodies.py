@@ -106,9 +106,8 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
         if body.coinciding:
             yield (
                 f"{what}: {body.coinciding} of its nodes lie at the places of nodes of another "
-                "body, as of meshes that "
-                "are not merged: merge them (Coherence in Gmsh), or make a contact or a tie "
-                "between the two",
+                "body, as of meshes that are not merged: merge them (Coherence in Gmsh), or make a "
+                "contact or a tie between the two",
                 True,
             )
         else:

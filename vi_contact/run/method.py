@@ -178,6 +178,5 @@ def check_state(
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
         raise InputError(
             f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a "
-            "state "
-            "with every gap >= 0"
+            "state with every gap >= 0"
         )

@@ -141,8 +141,8 @@ class Proximal:
             return progress.best
         raise StepFailure(
             f"the static stage of a body held by contact alone was not solved ({why}): start "
-            "closer to "
-            "the obstacle, use stiffer supports, the solver Condensed(), or hold a part of the body"
+            "closer to the obstacle, use stiffer supports, the solver Condensed(), or hold a part "
+            "of the body"
         )
 
     def _iterate(self, answer: StepResult, progress: _Progress) -> None:
@@ -230,10 +230,8 @@ class Proximal:
             return
         raise InputError(
             f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither "
-            "contact nor "
-            "a prescribed displacement stops it: hold it there, change the loads, or start the "
-            "dynamics "
-            "from rest"
+            "contact nor a prescribed displacement stops it: hold it there, change the loads, or "
+            "start the dynamics from rest"
         )
 
     def _way(self, d: Array) -> str:

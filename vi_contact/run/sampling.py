@@ -76,8 +76,7 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
         if dt > spacing * (1.0 + ROUNDED):
             yield (
                 f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of "
-                f"{name}, whose "
-                f"peaks fall between the steps: take a dt of at most {spacing:g} s"
+                f"{name}, whose peaks fall between the steps: take a dt of at most {spacing:g} s"
             )
     elif isinstance(source, HalfSine | FullSine | Rectangular):
         period = source.duration * {HalfSine: 2.0, FullSine: 1.0}.get(type(source), FEWEST)
@@ -121,10 +120,8 @@ def _of_samples(spacing: float, dt: float) -> Iterator[str]:
     if dt > spacing * (1.0 + ROUNDED):
         yield (
             f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose "
-            "peaks fall between "
-            "the steps: take a shorter dt, or give resampled(record, dt), which filters out "
-            "frequencies that dt "
-            "cannot represent"
+            "peaks fall between the steps: take a shorter dt, or give resampled(record, dt), which "
+            "filters out frequencies that dt cannot represent"
         )
 
 
@@ -136,8 +133,7 @@ def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
     blind = round(halves) >= 1 and abs(halves - round(halves)) <= ROUNDED * halves
     why = (
         f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every "
-        "step sees the same "
-        "value, or zero"
+        "step sees the same value, or zero"
         if blind
         else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}"
     )

@@ -179,8 +179,7 @@ def opened(
     if changed and restart is False:
         raise InputError(
             "changed=True is for a run that is continued, and this one begins anew: give restart "
-            "too, or "
-            "leave it out"
+            "too, or leave it out"
         )
     end = WallTime(wall_time, runs)
     problem, scheme = with_defaults(problem, scheme, others)

@@ -121,10 +121,9 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
         return None
     return (
         f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest "
-        "energy of the run: "
-        "take a smaller dt (a wave should not cross more than two elements in a step) or, without "
-        "impact law, "
-        "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it"
+        "energy of the run: take a smaller dt (a wave should not cross more than two elements in a "
+        "step) or, without impact law, ContactStabilisedNewmark(), which creates none; HHT() and "
+        "HalvedAtImpact do not cure it"
     )
 
 

@@ -96,10 +96,8 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     if surface.comm.rank == 0:
         log.warning(
             "at rest at t = %g s %.3g %% of the contact area that touches at the start is open, "
-            "from %s on: "
-            "loads that lift a body do that; so does a side 1 with smaller facets than a softer "
-            "side 2, which "
-            "should be meshed as finely or be side 1",
+            "from %s on: loads that lift a body do that; so does a side 1 with smaller facets than "
+            "a softer side 2, which should be meshed as finely or be side 1",
             state.t,
             100.0 * lost / area,
             at(place),
@@ -197,8 +195,7 @@ def quasi_static(
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
         raise InputError(
             f"load steps have no slip rate for {problem.friction}: use Coulomb with the "
-            "coefficient of "
-            "slow sliding, or compute the history in time by march"
+            "coefficient of slow sliding, or compute the history in time by march"
         )
     if state is None:
         with together(problem.surface.comm):

@@ -155,8 +155,7 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
             goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
             raise InputError(
                 f"{goal} has more than {LARGEST:.0e} steps of dt = {size:g} s: give a larger dt or "
-                "end "
-                "earlier"
+                "end earlier"
             )
         if done or not parts:
             parts.append((size, done))

@@ -38,8 +38,8 @@ class SingleStep:
         if problem.equations.massless is not None:
             raise InputError(
                 f"{type(self).__name__} needs mass at the contact nodes, else their forces "
-                "oscillate: "
-                "give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()"
+                "oscillate: give the problem mass=ConsistentMass(), or use the default scheme "
+                "Trapezoidal()"
             )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
@@ -134,8 +134,7 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     if massless and problem.impact is not None:
         raise InputError(
             f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in "
-            "this "
-            "problem: leave the law out, or give the problem mass=ConsistentMass()"
+            "this problem: leave the law out, or give the problem mass=ConsistentMass()"
         )
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
@@ -155,6 +154,6 @@ def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     if layer is not None and surface.some(~layer[surface.owned]):
         raise InputError(
             "rows of M are zero while contact nodes have mass: condense these unknowns out of K "
-            "(it is "
-            "exact, as for rotations of a lumped beam), give them mass, or use mass=Redistributed()"
+            "(it is exact, as for rotations of a lumped beam), give them mass, or use "
+            "mass=Redistributed()"
         )

@@ -187,9 +187,8 @@ class GeneralisedAlpha(AlphaStep):
             )
             raise InputError(
                 f"{told} are not unconditionally stable, and contact has no highest frequency to "
-                "choose "
-                "dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= "
-                "gamma/2"
+                "choose dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, "
+                "beta >= gamma/2"
             )
 
     @property

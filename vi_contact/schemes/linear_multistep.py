@@ -70,8 +70,7 @@ class LinearMultistep(BalanceStep):
         if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
             raise InputError(
                 "LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit "
-                "schemes "
-                "can hold contact"
+                "schemes can hold contact"
             )
         level = -np.arange(q + 1.0)
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
@@ -86,16 +85,13 @@ class LinearMultistep(BalanceStep):
         if not np.max(np.abs(defects)) <= 1e-12 * scale * (q + 1) ** 2:
             raise InputError(
                 "LinearMultistep coefficients are inconsistent: give some for which eq. 11a is "
-                "exact for "
-                "u = 1, t and eq. 11b for u = 1, t, t²"
+                "exact for u = 1, t and eq. 11b for u = 1, t, t²"
             )
         if self.spectral_radius() > 1.0 + 1e-6:
             raise InputError(
                 f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not "
-                "unconditionally "
-                "stable: contact has no highest frequency to choose dt by; take other "
-                "coefficients, for "
-                "Newmark beta >= gamma/2 >= 1/4"
+                "unconditionally stable: contact has no highest frequency to choose dt by; take "
+                "other coefficients, for Newmark beta >= gamma/2 >= 1/4"
             )
 
     def spectral_radius(self) -> float:

@@ -77,8 +77,7 @@ class MoreauJean(SingleStep):
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
             raise InputError(
                 f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give "
-                "theta "
-                f"from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True"
+                f"theta from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True"
             )
 
     def check(self, problem: ContactProblem) -> None:
@@ -96,14 +95,12 @@ class MoreauJean(SingleStep):
         if problem.impact is not None:
             raise InputError(
                 f"MoreauJean has its own restitution coefficient and {problem.impact} would act on "
-                "top of "
-                "it: leave the impact law out, and give MoreauJean(e=…)"
+                "top of it: leave the impact law out, and give MoreauJean(e=…)"
             )
         if surface.some(surface.bilateral & (surface.gap0 > 0.0)):
             raise InputError(
                 "MoreauJean holds the velocity of bilateral points and would never close their "
-                "initial "
-                "gap: let them start on the obstacle, or use another scheme"
+                "initial gap: let them start on the obstacle, or use another scheme"
             )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:

@@ -44,8 +44,7 @@ class SS22(SingleStep):
         if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
             raise InputError(
                 f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give "
-                "theta2 >= "
-                "theta1 >= 0.5, the unconditionally stable range"
+                "theta2 >= theta1 >= 0.5, the unconditionally stable range"
             )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:

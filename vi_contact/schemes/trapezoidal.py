@@ -55,8 +55,7 @@ class Trapezoidal:
         if self.mass not in (Redistributed(), problem.mass):
             raise InputError(
                 f"Trapezoidal: mass={self.mass} is not read, as the problem has "
-                f"mass={problem.mass}: "
-                "leave one of the two out"
+                f"mass={problem.mass}: leave one of the two out"
             )
         check_balance("Trapezoidal()", problem)
 

@@ -58,8 +58,7 @@ class CompanionRun:
         if isinstance(dt, HalvedAtImpact):
             raise InputError(
                 f"{self.name} is computed beside the run and needs its time steps beforehand, but "
-                "the "
-                f"run has {dt!r}: give dt as a number or a Schedule"
+                f"the run has {dt!r}: give dt as a number or a Schedule"
             )
         self._bound = scheme, dt
         # the last piece does not end: only the times of a run are asked for
@@ -81,9 +80,8 @@ class CompanionRun:
         if self._bound is None:
             raise InputError(
                 f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: "
-                "give "
-                "it to a run as it is, not inside a function of your own, or call bind(scheme, dt) "
-                "first"
+                "give it to a run as it is, not inside a function of your own, or call "
+                "bind(scheme, dt) first"
             )
         while self._t[-1] < t:
             state, _ = next(self._steps)

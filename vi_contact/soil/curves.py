@@ -47,8 +47,7 @@ class SoilCurves:
         if len(strain) < 2 or strain[0] <= 0.0 or np.any(np.diff(strain) <= 0.0):
             raise InputError(
                 f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more "
-                "rising "
-                "numbers above zero"
+                "rising numbers above zero"
             )
         if (
             np.any(np.diff(reduction) > 0.0)
@@ -57,14 +56,13 @@ class SoilCurves:
         ):
             raise InputError(
                 f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax "
-                "that "
-                f"falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller strains"
+                f"that falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller "
+                "strains"
             )
         if damping.min() < 0.0 or damping.max() >= 0.5:
             raise InputError(
                 f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from "
-                "0 to "
-                "less than 1/2, not per cent"
+                "0 to less than 1/2, not per cent"
             )
         for name, values in (("strain", strain), ("reduction", reduction), ("damping", damping)):
             object.__setattr__(self, name, tuple(values.tolist()))
@@ -108,8 +106,7 @@ class SoilCurves:
         if index > known["plasticity"][-1]:
             raise InputError(
                 f"SoilCurves.vucetic_dobry: the plasticity index is {index:g} %, and the curves "
-                "end at "
-                f"{known['plasticity'][-1]} %: give SoilCurves of your own"
+                f"end at {known['plasticity'][-1]} %: give SoilCurves of your own"
             )
         reduction, damping = (
             [float(np.interp(index, known["plasticity"], one)) for one in np.transpose(known[name])]
@@ -175,8 +172,8 @@ class SoilCurves:
             if strain <= self.strain[-1]
             else (
                 f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and "
-                f"'{self.name}' ends at "
-                f"{100.0 * self.strain[-1]:.3g} %; give a weaker motion, or curves that go further"
+                f"'{self.name}' ends at {100.0 * self.strain[-1]:.3g} %; give a weaker motion, or "
+                "curves that go further"
             )
         )
 

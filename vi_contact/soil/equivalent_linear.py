@@ -108,8 +108,7 @@ def equivalent_linear(
         if material.xi:
             raise InputError(
                 f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and "
-                "the "
-                "curves of the layer give its damping; leave xi out"
+                "the curves of the layer give its damping; leave xi out"
             )
     instance(owner, "record", record, Record, "give a Record, such as read_record returns")
     optional(instance, owner, "rock", rock, LinearElastic, "give a LinearElastic, or None")
@@ -117,14 +116,12 @@ def equivalent_linear(
     if rock is None and rock_damping not in (0.0, ROCK_DAMPING):
         raise InputError(
             f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or "
-            "leave "
-            "it out"
+            "leave it out"
         )
     if rock is not None and rock.xi:
         raise InputError(
             f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; "
-            "give "
-            "rock_damping, and leave xi out"
+            "give rock_damping, and leave xi out"
         )
     optional(number, owner, "frequency", frequency, positive=True)
     number(owner, "ratio", ratio, positive=True)

@@ -111,14 +111,12 @@ class FreeFieldSide:
         if not compliant and held < 2:
             raise InputError(
                 f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the "
-                "base, "
-                "or give the side its CompliantBase"
+                "base, or give the side its CompliantBase"
             )
         if compliant and held:
             raise InputError(
                 f"the lowest node of free-field side '{name}' is held, but its base is compliant: "
-                "leave "
-                "the base free"
+                "leave the base free"
             )
 
     def _problem(self) -> ContactProblem:
@@ -189,8 +187,7 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
     if np.isnan(rows).any():
         raise InputError(
             f"free-field side '{name}' stands beside orthotropic cells, and its soil column is "
-            "isotropic: "
-            "put a LinearElastic there, or Dashpots(…, material=)"
+            "isotropic: put a LinearElastic there, or Dashpots(…, material=)"
         )
     x, close = rows[:, 7:9], 1e-9 * space.size
     if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):

@@ -147,6 +147,5 @@ def _refuse_lost_ratios(
         if not largest(comm, outside) and isinstance(one, LinearElastic) and one.xi:
             raise InputError(
                 f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, "
-                "and the "
-                "curves of its cells give another one; leave xi out there"
+                "and the curves of its cells give another one; leave xi out there"
             )

@@ -127,6 +127,5 @@ def refuse_matrix(problem: ContactProblem, A: EffectiveMatrix) -> None:
     place = _place(comm, wrong, None if A.space is None else A.space.coordinates)
     raise InputError(
         f"the matrix of the steps{whose} has NaN or infinite entries{place}: check materials, "
-        "masses, "
-        "damping, contact directions and the time step"
+        "masses, damping, contact directions and the time step"
     )

@@ -315,8 +315,7 @@ class Problem:
         except (TypeError, ValueError):
             raise refused(
                 f"{name} is {shown(given)}; give a Function on u.function_space itself, a number "
-                "(or "
-                f"{width}, one for a component), or None"
+                f"(or {width}, one for a component), or None"
             ) from None
 
 

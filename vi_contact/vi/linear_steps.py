@@ -43,8 +43,7 @@ class LinearSteps:
         if self.given and isinstance(self.given[0], TaoTron) and not symmetric:
             raise refused(
                 f"{self.given[0]} minimises, and the form is not symmetric, so there is nothing to "
-                "minimise: "
-                "leave method out, or take ReducedNewton() or SemismoothNewton()"
+                "minimise: leave method out, or take ReducedNewton() or SemismoothNewton()"
             )
         suited: list[Method] = (
             [TaoTron(), ReducedNewton()] if symmetric else [ReducedNewton(), SemismoothNewton()]

@@ -72,8 +72,7 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
     refuse(
         [
             f"the mid-point {at(one)} on '{facets.name}' is prescribed and the ends of its edge "
-            "are not: prescribe all "
-            "nodes of an edge, or none"
+            "are not: prescribe all nodes of an edge, or none"
             for one in where
         ],
         space.comm,

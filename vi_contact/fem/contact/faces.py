@@ -320,8 +320,7 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
         places = ", ".join(at(point) for point in some) + (", …" if len(numbers) > NAMED else "")
         log.info(
             "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition "
-            "for every face: "
-            "%s",
+            "for every face: %s",
             name,
             np.degrees(angle),
             len(numbers),

@@ -135,8 +135,7 @@ class NodalFrames:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
             raise InputError(
                 f"contact node {at(self.points[slot])} is also prescribed along its contact "
-                "direction: "
-                "free that component or leave the node out of the contact surface"
+                "direction: free that component or leave the node out of the contact surface"
             )
 
     def _refuse_dependent(self, slots: Indices) -> None:
@@ -147,16 +146,15 @@ class NodalFrames:
         if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(
                 f"{where} is on several contact surfaces with one contact direction: list every "
-                "boundary "
-                "and every pair once, and join boundaries that continue one another in one group"
+                "boundary and every pair once, and join boundaries that continue one another in "
+                "one group"
             )
         if k > d or np.linalg.svd(directions, compute_uv=False)[-1] < INDEPENDENT:
             raise InputError(
                 f"{where} has {k} contact directions, "
-                f"{'more than' if k > d else 'not independent in'} "
-                f"its {d} dimensions: treat the corner as smooth (a larger feature_angle=), or "
-                "leave the "
-                "node out of some of its surfaces (points=)"
+                f"{'more than' if k > d else 'not independent in'} its {d} dimensions: treat the "
+                "corner as smooth (a larger feature_angle=), or leave the node out of some of its "
+                "surfaces (points=)"
             )
 
 
@@ -336,10 +334,7 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
                 )
             raise InputError(
                 f"{where} is on side 1 of one contact pair and on side 2 of another: where cracks "
-                "cross, "
-                "give each arm a group and a cut of its own, with matching=NodeToNode() and sides "
-                "that "
-                "take turns round the crossing; else exchange the sides of one pair, or give it "
-                "once if "
-                "both are the same"
+                "cross, give each arm a group and a cut of its own, with matching=NodeToNode() and "
+                "sides that take turns round the crossing; else exchange the sides of one pair, or "
+                "give it once if both are the same"
             )

@@ -126,10 +126,8 @@ class NodeToNode:
         if len(missing):
             raise InputError(
                 f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of "
-                f"'{two.name}' "
-                f"opposite, the first at {at(one.nodes.points[missing[0]])}: mesh both sides "
-                "alike, make "
-                "the smaller side the first, or use matching=DualMortar()"
+                f"'{two.name}' opposite, the first at {at(one.nodes.points[missing[0]])}: mesh "
+                "both sides alike, make the smaller side the first, or use matching=DualMortar()"
             )
         first, counts = np.unique(partner, return_counts=True)
         if counts.max() > 1:
@@ -251,8 +249,7 @@ def refuse_same_way(one: str, two: str, point: Array) -> None:
     """Raise InputError for sides whose outward normals point the same way."""
     raise InputError(
         f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same "
-        "way: "
-        "choose the two boundaries between the bodies"
+        "way: choose the two boundaries between the bodies"
     )
 
 

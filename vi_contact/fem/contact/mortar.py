@@ -69,9 +69,8 @@ class DualMortar:
         if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
             raise InputError(
                 f"DualMortar joins facets of first order and those of '{one.name}' and "
-                f"'{two.name}' have "
-                "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use "
-                "degree=1"
+                f"'{two.name}' have mid-points (degree=2): mesh both sides alike for "
+                "matching=NodeToNode(), or use degree=1"
             )
         found = in_space(one, two) if d == 3 else _in_plane(one, two)
         D = found.D
@@ -91,8 +90,7 @@ def _refuse(one: Side, two: Side) -> None:
         refuse_same_way(one.name, two.name, one.nodes.points[0])
     raise InputError(
         f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: "
-        "choose the "
-        "two boundaries between the bodies"
+        "choose the two boundaries between the bodies"
     )
 
 

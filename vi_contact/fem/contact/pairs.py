@@ -186,8 +186,7 @@ def _checked_pair(
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
         raise InputError(
             "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
-            "both "
-            "sides alike, or use degree=1"
+            "both sides alike, or use degree=1"
         )
     return space, angle
 
@@ -202,8 +201,7 @@ def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side,
     if shared.all():
         raise InputError(
             f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
-            "mesh the "
-            "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
+            "mesh the bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
         )
     _refuse_common(one, two)
     return one, two, shared
@@ -255,10 +253,8 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
         where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
         log.warning(
             "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of "
-            "their facets, "
-            "and no whole facet is near: their pressures are left out of the largest ones; make "
-            "'%s' the first "
-            "side, or mesh '%s' finer",
+            "their facets, and no whole facet is near: their pressures are left out of the largest "
+            "ones; make '%s' the first side, or mesh '%s' finer",
             len(little),
             one.name,
             where,
@@ -356,8 +352,7 @@ def _refuse_common(one: Side, two: Side) -> None:
         where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
         raise InputError(
             f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch "
-            "itself, "
-            "so list it on one side only"
+            "itself, so list it on one side only"
         )
 
 
@@ -381,8 +376,8 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(
                 f"'{one.name}' turns round and meets itself at {at(again)}: give it as two "
-                "boundaries "
-                "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)"
+                "boundaries (fem.joined_surfaces), or treat the corner as smooth (a larger "
+                "feature_angle=)"
             )
         tied = None if one.tied is None else one.tied[used]
         found.append(
@@ -464,8 +459,7 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
     if len(lost):
         raise InputError(
             f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free "
-            "node of "
-            f"'{two.name}': make '{two.name}' the first side, or clamp less"
+            f"node of '{two.name}': make '{two.name}' the first side, or clamp less"
         )
     if clamped.all():
         raise InputError(
@@ -490,13 +484,10 @@ def _gap(
         worst = int(np.argmax(behind))
         raise InputError(
             f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: "
-            "the "
-            "bodies overlap there, or these are not the boundaries between them; choose the sides "
-            "that "
-            "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the "
-            "strain of "
-            "the body that is too large, or by quasi_static on surface.moving(towards=…), its "
-            "overlap"
+            "the bodies overlap there, or these are not the boundaries between them; choose the "
+            "sides that face, or draw the bodies in touch and make a press fit by "
+            "fem.InitialStrain, the strain of the body that is too large, or by quasi_static on "
+            "surface.moving(towards=…), its overlap"
         )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning(

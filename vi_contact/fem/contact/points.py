@@ -140,8 +140,7 @@ def _nodes(
     for number in numbers[found[:, 0] == 0.0]:
         raise InputError(
             f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers "
-            "from 0 "
-            "on, in the order of its coordinates"
+            "from 0 on, in the order of its coordinates"
         )
     points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)
     return Nodes(numbers, points, normals, weights, held > 0.0, unknowns.astype(np.int64))

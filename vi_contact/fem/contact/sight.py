@@ -74,8 +74,7 @@ def facets_of(side: Side, sense: int) -> Facets:
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
         raise InputError(
             f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal "
-            "cannot "
-            "be trusted, so mesh this boundary again"
+            "cannot be trusted, so mesh this boundary again"
         )
     return Facets(nodes[:, ::sense], corners[:, ::sense], middles, normals, reach)
 

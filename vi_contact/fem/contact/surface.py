@@ -355,8 +355,7 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     if largest(space.comm, not weights.all()):
         raise InputError(
             f"boundary group '{facets.name}' lies inside the body, where cells on both sides share "
-            "its "
-            "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
+            "its nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
         )
     length = np.linalg.norm(sums, axis=1)[:, None]
     normals = in_symmetry_planes(sums / np.maximum(length, np.finfo(float).tiny), held)
@@ -372,8 +371,7 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     if not largest(space.comm, (~clamped).any()):
         raise InputError(
             f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point "
-            "cannot "
-            "be clamped and in contact: choose another boundary or clamp less"
+            "cannot be clamped and in contact: choose another boundary or clamp less"
         )
     if count:
         log.info("%d clamped nodes of '%s' are left out of the contact surface", count, name)
@@ -395,8 +393,7 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         if distance[row] > 0.05 * space.size:
             raise InputError(
                 f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group "
-                f"'{name}': "
-                "give a point on it"
+                f"'{name}': give a point on it"
             )
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
             log.warning(
@@ -409,8 +406,7 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         if row in rows:
             raise InputError(
                 f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list "
-                "each "
-                "once"
+                "each once"
             )
         rows.append(row)
     if not rows:
@@ -447,8 +443,7 @@ def merged(
             )
             raise InputError(
                 f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing "
-                "the "
-                f"others as points=, or {remedy}"
+                f"the others as points=, or {remedy}"
             )
         target[row] = alike[turn.argmax()]
     kept, place = np.unique(target, return_inverse=True)

@@ -98,10 +98,8 @@ class Watched:
         what = "its obstacle" if self.side is None else f"'{self.side}'"
         raise InputError(
             f"contact node {at(point)} of '{self.name}' is prescribed in every component and is "
-            "driven "
-            f"{depth:.3g} m into {what} at t = {t:.6g} s: prescribe a motion that keeps off, or "
-            "only the "
-            "components at right angles to its contact direction"
+            f"driven {depth:.3g} m into {what} at t = {t:.6g} s: prescribe a motion that keeps "
+            "off, or only the components at right angles to its contact direction"
         )
 
     def _towards(self, t: float) -> tuple[Array, float]:

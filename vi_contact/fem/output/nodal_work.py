@@ -119,8 +119,8 @@ class NodalWork:
             text = ", ".join(f"{x:.4g}" for x in theirs)
             log.warning(
                 "%s: the system has constant loads of (%s) N in all, and none were given here: if "
-                "they act on "
-                "these elements, give the loads of fem.assemble or the gravity of with_weight",
+                "they act on these elements, give the loads of fem.assemble or the gravity of "
+                "with_weight",
                 owner,
                 text,
             )
@@ -132,16 +132,14 @@ class NodalWork:
         ):
             raise InputError(
                 "section forces: the part of a LinearForm on the cells of a cut is unknown; give "
-                "these "
-                "loads as Traction and BodyForce, or record Reactions"
+                "these loads as Traction and BodyForce, or record Reactions"
             )
         forms, ours = [*self._forms, *self._load_forms], self.space.forms
         if not ours.densities and any(beyond for *_, beyond in parts):
             raise InputError(
                 "a section goes through elements, and with forms=… the mass of their parts is "
-                "unknown: "
-                "let it run along element sides, or give a material for the density in place of "
-                "mass="
+                "unknown: let it run along element sides, or give a material for the density in "
+                "place of mass="
             )
         densities = [
             (ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")

@@ -102,8 +102,7 @@ class Reactions:
         if not largest(space.comm, held.any()):
             raise InputError(
                 f"nothing is prescribed on boundary group '{self.facets.name}', and it has no "
-                "dashpots, "
-                "so it has no reactions: give a boundary that is held"
+                "dashpots, so it has no reactions: give a boundary that is held"
             )
         self._parts = {1: ["x"], 2: ["x", "y", "M"], 3: ["x", "y", "z", "M_x", "M_y", "M_z"]}[
             space.dimension

@@ -93,8 +93,8 @@ class SectionForces:
             if len(shape) == 2 and shape not in ((2, 2), (3, 3)):
                 raise InputError(
                     f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} "
-                    "coordinates; "
-                    "give 2 ends (x, y) in the plane, 3 corners (x, y, z) of a rectangle in space"
+                    "coordinates; give 2 ends (x, y) in the plane, 3 corners (x, y, z) of a "
+                    "rectangle in space"
                 )
             d = 3 if shape[:1] == (3,) else 2
             array(
@@ -174,8 +174,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     if len(corners) != space.dimension:
         raise InputError(
             f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of "
-            "a "
-            f"rectangle in space; this mesh has {space.dimension} dimensions"
+            f"a rectangle in space; this mesh has {space.dimension} dimensions"
         )
     axes, size = axes_of(name, corners)
     # a rectangle may be much larger than the body
@@ -208,10 +207,9 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     cover = through + max(left, right)
     if not cover > 0.0 or (space.dimension == 2 and abs(cover - size[0]) > UNCOVERED * size[0]):
         raise InputError(
-            f"section '{name}': elements cover {cover:.4g} of its {size.prod():.4g} m"
-            f"{'²' * (space.dimension - 2)}: let it reach from one surface of the group of cells "
-            "to the "
-            "other"
+            f"section '{name}': elements cover {cover:.4g} of its {size.prod():.4g} "
+            f"m{'²' * (space.dimension - 2)}: let it reach from one surface of the group of cells "
+            "to the other"
         )
     sign = 1.0 if left >= right else -1.0
     away, at = level(space.points), (space.points - corners[0]) @ axes[1:].T

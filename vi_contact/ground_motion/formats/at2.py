@@ -104,8 +104,7 @@ def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | No
         if known_units(units) is not None and known_units(units) != known_units(found[0][1]):
             raise InputError(
                 f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} "
-                "states "
-                f"them as {found[0][1]}; correct the file, or get it again"
+                f"states them as {found[0][1]}; correct the file, or get it again"
             )
     return found[0] if found else (None, None)
 

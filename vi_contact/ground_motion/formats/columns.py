@@ -89,8 +89,7 @@ def read(text: TextFile) -> Record:
     if len(rows[-1]) != len(rows[0]):
         raise InputError(
             f"{text.at(lines[-1])}: {len(rows[-1])} columns instead of {len(rows[0])}; a value is "
-            "missing, "
-            "get the complete file"
+            "missing, get the complete file"
         )
     return _component(text, header, lines, np.array(rows), found, leading)
 
@@ -288,8 +287,7 @@ def _is_series(
     if components or width < 4 and along < across / INTERLEAVED:
         raise InputError(
             f"{text.at(lines[0])}: {width} columns of which none is a time ({names}); pass "
-            "channel= for one "
-            "of them, or write one value a line where the rows follow one another"
+            "channel= for one of them, or write one value a line where the rows follow one another"
         )
     found.doubts.append(
         f"rows of {width} values are read one after the other; if the columns are components, pass "
@@ -321,8 +319,8 @@ def _series(
     ):
         raise InputError(
             f"{text.at(lines[0])}: {shown(text.lines[lines[0]].strip())} are whole numbers and "
-            "others are "
-            "not, so that they may belong to the header; begin lines of the header with #"
+            "others are not, so that they may belong to the header; begin lines of the header with "
+            "#"
         )
     if text.channel is not None:
         text.chosen(["acceleration"])
@@ -448,8 +446,7 @@ def _timed(
     elif stated is not None:
         raise InputError(
             f"{text.at(found.step[0] if found.step else 0)}: the header states a time step of "
-            f"{stated:g} s "
-            f"but the times count up by {step:g} s; correct the file, or get it again"
+            f"{stated:g} s but the times count up by {step:g} s; correct the file, or get it again"
         )
     if times[0] != 0.0:
         found.notes.append(f"the first time in the file is {seconds[0]:g} s and is t = 0 here")

@@ -106,10 +106,8 @@ def read(text: TextFile) -> Record:
     if not blocks:
         raise InputError(
             f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points "
-            "of accel "
-            "data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not "
-            "read, "
-            "write columns of time and acceleration"
+            "of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts "
+            "are not read, write columns of time and acceleration"
         )
     block = blocks[text.chosen([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
@@ -210,8 +208,7 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
         if fields != wanted:
             raise InputError(
                 f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
-                f"{index + 1} "
-                f"holds {fields} of them instead of {wanted:g}; get the complete file"
+                f"{index + 1} holds {fields} of them instead of {wanted:g}; get the complete file"
             )
         row = text.fixed(index, block.width)
         if unknown in row:
@@ -228,8 +225,7 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     ):
         raise InputError(
             f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
-            f"{block.end + 1} "
-            "holds more of them; get the complete file"
+            f"{block.end + 1} holds more of them; get the complete file"
         )
     return values, lines
 

@@ -35,8 +35,7 @@ def read(text: TextFile) -> Record:
     if first.lower() != "time" or not names:
         raise InputError(
             f"{text.at(sequence_line)}: the columns {sequence!r} do not begin with the time; get "
-            "the file "
-            "again"
+            "the file again"
         )
     form_line, form = text.entry(header, "DATA")
     if not (match := _FORMAT.match(form)) or int(match[1]) != len(names) + 1:
@@ -54,8 +53,7 @@ def read(text: TextFile) -> Record:
         if len(row) != len(names) + 1:
             raise InputError(
                 f"{text.at(index)}: {len(row)} values instead of {len(names) + 1}; a value is "
-                "missing or "
-                "too many, get the complete file"
+                "missing or too many, get the complete file"
             )
         rows.append(row)
     rate_line, rate = (
@@ -71,16 +69,14 @@ def read(text: TextFile) -> Record:
     if not abs(len(rows) - seconds * rate) <= 0.5:
         raise InputError(
             f"{text.at(text.entry(header, 'RECORDLENGTH(SEC)')[0])}: {seconds:g} s at {rate:g} Hz "
-            "are "
-            f"announced but {len(rows)} samples follow; get the complete file"
+            f"are announced but {len(rows)} samples follow; get the complete file"
         )
     table = np.array(rows)
     step, rounding, uneven = time_step(text, lines, table[:, 0], decimals=int(match[3]))
     if uneven or not math.isclose(step, 1.0 / rate, rel_tol=max(rounding, SAME_STEP)):
         raise InputError(
             f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} "
-            "s; get the "
-            "complete file"
+            "s; get the complete file"
         )
     units_line, units = text.entry(header, "AMPLITUDEUNIT")
     unit = _UNIT.match(units)

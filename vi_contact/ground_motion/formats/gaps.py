@@ -39,8 +39,7 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
         if abs(values[k]) > (1.0 if whole else 1.5) * most or apart:
             raise InputError(
                 f"{place(int(k))}: the sample {values[k]:.10g} stands for a missing value; fill "
-                "the gap "
-                "or use another record"
+                "the gap or use another record"
             )
 
 

@@ -83,8 +83,7 @@ def read(text: TextFile) -> Record:
     if count[1] != part.counts[0]:
         raise InputError(
             f"{text.at(count[0])}: {count[1]:g} points are announced but the integers of the "
-            "header say "
-            f"{part.counts[0]}; get the file again"
+            f"header say {part.counts[0]}; get the file again"
         )
     step = _first(text, header, _STEP, "the interval of the samples")
     _check_step(text, part, step, count[1])
@@ -147,9 +146,8 @@ def _parts(text: TextFile) -> Iterator[_Part]:
         if part.counts[0] < 2 or min(part.counts) < 0 or part.end > total:
             raise InputError(
                 f"{text.at(start + TEXT_LINES + 3)}: {part.counts[0]} accelerations, "
-                f"{part.counts[1]} "
-                f"velocities and {part.counts[2]} displacements are announced but the file has "
-                f"{total - part.data} lines for them; get the complete file"
+                f"{part.counts[1]} velocities and {part.counts[2]} displacements are announced but "
+                f"the file has {total - part.data} lines for them; get the complete file"
             )
         yield part
         start = part.end
@@ -163,8 +161,7 @@ def _fields(text: TextFile, start: int, lines: int) -> list[float]:
         if len(row) != PER_LINE:
             raise InputError(
                 f"{text.path}, line {index + 1}: {len(row)} header values instead of {PER_LINE}; "
-                "get the "
-                "file again"
+                "get the file again"
             )
         values += row
     return values
@@ -179,8 +176,7 @@ def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
         if len(row) != wanted:
             raise InputError(
                 f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is "
-                "missing "
-                "or too many, get the complete file"
+                "missing or too many, get the complete file"
             )
         values += row
         lines += [index] * len(row)
@@ -220,6 +216,5 @@ def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: flo
             if not abs(seconds - count * step[1]) <= 1.01 * step[1] + 0.01:
                 raise InputError(
                     f"{text.at(place)}: {seconds:g} s are announced but {count:g} points at "
-                    f"{step[1]:g} s "
-                    "follow; get the complete file"
+                    f"{step[1]:g} s follow; get the complete file"
                 )

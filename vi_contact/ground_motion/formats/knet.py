@@ -60,8 +60,7 @@ def read(text: TextFile) -> Record:
     if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(
             f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are "
-            "announced but "
-            f"{len(counts)} samples follow; get the complete file"
+            f"announced but {len(counts)} samples follow; get the complete file"
         )
     lines = tuple(" ".join(line.split()) for line in text.heads[: header["Memo."]])
     time, station, direction = (text.heads[header[key]][len(key) :].strip() for key in KEYS[:3])

@@ -58,8 +58,7 @@ def read_record(
     if channel is not None and reader not in (*SEVERAL, columns):
         raise InputError(
             f"{text.path}: channel={shown(channel)} was passed but the file holds one record; "
-            "leave "
-            "channel out"
+            "leave channel out"
         )
     number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = reader.read(text)
@@ -67,23 +66,19 @@ def read_record(
     if peak > largest:
         raise InputError(
             f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = "
-            f"{peak:.4g} m/s2 "
-            f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the "
-            "motion "
-            "is that strong"
+            f"{peak:.4g} m/s2 if the unit is {record.units}; give the right units=, or largest= in "
+            "m/s2 where the motion is that strong"
         )
     if 0.0 < peak < DOUBTED[0] or peak > DOUBTED[1]:
         doubt = (
             f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the "
-            "unit, which "
-            f"comes from: {record.units_from}"
+            f"unit, which comes from: {record.units_from}"
         )
         record = replace(record, doubts=(*record.doubts, doubt))
     if not STEPS[0] <= record.dt <= STEPS[1]:
         raise InputError(
             f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; "
-            "give "
-            f"seconds from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples"
+            f"give seconds from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples"
         )
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)

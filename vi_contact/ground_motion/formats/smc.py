@@ -42,8 +42,7 @@ def read(text: TextFile) -> Record:
     if kind.upper().startswith("1"):
         raise InputError(
             f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before "
-            "instrument "
-            "correction; get the file of type '2 CORRECTED ACCELEROGRAM'"
+            "instrument correction; get the file of type '2 CORRECTED ACCELEROGRAM'"
         )
     if not kind.upper().startswith("2"):
         raise InputError(
@@ -60,8 +59,7 @@ def read(text: TextFile) -> Record:
     ):
         raise InputError(
             f"{text.at(TEXT_LINES + 1)}: the header announces {integers[COMMENTS]:g} comment lines "
-            "but "
-            "as many lines starting with '|' do not follow; get the file again"
+            "but as many lines starting with '|' do not follow; get the file again"
         )
     rate = reals[SAMPLING_RATE]
     stated = 1.0 / rate if 0.0 < rate < UNDEFINED else None

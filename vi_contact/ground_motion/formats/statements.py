@@ -157,8 +157,7 @@ def agreed(
         if abs(value - found[0][1]) > rounding * abs(found[0][1]):
             raise InputError(
                 f"{text.at(index)}: the header states {what} as {value:g}, but line "
-                f"{found[0][0] + 1} "
-                f"states it as {found[0][1]:g}; correct the file, or get it again"
+                f"{found[0][0] + 1} states it as {found[0][1]:g}; correct the file, or get it again"
             )
     return found[0] if found else None
 
@@ -172,8 +171,7 @@ def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int,
         if UNITS[units] != UNITS[found[0][1]]:
             raise InputError(
                 f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} "
-                "states "
-                f"them as {found[0][1]}; correct the file, or get it again"
+                f"states them as {found[0][1]}; correct the file, or get it again"
             )
     return found[0] if found else None
 

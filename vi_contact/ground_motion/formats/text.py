@@ -111,8 +111,7 @@ class TextFile:
         if UNITS[names[0]] != UNITS[names[-1]]:
             raise InputError(
                 f"{place}: the file states its units as {names[0]} but units={self.units!r} was "
-                "passed; "
-                "leave units out or correct the file"
+                "passed; leave units out or correct the file"
             )
         if step is None:
             raise InputError(
@@ -125,8 +124,7 @@ class TextFile:
         ):
             raise InputError(
                 f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was "
-                "passed; "
-                "leave dt out or correct the file"
+                "passed; leave dt out or correct the file"
             )
         if lines is not None:
             refuse_fill_values(samples, lambda k: self.at(lines[k]))
@@ -178,8 +176,7 @@ class TextFile:
         if found != announced:
             raise InputError(
                 f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get "
-                "the "
-                "complete file"
+                "the complete file"
             )
 
     def filled(self, start: int) -> Sequence[int]:
@@ -225,8 +222,7 @@ class TextFile:
             if length != usual and not (k == len(lengths) - 1 and length < usual):
                 raise InputError(
                     f"{self.at(lines[k])}: the row has {length} values and other rows have "
-                    f"{usual}; a "
-                    "value is missing or too many, get the complete file"
+                    f"{usual}; a value is missing or too many, get the complete file"
                 )
 
     def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
@@ -244,8 +240,7 @@ class TextFile:
         if gaps and len(gaps) < len(lines) - 1 and all(len(row) == 1 for row in rows):
             raise InputError(
                 f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so "
-                "that a "
-                "value is missing; get the complete file, or take the line out where none is"
+                "that a value is missing; get the complete file, or take the line out where none is"
             )
 
     def refuse_misaligned(self, lines: Sequence[int]) -> None:
@@ -266,8 +261,7 @@ class TextFile:
             if found != usual[: len(found)] and found[-1] < usual[len(found) - 1]:
                 raise InputError(
                     f"{self.at(index)}: the row is shorter than the others, whose numbers end at "
-                    "the same "
-                    "places, so that a character is missing; get the complete file"
+                    "the same places, so that a character is missing; get the complete file"
                 )
 
     def rows(self, indices: Sequence[int]) -> Iterator[list[float]]:
@@ -289,8 +283,7 @@ class TextFile:
         if _EMPTY_CELL.search(self.lines[index]):
             raise InputError(
                 f"{self.at(index)}: a cell is empty between two separators, so that a value is "
-                "missing; "
-                "get the complete file"
+                "missing; get the complete file"
             )
         for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(
             self.lines[index].strip()
@@ -338,8 +331,8 @@ class TextFile:
             if len(field) < width or field[-1].isspace():
                 raise InputError(
                     f"{self.at(index)}: {shown(field.strip())}{where} does not end where its "
-                    "columns do, "
-                    "so that a character is missing or too many on the line; get the complete file"
+                    "columns do, so that a character is missing or too many on the line; get the "
+                    "complete file"
                 )
         return values
 
@@ -390,8 +383,7 @@ class TextFile:
             if zeros and short:
                 raise InputError(
                     f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of "
-                    "other "
-                    "numbers; a digit was lost, get the complete file"
+                    "other numbers; a digit was lost, get the complete file"
                 )
         if len(words) < 2 or not words[-1]:
             return
@@ -407,8 +399,7 @@ class TextFile:
         if found < decimals or exponent and not has_exponent:
             raise InputError(
                 f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its "
-                "column "
-                f"have {decimals} decimals{' and an exponent' if exponent else ''}; get the "
+                f"column have {decimals} decimals{' and an exponent' if exponent else ''}; get the "
                 "complete file"
             )
 
@@ -436,8 +427,7 @@ class TextFile:
             return True
         raise InputError(
             f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; "
-            "write "
-            "decimal points, and blanks between the numbers"
+            "write decimal points, and blanks between the numbers"
         )
 
 

@@ -70,8 +70,7 @@ def time_step(
         k = int(np.argmax(odd)) + 1
         raise InputError(
             f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, "
-            "others "
-            f"{usual:.9g} s; pass resample_dt= to interpolate, or correct the time"
+            f"others {usual:.9g} s; pass resample_dt= to interpolate, or correct the time"
         )
     wanted = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
     step = wanted / math.ceil(wanted / usual * (1.0 - SAME_STEP))

@@ -50,8 +50,7 @@ def read(text: TextFile) -> Record:
     if len(names) != channels or width < 1:
         raise InputError(
             f"{text.at(form_line)}: the data have {channels} columns and the header names "
-            f"{len(names)} "
-            "directions; get the file again"
+            f"{len(names)} directions; get the file again"
         )
     place = text.chosen(names)
     data = _first_row(text, start)
@@ -62,8 +61,7 @@ def read(text: TextFile) -> Record:
         if len(row) != channels:
             raise InputError(
                 f"{text.at(index)}: {len(row)} values instead of {channels}, one of each channel; "
-                "a value "
-                "is missing or too many, get the complete file"
+                "a value is missing or too many, get the complete file"
             )
         values.append(row[place])
     count_line, counts = _entry(text, header, "NUM. TOTAL DE MUESTRAS, C1")
@@ -150,7 +148,6 @@ def _first_row(text: TextFile, start: int) -> int:
     if len(rulers) < 2:
         raise InputError(
             f"{text.at(start)}: the names of the columns do not stand between two rulers '-----'; "
-            "get the "
-            "complete file"
+            "get the complete file"
         )
     return rulers[-1] + 1

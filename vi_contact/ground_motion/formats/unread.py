@@ -30,8 +30,7 @@ _KNOWN = (
     (
         re.compile(r"^TIMESERIES \S+, \d+ samples", re.IGNORECASE),
         "this is a TSPAIR or SLIST file of EarthScope in counts, which is not read; remove the "
-        "response and "
-        "write columns, for example with ObsPy",
+        "response and write columns, for example with ObsPy",
     ),
 )
 _SAC = (

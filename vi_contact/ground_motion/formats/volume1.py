@@ -103,8 +103,7 @@ def read(text: TextFile) -> Record:
         if abs(times[-1] - times[0] + step - seconds) > 1.5 * float(np.max(np.diff(times))) + 1e-3:
             raise InputError(
                 f"{text.at(line)}: {seconds:g} s are announced but the times end at {times[-1]:g} "
-                "s; get "
-                "the complete file"
+                "s; get the complete file"
             )
         if uneven:
             samples, sample_lines = interpolated(times, samples, step), []
@@ -170,8 +169,7 @@ def _parts(text: TextFile) -> list[_Part]:
         if short or not whole or _INTEGERS.fullmatch(text.lines[numbers + INTEGER_LINES]):
             raise InputError(
                 f"{text.at(numbers)}: {INTEGER_LINES} lines of integers and {REAL_LINES} lines of "
-                "reals do "
-                "not follow the text; lines were lost or added, get the complete file"
+                "reals do not follow the text; lines were lost or added, get the complete file"
             )
         named = (_COMPONENT.search(text.heads[k]) for k in range(start, numbers))
         name = next(
@@ -224,8 +222,7 @@ def _fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float
         if len(row) != FIELDS and not (last and 0 < len(row) < FIELDS):
             raise InputError(
                 f"{text.at(index)}: the row has {len(row)} values instead of {FIELDS}; a value is "
-                "missing "
-                "or too many, get the complete file"
+                "missing or too many, get the complete file"
             )
         values += row
         lines += [index] * len(row)

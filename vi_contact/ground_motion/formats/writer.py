@@ -65,6 +65,5 @@ def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
     except OSError as error:
         raise InputError(
             f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, "
-            "or "
-            "mend what the system says"
+            "or mend what the system says"
         ) from error

@@ -148,8 +148,7 @@ def refuse_files_of_others(folder: Path) -> None:
     for path in _written_by_runs(folder):
         raise InputError(
             f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a "
-            "run would "
-            "replace it: choose another output folder, or move the file"
+            "run would replace it: choose another output folder, or move the file"
         )
 
 
@@ -207,8 +206,7 @@ def check_format(file: Path, found: Any) -> None:
     if found != FORMAT or isinstance(found, bool):
         raise InputError(
             f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: "
-            "read it "
-            "with the version that wrote it"
+            "read it with the version that wrote it"
         )
 
 
@@ -356,8 +354,7 @@ def _take(folder: Path, name: str) -> Any:
         except BlockingIOError:
             raise InputError(
                 f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or "
-                "choose "
-                "another output folder"
+                "choose another output folder"
             ) from None
         except OSError as error:
             log.warning(

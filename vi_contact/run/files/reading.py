@@ -208,14 +208,12 @@ def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, 
     if len(gaps):
         raise InputError(
             f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not "
-            "follow "
-            "each other): restore it or run again"
+            "follow each other): restore it or run again"
         )
     if isinstance(steps, int) and rows < steps + 1:
         raise InputError(
             f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of "
-            f"{steps} "
-            "steps and the initial state): restore it or run again"
+            f"{steps} steps and the initial state): restore it or run again"
         )
 
 
@@ -235,8 +233,8 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
             csv = path.with_name(HISTORY_CSV)
             raise InputError(
                 f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is "
-                "damaged or "
-                f"was changed; restore it, or move {HISTORY_H5} away to read the other alone"
+                f"damaged or was changed; restore it, or move {HISTORY_H5} away to read the other "
+                "alone"
             )
 
 

@@ -90,8 +90,7 @@ class StoredRows:
             if self._checksum and self.hash.hexdigest() != self._checksum:
                 raise InputError(
                     f"the histories in '{self.folder}' do not belong to the checkpoint, or a file "
-                    "is "
-                    "damaged: restore the folder or start a new run"
+                    "is damaged: restore the folder or start a new run"
                 )
 
 
@@ -110,8 +109,7 @@ def read_blocks(
         if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
             raise InputError(
                 f"the steps in '{csv.name}' after line {done + 1} do not follow each other: "
-                "restore it or "
-                "start a new run"
+                "restore it or start a new run"
             )
         n = len(steps) if k is None else int(np.searchsorted(steps, k, side="right"))
         if n:
@@ -222,8 +220,7 @@ class StoredArrays:
             missing = int(steps[len(part)] if len(part) < len(steps) else steps[0])
             raise InputError(
                 f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: "
-                "restore it "
-                "or start a new run"
+                "restore it or start a new run"
             )
         ends = np.cumsum([one.size for one in self._samples.values()])[:-1]
         columns = np.split(np.array(part[:, 1:]), ends, axis=1)

@@ -79,8 +79,7 @@ class Table:
         for name in sorted(row.keys() ^ self.columns.keys()):
             raise InputError(
                 f"a recorder names the column '{name}' in columns() only, or in start() and row() "
-                "only: "
-                "let all three name the same columns"
+                "only: let all three name the same columns"
             )
         for name, value in row.items():
             if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(

@@ -185,10 +185,8 @@ class ScaledProblem:
         if not residual <= max(tolerance * unit, rounding):
             raise StepFailure(
                 f"{method} stopped after {iterations} iterations with residual "
-                f"{residual / unit:.1e}: "
-                "try another friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step "
-                "of "
-                "time or load"
+                f"{residual / unit:.1e}: try another friction method (FrictionNewton, NSGS, "
+                "FixedPoint), or a smaller step of time or load"
             )
         still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
         active = (r[:, 0] > 0.0) | self.delassus.bilateral

@@ -82,6 +82,6 @@ class RateIteration:
             mu = np.maximum(following(mu, new), 0.0)
         raise StepFailure(
             f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the "
-            "friction "
-            "coefficients: take a smaller time step, or let mu(v) vary less with the slip rate"
+            "friction coefficients: take a smaller time step, or let mu(v) vary less with the slip "
+            "rate"
         )

@@ -80,8 +80,7 @@ def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -
     words, remedy = SAID.get(str(reason), SAID["cg"])
     return StepFailure(
         f"{name} stopped after {iterations} linear iterations, {words} (residuals "
-        f"{told(history)}): "
-        f"{remedy}"
+        f"{told(history)}): {remedy}"
     )
 
 

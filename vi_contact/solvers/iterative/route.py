@@ -94,8 +94,7 @@ class Iterative:
         if not self.tolerance < 1.0:
             raise InputError(
                 f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, "
-                "such as "
-                "3e-10"
+                "such as 3e-10"
             )
 
     def check(self, problem: ContactProblem) -> None:

@@ -172,8 +172,7 @@ def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arr
     elif not unsymmetric:
         raise InputError(
             "the Delassus operator is not symmetric: use a symmetric effective matrix A, or the "
-            "methods "
-            "Lemke() and, with friction, FrictionNewton()"
+            "methods Lemke() and, with friction, FrictionNewton()"
         )
     return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 

@@ -70,8 +70,7 @@ class _Pivots:
         if b.any() and np.linalg.cond(G[np.ix_(b, b)]) > 0.1 / EPS:
             raise InputError(
                 "bilateral rows of the Delassus operator depend on each other: remove constraints "
-                "that "
-                "act on the same motion twice"
+                "that act on the same motion twice"
             )
         self._carry = np.linalg.solve(G[np.ix_(b, b)].T, G[:, b].T).T
         self._matrix = G - self._carry @ G[b]
@@ -146,8 +145,7 @@ def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
     if not rows.size:
         raise StepFailure(
             f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is "
-            "not "
-            "copositive-plus; take a smaller time step, a finer mesh, or a symmetric G"
+            "not copositive-plus; take a smaller time step, a finer mesh, or a symmetric G"
         )
     for place in (-1, *range(m)):
         ratio = tableau[rows, place] / column[rows]

@@ -56,8 +56,7 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
     words = WORDS.get(name, "no convergence")
     return StepFailure(
         f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, "
-        f"{name} "
-        f"({words}): {ADVICE.get(name, GENERAL_ADVICE)}"
+        f"{name} ({words}): {ADVICE.get(name, GENERAL_ADVICE)}"
     )
 
 

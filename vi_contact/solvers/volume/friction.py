@@ -109,8 +109,8 @@ class VolumeFriction:
             start = self._scaled.moved(found.state, found.slip, limit[mine])
         raise StepFailure(
             f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of "
-            f"{history[-1]:.1e} "
-            "of the friction thresholds: take a smaller step of time or load, or use Condensed()"
+            f"{history[-1]:.1e} of the friction thresholds: take a smaller step of time or load, "
+            "or use Condensed()"
         )
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:

@@ -62,8 +62,7 @@ class OptionLayers:
             except PETSc.Error as error:
                 raise InputError(
                     f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): "
-                    "correct "
-                    "or drop them"
+                    "correct or drop them"
                 ) from error
             check(solver, self)
 
@@ -207,8 +206,7 @@ def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
         if not found:
             raise InputError(
                 "Volume() with friction needs a direct solver that exchanges rows, and this PETSc "
-                "has "
-                "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()"
+                "has none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()"
             )
         own["pc_factor_mat_solver_type"] = found[0]
     else:

@@ -168,8 +168,7 @@ def check_axes(node: Any, d: int, source: str) -> None:
         if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):
             raise InputError(
                 f"{source} {shown(one.text)} has {min(beyond)}, and a model of dimension {d} has "
-                "only "
-                f"{', '.join('xyz'[:d])}: use these only"
+                f"only {', '.join('xyz'[:d])}: use these only"
             )
 
 

@@ -68,8 +68,7 @@ def located(case: str) -> Path:
     if case not in builtin_cases():
         raise InputError(
             f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file "
-            "ends in "
-            ".toml"
+            "ends in .toml"
         )
     return FOLDER / f"{case}.toml"
 
@@ -80,8 +79,7 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
     if found != FORMAT or isinstance(found, bool):
         raise InputError(
             f"{path}: format is {shown(found)}, and this version of vi_contact reads format "
-            f"{FORMAT}: "
-            "use the version that it was written for, or correct the number"
+            f"{FORMAT}: use the version that it was written for, or correct the number"
         )
 
 
@@ -131,8 +129,7 @@ def refuse_case_of_others(path: Path, folder: Path) -> None:
     ):
         raise InputError(
             f"'{folder / COPY}' is not the copy of a case that a run has made, and this run would "
-            "replace "
-            "it: choose another output folder, or move the file"
+            "replace it: choose another output folder, or move the file"
         )
 
 

@@ -134,8 +134,7 @@ def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
     except Exception as error:  # type hints are evaluated
         raise spot.inside(
             f"has the type '{text}', whose arguments cannot be read ({_line(error)}): correct the "
-            "type "
-            "hints of its constructor"
+            "type hints of its constructor"
         ) from error
 
 

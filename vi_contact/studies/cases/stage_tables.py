@@ -75,8 +75,7 @@ def split(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
             if not one.static and one.tables.get(key) != before.tables.get(key):
                 raise InputError(
                     f"{one.label} has another [{key}] than the stage before it, and would jump at "
-                    "t = 0: "
-                    "give both the same, or put a static stage with this one between them"
+                    "t = 0: give both the same, or put a static stage with this one between them"
                 )
     return stages
 
@@ -132,6 +131,5 @@ def refuse_own(tables: Mapping[str, Any], key: str, asked: str) -> None:
     if isinstance(stages, list) and stages and isinstance(stages[-1], dict) and table in stages[-1]:
         raise InputError(
             f"{asked} changes [{table}], and the last [[stage]] has its own: leave it out there, "
-            "or give "
-            f"--set stage.{len(stages)}.{table}…"
+            f"or give --set stage.{len(stages)}.{table}…"
         )

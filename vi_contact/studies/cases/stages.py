@@ -127,8 +127,7 @@ def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
     if keep and old:
         raise InputError(
             f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and "
-            "order, or "
-            "start a new run, which removes it"
+            "order, or start a new run, which removes it"
         )
     for folder in () if keep else old:
         remove_run(out / folder)
@@ -196,16 +195,14 @@ def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts,
         else:
             raise InputError(
                 "it has other supports than the dynamic stage before it: put a static stage with "
-                "the "
-                "supports of that one between them, or change supports before the motion"
+                "the supports of that one between them, or change supports before the motion"
             )
         force = begun.system.load.constant - problem.system.load.constant
         name, newtons = removed_support(before, begun, np.asarray(force))
         if name and not stage.release:
             raise InputError(
                 f"it removes the support '{name}', which carries {newtons:.4g} N: give release = "
-                "true, "
-                "which holds its reaction as a force, or keep the support"
+                "true, which holds its reaction as a force, or keep the support"
             )
     except InputError as error:
         raise InputError(f"{stage.label}: {error}") from error

@@ -123,8 +123,7 @@ def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> 
                 f"material.{name}",
                 (
                     f"{path}: [material.{name}] is of nothing, as [system] does not name it: give "
-                    "its "
-                    "cell group in [system] material, or leave it out"
+                    "its cell group in [system] material, or leave it out"
                 ),
             )
 
@@ -142,8 +141,8 @@ def _ratios(part: Part) -> Iterator[Finding]:
             "system.damping",
             (
                 f"{part.label}: [system.damping] {RATIO_LAW} damps by the ratios of the materials, "
-                "and "
-                f"none has one: give [material.{names[0]}] xi = 0.05, or another type of damping"
+                f"and none has one: give [material.{names[0]}] xi = 0.05, or another type of "
+                "damping"
             ),
         )
     if word in BLIND_TO_RATIOS and damped:
@@ -173,8 +172,7 @@ def _without_contact(part: Part) -> Iterator[Finding]:
                 table,
                 (
                     f"{part.label}: [{table}] has no effect, as nothing {happens} without "
-                    "[[contact]]: "
-                    "give the contact, or leave it out"
+                    "[[contact]]: give the contact, or leave it out"
                 ),
             )
     if part.calls("impact") and surfaces and all("springs" in one.arguments for one in surfaces):
@@ -182,8 +180,7 @@ def _without_contact(part: Part) -> Iterator[Finding]:
             "impact",
             (
                 f"{part.label}: [impact] has no effect, as every [[contact]] has springs, which do "
-                "not "
-                "collide: leave it out"
+                "not collide: leave it out"
             ),
         )
     dt = part.nodes["run"].arguments.get("dt")
@@ -192,8 +189,7 @@ def _without_contact(part: Part) -> Iterator[Finding]:
             "run.dt",
             (
                 f"{part.label}: [run] dt is HalvedAtImpact, which halves nothing without "
-                "[[contact]]: "
-                "give the contact, or the step alone"
+                "[[contact]]: give the contact, or the step alone"
             ),
         )
     if part.calls("mass") and any("mass" in one.arguments for one in part.calls("scheme")):
@@ -201,8 +197,7 @@ def _without_contact(part: Part) -> Iterator[Finding]:
             "scheme.mass",
             (
                 f"{part.label}: [scheme] mass is not read, as [mass] comes before it: leave one of "
-                "the "
-                "two out"
+                "the two out"
             ),
         )
 
@@ -220,8 +215,7 @@ def _of_solvers(part: Part) -> Iterator[Finding]:
                 "escalation",
                 (
                     f"{part.label}: [[escalation]] names {other.callee.name} with the same keys as "
-                    "the "
-                    "solver before it, which has failed by then: leave it out, or change a key"
+                    "the solver before it, which has failed by then: leave it out, or change a key"
                 ),
             )
 
@@ -236,8 +230,7 @@ def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -
             table,
             (
                 f"{label}: [{table}] method is for contact without friction, and [friction] is "
-                "given: "
-                "give friction_method in its place, or leave it out"
+                "given: give friction_method in its place, or leave it out"
             ),
         )
     for key in (one for one in ("friction_method", "rates") if one in keys and not rubs):
@@ -245,8 +238,7 @@ def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -
             table,
             (
                 f"{label}: [{table}] {key} is for contact with friction, and there is no "
-                "[friction]: "
-                "give the friction, or leave it out"
+                "[friction]: give the friction, or leave it out"
             ),
         )
     if "rates" in keys and rubs in WITHOUT_RATES:
@@ -254,8 +246,7 @@ def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -
             table,
             (
                 f"{label}: [{table}] rates is for friction that depends on the slip rate, and "
-                f"{rubs} "
-                "does not: leave it out"
+                f"{rubs} does not: leave it out"
             ),
         )
 
@@ -272,8 +263,7 @@ def _twice(part: Part) -> Iterator[Finding]:
                     key,
                     (
                         f"{part.label}: [[{key}]] has two tables that are alike, word for word: "
-                        "leave "
-                        "one of them out, or give one of twice the size"
+                        "leave one of them out, or give one of twice the size"
                     ),
                 )
 
@@ -304,8 +294,7 @@ def _start(parts: Sequence[Part]) -> Iterator[Finding]:
             "system.initial_velocity",
             (
                 f"{first.label}: [system] initial_velocity is lost, as {at_rest} lets the body "
-                "begin at "
-                "rest, in equilibrium: leave one of the two out"
+                "begin at rest, in equilibrium: leave one of the two out"
             ),
         )
     for part in later:
@@ -314,8 +303,7 @@ def _start(parts: Sequence[Part]) -> Iterator[Finding]:
                 f"system.{key}",
                 (
                     f"{part.label}: system has {key}, and a stage begins where the stage before "
-                    "has "
-                    "left the body: give it in the first stage, or leave it out"
+                    "has left the body: give it in the first stage, or leave it out"
                 ),
             )
 
@@ -328,8 +316,7 @@ def _ground(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
             "system.base_inertia",
             (
                 f"{path}: [system] base_inertia is about the inertia load of a ground motion, and "
-                "there "
-                "is no [[excitation]]: leave it out"
+                "there is no [[excitation]]: leave it out"
             ),
         )
 
@@ -345,8 +332,7 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
                 key,
                 (
                     f"{path}: [{key}] is read by no stage, as every [[stage]] that could read it "
-                    "has "
-                    "its own: leave it out there or here"
+                    "has its own: leave it out there or here"
                 ),
             )
     own = tables.get("system")
@@ -356,8 +342,7 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
                 f"system.{key}",
                 (
                     f"{path}: [system] {key} is read by no stage, as every [[stage]] has its own: "
-                    "leave "
-                    "it out there or here"
+                    "leave it out there or here"
                 ),
             )
 
@@ -373,7 +358,6 @@ def _released(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
                 "stage",
                 (
                     f"{path}: [[stage]] '{stage.get('name')}' has release = true, and the supports "
-                    "of "
-                    "the stage before it: leave it out, or change the supports"
+                    "of the stage before it: leave it out, or change the supports"
                 ),
             )

@@ -50,8 +50,7 @@ def limit(text: str) -> tuple[Demand, float]:
     if not math.isfinite(found):
         raise InputError(
             f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such "
-            "as "
-            "contact_max_slip:max=0.05"
+            "as contact_max_slip:max=0.05"
         )
     return demand(name), found
 
@@ -121,8 +120,8 @@ def fragility_curve(brackets: Array) -> Fragility:
     if low <= high * (1.0 + SAME):
         raise InputError(
             f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe "
-            "all at "
-            f"one intensity from {low:g} to {high:g}: give other or closer levels, or more records"
+            f"all at one intensity from {low:g} to {high:g}: give other or closer levels, or more "
+            "records"
         )
     with np.errstate(divide="ignore"):
         x = np.log(brackets)
@@ -138,8 +137,7 @@ def fragility_curve(brackets: Array) -> Fragility:
     if p[0] <= LEAST:
         raise InputError(
             f"the capacities of {len(brackets)} records have a spread that cannot be fitted: give "
-            "more "
-            "levels, or more records"
+            "more levels, or more records"
         )
     for _ in range(3):  # of Newton, from digits that are enough to all of them
         _, slope, bend = _likelihood(p, x)

@@ -244,15 +244,14 @@ def _claim(study: IDA, out: Path) -> None:
         if is_own(out / STUDY):
             raise InputError(
                 f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, "
-                "or move "
-                "this one away"
+                "or move this one away"
             )
         for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
             if os.path.lexists(out / name):
                 raise InputError(
                     f"'{out / name}' is not of a study of vi_contact, which would replace it "
-                    "(there is no "
-                    f"whole {STUDY} in '{out}'): choose another folder, or move the file"
+                    f"(there is no whole {STUDY} in '{out}'): choose another folder, or move the "
+                    "file"
                 )
     else:
         kept = old.get("records")

@@ -41,8 +41,7 @@ class Intensity:
         if not (level > 0.0 and value > 0.0):
             raise InputError(
                 f"level {level:g} of {self.name}: the record has {value:g}; give levels above "
-                "zero, and "
-                "records with a motion"
+                "zero, and records with a motion"
             )
         return float((level / value) ** (1.0 / self.degree))
 

@@ -239,6 +239,5 @@ def refuse_mpirun() -> None:
     if any(name in os.environ for name in _MPI):
         raise InputError(
             "ida starts processes and must not be one of MPI's: start it without mpirun, and give "
-            "the "
-            "runs their ranks with --launch 'mpirun -n N'"
+            "the runs their ranks with --launch 'mpirun -n N'"
         )

@@ -83,8 +83,7 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
         if table.get("type") != "GroundMotion":
             raise InputError(
                 f"{case.path}: [{place}] has no record that others can replace: make it a "
-                "GroundMotion "
-                "with a record file"
+                "GroundMotion with a record file"
             )
     if not found:
         raise InputError(
