@@ -48,7 +48,8 @@ def _peaks(options: argparse.Namespace) -> str:
     rows = peaks(run.history, run.columns, options.columns or None)
     table = write_peaks(_table_path(options), rows)
     lines = [
-        f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}{row.min:>13.4e}{row.t_min:>10.4g}"
+        f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}"
+        f"{row.min:>13.4e}{row.t_min:>10.4g}"
         for row in rows
     ]
     head = f"{'column':<28}{'unit':>6}{'max':>13}{'t [s]':>10}{'min':>13}{'t [s]':>10}"

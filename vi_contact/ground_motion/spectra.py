@@ -21,9 +21,9 @@ from ..core.errors import InputError
 from .record import Record
 
 PER_PERIOD, PER_STEP = 64, 4
-"""The response is looked at this often in a period of the oscillator, or in a step of the record.
+"""Looks at the response in a period of the oscillator, and in a step of the record.
 
-What counts is whatever is more.
+The one of the two that makes more of them counts.
 """
 
 SHORTEST, MOST = 1000, 10**10
