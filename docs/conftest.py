@@ -22,6 +22,7 @@ import contextlib
 import io
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 from functools import partial
@@ -38,6 +39,7 @@ BOUND = 1e-9  # both are below the bound of certificates, or
 SMALL, ORDER = 1e-7, 10.0  # both are that small, and one is at most ten times the other
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 PRINTED: list[str] = []  # lines, by the blocks of this page
+FOLDERS = tempfile.TemporaryDirectory(prefix="pages_")  # removed at the end
 SHELL = f"""set -e
 . "{ROOT}/install/setup.sh"; vi_setup >&2
 vi-contact() {{ "$vi_python" -m vi_contact "$@"; }}
@@ -91,6 +93,8 @@ def compare(example: Example) -> None:
     """Find the lines of a block in what was printed, in their order."""
     printed = iter(PRINTED)
     for line in filter(str.strip, str(example.parsed).splitlines()):
+        if line.strip().startswith("wall time"):  # the clock's
+            continue
         assert any(agree(line, one) for one in printed), f"not printed here: {line}"
 
 
@@ -101,16 +105,18 @@ def keep(example: Example, file: str) -> None:
 
 def begin(namespace: dict[str, Any]) -> None:
     """Go into a new folder that looks like a clone, with records of shaking."""
-    folder = Path(tempfile.mkdtemp(prefix="page_"))
+    folder = Path(tempfile.mkdtemp(dir=FOLDERS.name))
     for one in ROOT.iterdir():
-        if one.name not in ("results", "build"):
+        # not .venv: a page must not install anything into it
+        if one.name not in ("results", "build") and not one.name.startswith("."):
             (folder / one.name).symlink_to(one)
     samples = "\n".join(f"{0.03 * (-1) ** (k // 5) * (1 - k / 100):.4f}" for k in range(100))
     for name in ("elcentro.at2", "h.at2", "v.at2"):
         (folder / name).write_text(f"A motion\nunits of g\nNPTS= 100, DT= .01 SEC\n{samples}\n")
+    os.environ["PYTHONPATH"] = str(ROOT)
     os.chdir(folder)
     PRINTED.clear()
-    namespace["__name__"] = "__main__"
+    namespace |= {"__name__": "__main__", "which": shutil.which}
 
 
 pytest_collect_file = Sybil(
@@ -126,4 +132,3 @@ pytest_collect_file = Sybil(
     patterns=["*.md"],
     setup=begin,
 ).pytest()
-os.environ["PYTHONPATH"] = str(ROOT)
