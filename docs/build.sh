@@ -22,11 +22,9 @@ if ! .venv/site/bin/python -m sphinx "${options[@]}" --doctree-dir "$site.doctre
   vi_fail "the site is not built: see the warnings above"
 fi
 echo '<!doctype html><title>vi_contact</title><meta http-equiv="refresh" content="0; url=docs/index.html">' >"$site/index.html"
-if [ -z "$quick" ] && ! "$vi_python" docs/notebooks/run.py --site "$site"; then
-  vi_fail "the pictures of the notebooks are not shown: see above"
-fi
-if [ -z "$quick" ] && ! "$vi_python" docs/gallery/make.py --into "$site/_images"; then
-  vi_fail "the pictures of the gallery are not made: see above"
+if [ -z "$quick" ] && ! VI_CONTACT_FIGURES=$(realpath "$site")/_images \
+  .venv/site/bin/python -m pytest -q -n 2 --dist loadfile docs/gallery; then
+  vi_fail "the gallery prints other lines than its pages say: see above"
 fi
 if [ -z "$quick" ] && ! "$vi_python" docs/theory/figures.py --out "$site/_images" >/dev/null; then
   vi_fail "the figures of the theory pages are not made, or a page states another number: see above"

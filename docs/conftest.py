@@ -14,6 +14,8 @@ What a page needs and does not show stands in it as a comment, and so does what 
     <!-- clear-namespace -->
 
 ``vi-contact`` and ``python3`` are those of this clone, and three records of shaking are there.
+``keep PICTURE NAME`` in a comment says which file of the run is which picture of docs/figures. With
+VI_CONTACT_FIGURES=DIR, from the root, it is put there.
 """
 
 from __future__ import annotations
@@ -40,10 +42,17 @@ SMALL, ORDER = 1e-7, 10.0  # both are that small, and one is at most ten times t
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 PRINTED: list[str] = []  # lines, by the blocks of this page
 FOLDERS = tempfile.TemporaryDirectory(prefix="pages_")  # removed at the end
+PALETTE = """
+import sys
+from PIL import Image  # 256 colours: a third of the size
+picture = Image.open(sys.argv[1]).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+picture.save(sys.argv[2], optimize=True)
+"""
 SHELL = f"""set -e
 . "{ROOT}/install/setup.sh"; vi_setup >&2
 vi-contact() {{ "$vi_python" -m vi_contact "$@"; }}
 python3() {{ "$vi_python" "$@"; }}
+keep() {{ "$vi_python" -c '{PALETTE}' "$1" "${{VI_CONTACT_FIGURES:-.}}/$2"; }}
 export -f vi-contact python3; export vi_python
 """
 
@@ -114,6 +123,8 @@ def begin(namespace: dict[str, Any]) -> None:
     for name in ("elcentro.at2", "h.at2", "v.at2"):
         (folder / name).write_text(f"A motion\nunits of g\nNPTS= 100, DT= .01 SEC\n{samples}\n")
     os.environ["PYTHONPATH"] = str(ROOT)
+    if figures := os.environ.get("VI_CONTACT_FIGURES"):
+        os.environ["VI_CONTACT_FIGURES"] = str(ROOT / figures)
     os.chdir(folder)
     PRINTED.clear()
     namespace |= {"__name__": "__main__", "which": shutil.which}

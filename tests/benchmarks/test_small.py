@@ -1,7 +1,7 @@
 """The benchmarks that pages give and no other test runs, with small sizes: they end and print their
 rows.
 
-docs/run_commands.py has the list of the others. Times are not looked at here.
+Times are not looked at here.
 """
 
 from __future__ import annotations
