@@ -74,61 +74,6 @@ def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
     assert picture == "" and (first[0] / "frame.png").stat().st_size > 5000
 
 
-def together(codes: list[str], folder: Path) -> list[str]:
-    """What each of them prints, one after the other in one process: they start with names of their
-    own."""
-    names = [f"page_{number}.py" for number in range(len(codes))]
-    for name, code in zip(names, codes, strict=True):
-        (folder / name).write_text(code, encoding="utf-8")
-    return run(
-        f"import runpy\nfor name in {names}: runpy.run_path(name); print('---')\n", folder
-    ).split("---\n")[:-1]
-
-
-@pytest.mark.slow
-def test_other_examples_run_on_its_problem(tmp_path: Path) -> None:
-    """Those of records and solvers continue README's example where its problem is ready."""
-    (code,) = blocks(ROOT / "README.md", "python")
-    ready = code[: code.index("solution = ")]
-    samples = "\n".join(f"{0.3 * (-1) ** k:.3f}" for k in range(50))
-    (tmp_path / "elcentro.at2").write_text(
-        f"A motion\nunits of g\nNPTS= 50, DT= .02000 SEC\n{samples}"
-    )
-    examples = [
-        blocks(ROOT / "docs" / "guide" / name, "python")[-1]
-        for name in ("records.md", "solvers.md")
-    ]
-    together([ready + example for example in examples], tmp_path)
-
-
-@pytest.mark.slow
-def test_programs_print_what_their_pages_say(tmp_path: Path) -> None:
-    """Soil in space, bounds, questions, and all snippets of bring_your_own as one program; before
-    DOLFINx 0.7 with the names that spaces have there."""
-    from vi_contact.fem import compat
-
-    soil, bounds, own = (
-        ROOT / "docs" / "guide" / f"{name}.md" for name in ("soil", "bounds", "bring_your_own")
-    )
-    code = "".join(blocks(own, "python"))
-    if compat.VERSION < (0, 7):
-        code = code.replace(
-            'functionspace(mesh, ("Lagrange", 1, (2,)))',
-            'VectorFunctionSpace(mesh, ("Lagrange", 1))',
-        )
-        code = code.replace("fem.functionspace(", "fem.FunctionSpace(")
-    faq = ROOT / "docs" / "reference" / "faq.md"
-    bounded = "".join(blocks(bounds, "python"))  # the second block goes on with the first
-    found = together([blocks(soil, "python")[-1], bounded, *blocks(faq, "python"), code], tmp_path)
-    pages = [
-        blocks(soil, "text"),
-        ["".join(blocks(bounds, "text"))],
-        blocks(faq, "text"),
-        blocks(own, "text"),
-    ]
-    assert found == [text for page in pages for text in page]
-
-
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_exist(document: Path) -> None:
     """Every script that a document calls is there and bash can read it; every demo too."""
@@ -172,11 +117,6 @@ def test_options_exist(document: Path) -> None:
         assert given - set(command._option_string_actions) == set(), line
 
 
-def test_readme_names_the_two_commands() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "bash demos/run.sh wall" in text and "bash tests/run.sh" in text
-
-
 def anchors(document: Path) -> set[str]:
     """Anchors of the headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", document.read_text(encoding="utf-8"), re.MULTILINE)
@@ -193,19 +133,6 @@ def test_relative_links_resolve(document: Path) -> None:
         there = (document.parent / path).resolve() if path else document
         assert there.exists(), target
         assert not anchor or anchor in anchors(there), target
-
-
-def test_every_document_is_reached_from_readme() -> None:
-    """By links of pages, one after the other; what only the changelog links to is not reached."""
-    reached, waiting = set(), [ROOT / "README.md"]
-    while waiting:
-        reached.add(page := waiting.pop())
-        if page.name != "CHANGELOG.md":
-            found = re.findall(
-                r"\]\(([^)\s#:]+\.md)(?:#[^)\s]*)?\)", page.read_text(encoding="utf-8")
-            )
-            waiting += {(page.parent / target).resolve() for target in found} - reached
-    assert [str(page.relative_to(ROOT)) for page in DOCUMENTS if page not in reached] == []
 
 
 def test_figures_are_small_and_used() -> None:
@@ -270,21 +197,6 @@ def test_names_are_public(document: Path) -> None:
     files = set(re.findall(r"`((?:\w+/)+\w+\.(?:py|toml))`", text))
     tops = (ROOT, ROOT / "vi_contact", ROOT / "tests")
     assert [name for name in files if not any((top / name).exists() for top in tops)] == []
-
-
-CIPHERS = (
-    r"\b[Ss]eed 00\d|\bV\d+\.\d|\bP(?:[3-9]|[12]\d)\b|\b[Dd]esign idea|\b[Ss]olver "
-    r"notes|\bseismic\.md"
-)
-REGISTERS = {"verification.md", "sources.md", "petsc.md"}  # these explain the names
-
-
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_nothing_is_cited_by_a_private_name(document: Path) -> None:
-    """Author, year and title instead."""
-    if document.name not in REGISTERS:
-        lines = document.read_text(encoding="utf-8").splitlines()
-        assert [line for line in lines if re.search(CIPHERS, line)] == []
 
 
 def test_import_alone_is_quick() -> None:
