@@ -1,4 +1,4 @@
-"""Run the snippets and commands of the pages, with Sybil: .venv/site/bin/python -m pytest docs
+"""Run the snippets and commands of the pages, with Sybil: bash docs/test.sh
 
 Each page has a folder that looks like a clone. In the order of the page, ``python`` blocks run and
 share their names, ``sh`` blocks run as a reader types them, and the lines of a ``text`` block must

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # bash install/site.sh                installs Sphinx and the packages of install/site-requirements.txt into .venv/site of this clone;
 #                                     then run bash docs/build.sh
-# bash install/site.sh --browser      also installs Chromium, in which tests/house/test_site.py opens pages
+# bash install/site.sh --browser      also installs Chromium, in which docs/test_site.py opens pages
 set -uo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 vi_clean_environment

@@ -18,10 +18,8 @@ from typing import Any
 
 import pytest
 from report_packages import CHROMIUM_FLAGS, browser
-from site_tools import ROOT, site_tools
 
-pytestmark = pytest.mark.serial
-site_tools()
+ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
     "docs/index.html",
     "docs/gallery/index.html",
