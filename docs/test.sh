@@ -8,5 +8,7 @@ set -uo pipefail
 bash "$vi_root/install/site.sh" || exit
 vi_setup
 cd "$vi_root" || exit
-[ "$#" -gt 0 ] || set -- docs --ignore docs/gallery
+pages=
+for argument; do [ ! -e "${argument%%::*}" ] || pages=1; done
+[ -n "$pages" ] || set -- docs --ignore docs/gallery "$@"
 exec .venv/site/bin/python -m pytest -q -n 2 --dist loadfile "$@" </dev/null
