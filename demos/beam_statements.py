@@ -28,7 +28,7 @@ from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, r
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 ELEMENTS, DT = 1000, 0.002
 OUT = Path("results/beam_statements")
 

@@ -32,7 +32,7 @@ from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BAR = Bar(PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
 COURANT = 0.5  # dt c / h
 BOUNCES = 4

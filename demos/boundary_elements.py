@@ -43,7 +43,7 @@ from vi_contact import bem
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
 QUICK = {"square": 6, "steel": 5, "concrete": 4, "ball": 24}
 # of the finite elements; size of those of the ball

@@ -43,7 +43,7 @@ from vi_contact.plots.histories import History
 from vi_contact.run.static import static_equilibrium
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 # [m]
 CHANNEL = Channel(
     ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5)

@@ -34,7 +34,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 CELLS = 10  # along a side of the box
 FRICTION = {"smooth": vc.Frictionless(), "rough": vc.Coulomb(0.75)}
 DT = 1.0e-4  # [s]

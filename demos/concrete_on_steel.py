@@ -31,7 +31,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BOX = concrete(cells=20)
 FRICTION = {"smooth": vc.Frictionless(), "on steel": vc.Coulomb(0.3)}
 DT = 5.0e-5  # [s]

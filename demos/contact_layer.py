@@ -38,7 +38,7 @@ from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BARS = (Bar(ThrownBar(), elements=100), Bar(BouncingBar(), elements=100))
 T_END = {ThrownBar: 1.4, BouncingBar: 16.0 / 3.0}  # one impact, one period [s]
 WIDTHS = (1.0, 0.5, 0.25, 0.1)  # b [m] of the bar's layers

@@ -35,7 +35,7 @@ from vi_contact.fem import compat
 from vi_contact.solvers import ReducedNewton
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 WIDTH = 0.05  # l
 HEIGHT = 0.1
 ACROSS = 8  # cells; the strip has ten times as many along it

@@ -29,7 +29,7 @@ from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BALL = Ball(radius=0.01, speed=0.1, material=vc.LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))
 MESHES = (4, 8)  # cells in the largest contact radius
 STEPS = 200  # in the contact time

@@ -41,7 +41,7 @@ from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.faces import plot_faces
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 CONCRETE = vc.LinearElastic(E=2.5e10, nu=0.2, rho=2500.0)

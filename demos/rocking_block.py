@@ -34,7 +34,7 @@ from vi_contact import fem
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SHAPE = HousnerBlock(width=0.4, height=2.0)  # [m]
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.0, rho=2400.0)  # [Pa, -, kg/m³]
 BLOCK = rocking.RockingBlock(

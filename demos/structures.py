@@ -30,7 +30,7 @@ from demos.problems import structures as posed
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 ELEMENTS = (20, 40, 80, 160)  # of the beam on the ground
 CELLS = (8, 16, 32, 64)  # along the side of a plate on a stop, or the diameter
 GROUND_CELLS = (8, 16, 32)  # of the disk on the ground

@@ -36,7 +36,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 DISK = Disk(radius=0.5, size=0.04, push=Push(height=0.05, rise=1.0))  # h = 2 dt = 0.04
 FRICTION = {
     "no friction": vc.Frictionless(),

@@ -44,7 +44,7 @@ from demos.problems.published_beam import (
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 VISCOSITIES = (0.001, 2.0)  # a2 of the source [s]: almost elastic, strongly damped
 READING = "C"  # of the normal force that is drawn; the table has all of them
 SPANS = ((0.0, 0.6), (0.6, 1.5), (1.5, 2.0))  # of Figs. 8.4 to 8.9 [s]

@@ -33,7 +33,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(500.0, 250.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 TOWER = vc.LinearElastic(E=1.5e9, nu=0.2, rho=500.0)  # a building seen as one block

@@ -40,7 +40,7 @@ from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 WALL = wall_model.Wall(height=9.0, width=6.0, thickness=0.20, divisions=(8, 12))  # [m]
 CASES = {
     "a": "Fig. 4: three possible contact points",

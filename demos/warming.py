@@ -34,7 +34,7 @@ from vi_contact.core.surfaces import empty_surface
 from vi_contact.solvers.volume.route import Volume
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 CONCRETE = vc.LinearElastic(E=2.0e10, nu=0.2, rho=2400.0)
 BAR = vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
 ALPHA, WARMER = 1.0e-5, 30.0  # [1/K], [K]

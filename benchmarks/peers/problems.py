@@ -209,7 +209,7 @@ def thrown_reference() -> dict[str, Any]:
 
 
 # Measures
-# -----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 def measure(problem: str, answer: dict[str, Any], n: int) -> dict[str, float]:
     """Return the measures of an answer, which holds, for
 
@@ -291,7 +291,7 @@ def _bar(answer: dict[str, Any], n: int) -> dict[str, float]:
 
 
 # One row
-# ------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 def seconds() -> float:
     """Return the processor time [s] of this process and of its finished children, all threads."""
     both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]

@@ -40,7 +40,7 @@ BLUE, RED, GREEN, GREY = "tab:blue", "tab:red", "tab:green", "0.7"
 
 
 # Small bodies
-# --------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 def spring_mass(force: float) -> vc.ContactProblem:
     """A mass of 1 kg on a spring of 100 N/m, pushed towards a wall that is 5 cm away."""
     system = vc.system_from_arrays([1.0], None, [[100.0]], coordinates=[[0.0]], load=[force])
@@ -87,7 +87,7 @@ def simulated(problem: vc.ContactProblem, scheme: Any, dt: float, t_end: float) 
 
 
 # Figures
-# -------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 def inequality(path: Path) -> list[str]:
     """Energy of the spring-mass beside its wall, and reactions against gaps for growing loads."""
     k, g0, loads = 100.0, 0.05, (2.0, 8.0)
