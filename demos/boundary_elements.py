@@ -7,7 +7,7 @@ The examples are a pressed square, concrete on steel, concrete in concrete, and 
 moving plane. Boundary elements have unknowns on the boundary only, and they share no matrix with
 the finite elements. So the agreement of both methods shows that the mechanics agree.
 
-    bash demos/run.sh boundary_elements        # three figures and a table, into results/boundary_elements
+    bash demos/run.sh boundary_elements     # figures and a table, into results/boundary_elements
 
 docs/theory/bem.md explains the method, docs/guide/pressed_blocks.md the examples.
 """

@@ -10,9 +10,10 @@ unknowns, and the two must agree to round-off.
 
     bash demos/run.sh channel                   # three runs with all figures, into results/channel
     bash demos/run.sh -n 3 channel              # the same on three ranks
-    bash demos/run.sh channel --motion H,V --set friction.type=Coulomb --set friction.mu=0.5   # one run, its report
+    bash demos/run.sh channel --motion H,V --set friction.type=Coulomb --set friction.mu=0.5
 
-Units are SI; the case data and what the source leaves open are explained in docs/guide/channel.md.
+The last command makes one run and its report. Units are SI; the case data and what the source
+leaves open are explained in docs/guide/channel.md.
 """
 
 from __future__ import annotations

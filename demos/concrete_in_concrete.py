@@ -7,10 +7,10 @@ They are two elastic bodies in frictional contact.
 it is pressed and leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the
 load.
 
-    bash demos/run.sh concrete_in_concrete              # two figures and a table, into results/concrete_in_concrete
-    bash demos/run.sh -n 2 concrete_in_concrete         # the same on two ranks
+    bash demos/run.sh concrete_in_concrete          # two figures and a table
+    bash demos/run.sh -n 2 concrete_in_concrete     # the same on two ranks
 
-docs/guide/pressed_blocks.md explains the numbers.
+Both write into results/concrete_in_concrete. docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microse
 145 N on a spot of a third of a millimetre, and rebounds with its full speed. The model is a quarter
 of the ball, with the default scheme.
 
-    bash demos/run.sh hertz_impact                # the figure and a table, into results/hertz_impact
-    bash demos/run.sh -n 2 hertz_impact           # the same on two ranks
+    bash demos/run.sh hertz_impact          # the figure and a table, into results/hertz_impact
+    bash demos/run.sh -n 2 hertz_impact     # the same on two ranks
 """
 
 from __future__ import annotations

@@ -12,9 +12,12 @@ docs/guide/raft.md has the data, the figures, the mesh and the time step.
     bash demos/run.sh raft                          # 2e4 unknowns, 1000 steps, into results/raft
     bash demos/run.sh -n 2 raft --size 1e5          # on two ranks
     bash demos/run.sh raft --size 3e5 --steps 50    # 7 GB, six minutes until the first step
-    bash demos/run.sh raft --size 1e6 --steps 4     # without a factor: minutes a step, and hours for the gravity stage
+    bash demos/run.sh raft --size 1e6 --steps 4     # without a factor: minutes a step
+
+The last one takes hours for the gravity stage. The same stages from a case file:
+
     python3 meshes raft --size 2.4 --soil-size 1.6 --far 8 -o demos/cases/raft.msh
-    vi-contact run demos/cases/raft.toml --out results/raft_case    # the same stages from a case file
+    vi-contact run demos/cases/raft.toml --out results/raft_case
 """
 
 from __future__ import annotations

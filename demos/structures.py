@@ -97,7 +97,7 @@ def beam_on_the_ground(numbers: dict[str, float], shown: Shown, counts: tuple[in
 def plates_on_stops(
     comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]
 ) -> None:
-    """Press a simply supported square and a clamped disk on a stop at the middle, and over a gap."""
+    """Press a simply supported square and a clamped disk on a stop at the middle, or over a gap."""
     for name, disk in (("square", False), ("disk", True)):
         for share in (0.0, 0.5):
             errors = []

@@ -47,7 +47,7 @@ OUT = Path("results/tower_on_soil")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key numbers."""
+    """Return the key numbers of all three stages (``quick``: cells of 2 m, 110 steps of 10 ms)."""
     comm = MPI.COMM_WORLD
     h, dt, t_end = (2.0, 1e-2, 1.1) if quick else (1.0, DT, T_END)
     lower, upper = (

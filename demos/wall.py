@@ -7,12 +7,12 @@ A concrete wall, 9 m high, is clamped at its base; on its right side it may lift
 not enter it. Every step is solved twice, condensed to the contact points and on all unknowns, and
 the two must agree to round-off.
 
-    bash demos/run.sh wall                      # all figures, into results/wall, results/wall/a and results/wall/b
+    bash demos/run.sh wall                      # all figures, in results/wall and its folders a, b
     bash demos/run.sh -n 3 wall                 # the same on three ranks
-    bash demos/run.sh wall --case a --motion FILE --scale 2   # one run as "vi-contact run wall", and its report
+    bash demos/run.sh wall --case a --motion FILE --scale 2
 
-Units are SI; the case data and what the source leaves open are explained in
-docs/start/first_wall.md.
+The last command makes one run as "vi-contact run wall", and its report. Units are SI; the case data
+and what the source leaves open are explained in docs/start/first_wall.md.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 
 They are compared with closed forms.
 
-    sigma = C (eps(u) - eps_0),     eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
+    sigma = C (eps(u) - eps_0)
+    eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
 
 A wall below a rigid ceiling is warmed slowly: the gap g closes at (1 + nu) alpha dT H = g, and from
 there on the pressure is E / (1 - nu²) ((1 + nu) alpha dT - g / H). A bar that is warmed at once

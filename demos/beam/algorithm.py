@@ -4,8 +4,9 @@ It is Algorithm 10 of Ahn (2012), by block elimination.
 
 Midpoint rule (5.4), (5.5) for y = (theta, u), w = y', with the stiffness S and C = a2 S:
 
-    P y1 = Q y0 + (2/dt) M w0 + f(t0) - e_m R,     P = 2/dt² M + (a2/dt + ½) S,   Q = 2/dt² M + (a2/dt - ½) S      (7.7)
-    w1 = (2/dt) (y1 - y0) - w0                                                                                (7.11)
+    P y1 = Q y0 + (2/dt) M w0 + f(t0) - e_m R                                   (7.7)
+    P = 2/dt² M + (a2/dt + ½) S,    Q = 2/dt² M + (a2/dt - ½) S
+    w1 = (2/dt) (y1 - y0) - w0                                                  (7.11)
 
 R is the friction force of the step at the tip, with the limit mu(t0, |w0_m|) |r_N(t0)|: force and
 coefficient are those of the *old* time, as in the source. Solved for the increment d = y1 - y0, as
@@ -13,8 +14,9 @@ Q = P - S: the same equations with less round-off. With P split at the tip into 
 factorised once, and
 
     P d = r - e_m R,    r = (2/dt) M w0 - S y0 + f
-    c = P_mm - pᵀT⁻¹p,    g = r_m - pᵀT⁻¹r     leave the scalar equation  c s - g + R(s) = 0  of tip.py        (7.8)
-    d = (T⁻¹r - s T⁻¹p, s)                                                                                    (7.10)
+    c = P_mm - pᵀT⁻¹p,    g = r_m - pᵀT⁻¹r      leave the scalar equation of tip.py
+    c s - g + R(s) = 0                                                          (7.8)
+    d = (T⁻¹r - s T⁻¹p, s)                                                      (7.10)
 
 One back-substitution per step. Energy: E = ½ wᵀMw + ½ yᵀSy, and (6.5) holds step by step:
 

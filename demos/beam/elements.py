@@ -65,7 +65,7 @@ class Elements:
             )
 
     def nodes(self, length: float) -> Array:
-        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
+        """Return the positions of the unknowns [m]: all nodes but the clamped, shape (count,)."""
         return np.linspace(
             0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
         )[1:]

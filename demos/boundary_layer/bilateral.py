@@ -5,9 +5,9 @@ They are compared with the layer (b-geometry, ENOC 2017, equations 29 to 34).
 Every constraint phi^R(q) = 0 with a^R = d phi^R brings one coordinate lambda^R of a manifold of its
 own:
 
-    M v̇ + Γ(v, v) - f = sum_R [(m̄_R λ̇^R)˙ + c̄_R λ̇^R + k̄_R λ^R - f̄_R] a^R                                        (31)
-    (m̄_R φ̇^R)˙ + c̄_R φ̇^R + k̄_R φ^R = 0                                                                          (34)
-    m̄ = c·M c,  c̄ = -c·(∂f/∂v) c,  k̄ = -c·(∂f/∂q) c,  f̄ = c·f,  with a·c = 1                                (32, 33)
+    M v̇ + Γ(v, v) - f = sum_R [(m̄_R λ̇^R)˙ + c̄_R λ̇^R + k̄_R λ^R - f̄_R] a^R          (31)
+    (m̄_R φ̇^R)˙ + c̄_R φ̇^R + k̄_R φ^R = 0                                             (34)
+    m̄ = c·M c,  c̄ = -c·(∂f/∂v) c,  k̄ = -c·(∂f/∂q) c,  f̄ = c·f,  with a·c = 1       (32, 33)
 
 n + k ordinary differential equations for q and lambda, no algebraic ones. CHOSEN: c_R = M⁻¹a_R/(a_R
 M⁻¹ a_R), the direction that the boundary's B of (20) has, so that m̄ is g_11 of the layer; (33)

@@ -11,8 +11,10 @@ gamma [kg/m²] is g_11 per area: -gamma b² ÿ/rho is the reaction of the metric
 At rest p = k b²/rho: the law is a logarithmic barrier, and tends to the exact inequality 0 <= p ⊥
 rho >= 0 as b -> 0. The mean over a step from rho_0 to rho_1 is that of the midpoint rule in y:
 
-    p̄ = (Y_1 - Y_0)/(rho_1 - rho_0) · b² [k - (c/V)(y_1 - y_0)/dt - gamma (w_1 - w_0)/dt],   Y' = delta/rho, Y(b) = 0
-    (w_0 + w_1)/2 = (y_1 - y_0)/dt,    w_0 = ẏ = ρ̇/rho where the step begins outside the layer, carried on inside it
+    p̄ = (Y_1 - Y_0)/(rho_1 - rho_0) · b² [k - (c/V)(y_1 - y_0)/dt - gamma (w_1 - w_0)/dt]
+    Y' = delta/rho,    Y(b) = 0
+    (w_0 + w_1)/2 = (y_1 - y_0)/dt
+    w_0 = ẏ = ρ̇/rho where the step begins outside the layer, carried on inside it
 
 Order 2. Energy: the part with k does exactly the work of a potential -k b² Y; the part with gamma,
 where delta = 1, that of a kinetic energy ½ gamma b² w²; the part with c never gives any. Where the

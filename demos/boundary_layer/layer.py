@@ -2,8 +2,10 @@
 
 It has its width, cut-off and force (b-geometry, ENOC 2017, equation 25).
 
-    f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V,    x = rho(q) > 0 the distance function
-    delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z)),  f(z) = exp(-1/z) for z > 0, else 0
+    f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V
+    x = rho(q) > 0 the distance function
+    delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z))
+    f(z) = exp(-1/z) for z > 0, else 0
 
 x > 0 is admissible, x = 0 is the obstacle; a positive f̂_1 pushes away from it. The layer reaches
 from 0 to b; the force is complete up to a and fades out smoothly between a and b.

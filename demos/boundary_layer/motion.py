@@ -5,7 +5,8 @@ They are ordinary differential equations (b-geometry, ENOC 2017, 26 to 28).
 In velocities v (of coordinates q, or quasi-velocities) with M = [g_IJ(q)] and A = d rho:
 
     q̇ = rates(q, v),    M v̇ = f(t, q, v) - Γ(q)(v, v) + Aᵀ lambda,    lambda = 0 outside the layer
-    ρ̈ = A v̇ + Ȧ v,    lambda of metric.Metric inside it: a spring, a damper and the metric's own terms
+    ρ̈ = A v̇ + Ȧ v
+    lambda of metric.Metric inside the layer: a spring, a damper and the metric's own terms
 
 Aᵀ lambda is (28): every component is a projection of the one normal equation. Γ is the covariant
 part of (23) by the affinities of M, [Γ(v, v)]_I = Ṁ_IJ v_J - ½ ∂M_JK/∂q_I v_J v_K; a constant M has

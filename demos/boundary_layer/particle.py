@@ -5,14 +5,17 @@ See b-geometry, ENOC 2017, equations 35 to 38.
 With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ
 = -V:
 
-    x(t) = a exp(beta),   beta = kappa [(1 + s) T² phi(s T) - T],   ẋ = (V/a) x [(1 + s) T psi(s T) - 1]           (36)
-    s = c/(a k),  kappa = m V²/(k a²),  T = a k t/(m V),  phi(z) = (exp(-z) - 1 + z)/z²,  psi(z) = (1 - exp(-z))/z
+    x(t) = a exp(beta),   beta = kappa [(1 + s) T² phi(s T) - T]                (36)
+    ẋ = (V/a) x [(1 + s) T psi(s T) - 1]
+    s = c/(a k),  kappa = m V²/(k a²),  T = a k t/(m V)
+    phi(z) = (exp(-z) - 1 + z)/z²,  psi(z) = (1 - exp(-z))/z
 
 (this form of (36) has no difference of large numbers as c -> 0). Consequences, with h(z) = (z -
 ln(1 + z))/z²:
 
     compression ends at t_c = m V/(a k) ln(1 + s)/s,    x_min = a exp(-kappa h(s))
-    e = V'/V is the root of e² h(-s e) = h(s), that is e = tau/s - 1, tau = 1 + s + W0(-(1 + s) exp(-(1 + s)))
+    e = V'/V is the root of e² h(-s e) = h(s), that is e = tau/s - 1
+    tau = 1 + s + W0(-(1 + s) exp(-(1 + s)))
     contact ends at t_f = (1 + e) m V/(a k)
 
 e depends on s alone: e = 1 - 2/3 s + ... for small s, and tends to 1/s for large s. A speed V of

@@ -7,7 +7,8 @@ to space. Velocities v = (ṙ_c, Omega), Omega in the body frame (39); M = diag(
 constant. The plane is n·x = d, the body before it, n·x > d; P is the body's point next to the
 plane, l_P in the body frame:
 
-    rho = n·(r_c + R l_P) - d,    A = (n; l_P x Rᵀn)    (45, 46),    M v̇ = (F; T - Omega x J Omega) + Aᵀ lambda
+    rho = n·(r_c + R l_P) - d,    A = (n; l_P x Rᵀn)        (45, 46)
+    M v̇ = (F; T - Omega x J Omega) + Aᵀ lambda
     ṗ = ½ p ∘ (0, Omega)
 
 The impact map, which the motion through a thin layer tends to: v⁺ = v⁻ - M⁻¹Aᵀ g_11 (1 + e) ρ̇⁻,

@@ -1,9 +1,9 @@
 """Give closed forms for the elastic-plastic torsion of bars: the disk and the square.
 
 The stress function u of a bar of shear modulus G, yield stress k and twist theta per length
-minimises
+minimises (H. Brezis, M. Sibony, 1971)
 
-    ½ ∫ |∇u|² - 2 G theta ∫ u    under |∇u| <= k, which is |u| <= k dist(x, boundary)    (H. Brezis, M. Sibony, 1971)
+    ½ ∫ |∇u|² - 2 G theta ∫ u    under |∇u| <= k, which is |u| <= k dist(x, boundary)
 
 and the torque is 2 ∫ u. Lengths are in units of a (radius, half side), stresses in units of k; w =
 G theta a / k. Disk: plastic for r > 1/w, torque (2 pi/3) (1 - 1/(4 w³)) for w >= 1, pi w / 2

@@ -1,8 +1,9 @@
 """Hold both statements of Ahn (2012), section 8, against every reading of its normal force.
 
-    1   "oscillating of the beam at the right end depends on the magnitude of contact forces; larger contact forces
-        causes more oscillations"
-    2   "In our numerical results, energy loss for friction seems to be negligible as compared to the viscosity damping"
+    1   "oscillating of the beam at the right end depends on the magnitude of contact forces; larger
+        contact forces causes more oscillations"
+    2   "In our numerical results, energy loss for friction seems to be negligible as compared to
+        the viscosity damping"
 
 Statement 1 is asked of runs whose force is a hundredth, a tenth, the whole and ten times that of
 the reading. A run oscillates as often as its tip turns and then moves by more than eps: below eps,

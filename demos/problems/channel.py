@@ -39,8 +39,11 @@ from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
 REFERENCE = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": "l2"})
-"""The volume route to compare with and to fall back on. Without a line search its active set runs in circles in some
-steps of the channel: M/dt² of a consistent mass couples neighbours with the sign that sets need to settle reversed."""
+"""The volume route to compare with and to fall back on.
+
+Without a line search its active set runs in circles in some steps of the channel: M/dt² of a
+consistent mass couples neighbours with the sign that sets need to settle reversed.
+"""
 BODIES = ("channel", "soil")  # in the order of their nodes
 SIDES = ("base", "left", "right")  # of the contact, in the order of its conditions
 POINTS = 19

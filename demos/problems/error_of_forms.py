@@ -7,7 +7,8 @@ of concrete on steel: "The squared energy error for both couplings decays with s
 Displacements of nested meshes and time steps lie in the finest space, whose symmetric operator S
 knows the energy of any motion v of the boundary:
 
-    |v|²(t_n) = sum_(k<=n) (S v)_k . (v_k - v_(k-1)),       error² = sum_n |u_h - u|²(t_n) / sum_n |u|²(t_n),
+    |v|²(t_n) = sum_(k<=n) (S v)_k . (v_k - v_(k-1))
+    error² = sum_n |u_h - u|²(t_n) / sum_n |u|²(t_n),
 
 u the finest symmetric solution: the energy norm of the difference, over time. Its own error e² is
 what the successive differences of its last three levels, d = |u_4h - u_2h| and b = |u_2h - u_h|,

@@ -32,7 +32,7 @@ def member(a: Any, b: Any, *, EA: float, EI: float, rho_A: float) -> tuple[Any, 
 
 
 def frame(nodes: Any, members: Sequence[tuple[int, int]], **section: float) -> dict[str, Any]:
-    """M, K, coordinates and unknowns of a frame, as ``system_from_arrays`` takes them; C is None."""
+    """Give M, K, coordinates and unknowns of a frame for ``system_from_arrays``; C is None."""
     nodes = np.asarray(nodes, dtype=float)
     n = 3 * len(nodes)
     M, K = sp.lil_matrix((n, n)), sp.lil_matrix((n, n))
