@@ -31,17 +31,23 @@ WIDTHS = 1280, 390  # of a screen and of a telephone
 # Opens each page in a frame, waits until it is whole, and tells the server what it finds there.
 PROBE = """<!doctype html><link rel="icon" href="data:,"><script>
 const wait = (ms) => new Promise((done) => setTimeout(done, ms));
-async function until(holds) {  // half a minute, of which an idle machine needs a fraction of a second
+// waits half a minute at most, of which an idle machine needs a fraction of a second
+async function until(holds) {
   for (let k = 0; k < 1500 && !holds(); k++) await wait(20);
 }
 async function probe(url) {
   const frame = document.createElement("iframe");
   frame.style = "height: 800px; border: 0";
-  await new Promise((done) => { frame.onload = done; frame.src = url; document.body.append(frame); });
+  await new Promise((done) => {
+    frame.onload = done;
+    frame.src = url;
+    document.body.append(frame);
+  });
   const here = frame.contentWindow, page = here.document;
   const math = page.querySelectorAll(".math").length;
   const set = () => page.querySelectorAll("mjx-container mjx-math").length;
-  const hits = () => [...page.querySelectorAll("#search-results li a")].map((one) => one.textContent);
+  const results = () => [...page.querySelectorAll("#search-results li a")];
+  const hits = () => results().map((one) => one.textContent);
   await until(() => set() >= math && (hits().length || !url.includes("?q=")));
   page.querySelectorAll("img").forEach((one) => one.loading = "eager");
   await Promise.all([...page.images].map((one) => one.decode().catch(() => 0)));
@@ -57,7 +63,8 @@ async function probe(url) {
   }
   const loaded = here.performance.getEntriesByType("resource").map((one) => one.name);
   found.loaded = loaded.length;
-  found.outside = loaded.filter((one) => !one.startsWith(location.origin) && !/^(data|blob):/.test(one));
+  const own = (one) => one.startsWith(location.origin) || /^(data|blob):/.test(one);
+  found.outside = loaded.filter((one) => !own(one));
   frame.remove();
   return found;
 }
