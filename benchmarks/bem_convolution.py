@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Compare convolution quadrature with the energetic boundary elements: accuracy and cost on the
-problems of bem.py.
+"""Compare convolution quadrature with the energetic boundary elements on the problems of bem.py.
 
     python3 benchmarks/bem_convolution.py [--sides 10 20] [--methods convolution energetic]
 
@@ -65,8 +64,10 @@ Forces = Callable[[float, int], np.ndarray]
 
 
 def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.ndarray]]:
-    """problem(forces, fixed=, contact=), and the loads it takes from mean forces of any number of
-    steps."""
+    """Return problem(forces, fixed=, contact=) of a method, and the loads that it takes.
+
+    The loads are made of mean forces of any number of steps.
+    """
     mesh, dt, steps = bem.polygon(SQUARE, 1.0 / k), 1.0 / k, 6 * k
     if method == "energetic":
         operator = bem.PoincareSteklov(
@@ -83,7 +84,7 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
 
 
 def row(method: str, k: int) -> dict[str, float]:
-    """Times [s], memory and errors of one method at one size."""
+    """Return times [s], memory and errors of one method with k elements a side."""
     start = time.process_time()
     problem, loads = discretised(method, k)
     result = {"k": k, "assembly": time.process_time() - start}
@@ -100,6 +101,7 @@ def row(method: str, k: int) -> dict[str, float]:
 
 
 def pulse_error(problem: Problem, loads: Callable, k: int, *, shear: bool) -> float:
+    """Return the relative L2 error of a plane pulse, P or (``shear``) S, until T = 4."""
     wave, mesh = pulse(shear=shear), bem.polygon(SQUARE, 1.0 / k)
     forces = loads(lambda dt, steps: bem.traction_forces(mesh, wave.traction, dt=dt, steps=steps))
     exact = np.array([wave.displacement(mesh.points, (j + 1) / k).T for j in range(4 * k)])
@@ -118,6 +120,10 @@ def rod_errors(
     integral: Callable,
     k: int,
 ):
+    """Put the error of the top of the rod under one load into the result.
+
+    The load "step" also gives the error of the force at the base.
+    """
     mesh = bem.polygon(SQUARE, 1.0 / k)
     sides = [mesh.nodes_of(mesh.labels == side) for side in range(4)]
     forces = loads(
@@ -138,6 +144,10 @@ def rod_errors(
 
 
 def pressed_square(result: dict, problem: Problem, k: int) -> None:
+    """Put impulse at t = 4, energy at t = 2, W_0 and iterations of Uzawa's method into the result.
+
+    The square is pressed under Tresca's friction; nan means that Uzawa's method did not end.
+    """
     mesh = bem.polygon(SQUARE, 1.0 / k)
     forces = bem.traction_forces(
         mesh, lambda x, n, t: -n, dt=1.0 / k, steps=6 * k, elements=mesh.labels == 2
@@ -161,6 +171,7 @@ def pressed_square(result: dict, problem: Problem, k: int) -> None:
 
 
 def main() -> None:
+    """Print a row for each size and method, each computed in its own process."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

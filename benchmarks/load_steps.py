@@ -64,8 +64,10 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Block:
-    """Hold the block: its displacement u, energy and F, the condition at the top with its values g,
-    and the floor."""
+    """Hold the block: its displacement u, its energy, F, and the floor.
+
+    ``bc`` is the condition at the top, and g has its values.
+    """
 
     u: Any
     energy: Any
@@ -131,8 +133,10 @@ class Snes:
         self.posed.u.x.scatter_forward()
 
     def function(self, _snes: Any, x: Any, R: Any) -> None:
-        """F at free unknowns, with what the linear step to the prescribed values adds; u - g at
-        held ones."""
+        """Evaluate F at free unknowns and u - g at held ones.
+
+        F has what the linear step to the prescribed values adds.
+        """
         self.put(x)
         F = compat.assemble_vector(self.F)
         off = x.array_r[self.held] - self.posed.g.x.array[self.held]
@@ -149,7 +153,7 @@ class Snes:
         R.array[self.held] = off
 
     def jacobian(self, _snes: Any, x: Any, A: Any, _P: Any) -> None:
-        """J with the rows and columns of the identity at held unknowns."""
+        """Evaluate J with the rows and columns of the identity at held unknowns."""
         self.put(x)
         J = compat.assemble_matrix(self.J)
         J.zeroRowsColumns((self.first + self.held).astype(PETSc.IntType), diag=1.0)
@@ -189,8 +193,10 @@ class Snes:
 def run(
     posed: Block, count: int, solve: Callable[[], Any]
 ) -> tuple[list[Any], list[float], list[Any], int]:
-    """Take the load steps until one fails; return what each gave, its time on the busiest rank, u,
-    and failures."""
+    """Take the load steps until one fails; return answers, times, displacements and failures.
+
+    A time [s] is that of the busiest rank.
+    """
     given, seconds, fields = [], [], []
     for k in range(count):
         posed.lower_top(DOWN * (k + 1) / count)
@@ -246,7 +252,7 @@ def row(cells: int, step: float) -> dict[str, Any]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, and write the rows if asked to."""
+    """Print the measurements, and write the rows if asked to."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
         "--cells", type=int, nargs="+", default=[16, 32, 64], help="squares across the block"

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Measure what bounds on a field cost: ``vi.solve`` beside PETSc's SNESVI, on the membrane over a
-ball.
+"""Measure what bounds on a field cost: ``vi.solve`` and PETSc's SNESVI, a membrane over a ball.
 
     python3 benchmarks/obstacle.py [--cells 449] [--json FILE]
     mpirun -n 2 python3 benchmarks/obstacle.py
@@ -62,8 +61,10 @@ CASES = (  # what, size of u, whether it starts from the solution
 
 
 def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
-    """PETSc's reason, iterations and x (free and clamped unknowns) of SNES vinewtonrsls, from
-    posed.u."""
+    """Return PETSc's reason, iterations and x of SNES vinewtonrsls, which begins with posed.u.
+
+    x has the free and the clamped unknowns.
+    """
     A, V = compat.assemble_matrix(compat.compile_form(posed.a)), posed.u.function_space
     n = V.dofmap.index_map.size_local
     clamped, values = np.zeros(n, dtype=bool), posed.exact.x.array[:n]
@@ -107,12 +108,12 @@ def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
 
 
 def spent(start: float) -> float:
-    """Processor time since then of the busiest rank."""
+    """Return the processor time [s] of the busiest rank since then."""
     return float(COMM.allreduce(time.process_time() - start, op=MPI.MAX))
 
 
 def cost(cells: int) -> dict[str, Any]:
-    """Both routes once, cold; forms compiled beforehand."""
+    """Run both routes once, cold, with forms compiled beforehand."""
     small = build(COMM, 4)
     vi.solve((small.a, small.L), small.u, lower=small.lower, bcs=[small.bc])
     posed = build(COMM, cells)
@@ -142,7 +143,7 @@ def cost(cells: int) -> dict[str, Any]:
 
 
 def failures(cells: int) -> list[dict[str, Any]]:
-    """SNESVI with all of PETSc's defaults beside vi.solve, on a small mesh."""
+    """Return the rows of SNESVI with all of PETSc's defaults beside vi.solve, on a small mesh."""
     rows = []
     for case, unit, warm in CASES:
         posed = build(COMM, cells, unit)
@@ -174,7 +175,7 @@ def failures(cells: int) -> list[dict[str, Any]]:
 
 
 def main(arguments: list[str]) -> int:
-    """Measure, print, and write the numbers if asked to."""
+    """Print both measurements, and write the numbers if asked to."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
         "--cells", type=int, default=449, help="squares along a side; 449 are 2e5 unknowns"

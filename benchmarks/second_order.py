@@ -59,19 +59,21 @@ SECTIONS = {  # of the cantilever: dimension, section, Poisson's ratio
 
 
 def matrix(one: Any) -> sp.csr_matrix:
-    """A matrix of a system on one rank."""
+    """Return a matrix of a system on one rank in the form of scipy."""
     ends, columns, values = as_petsc(one).mat.getValuesCSR()
     return sp.csr_matrix((values, columns, ends))
 
 
 def entries(system: SemiDiscreteSystem) -> float:
-    """Entries of K that are not zero, for each unknown."""
+    """Return the entries of K that are not zero, for each unknown."""
     return matrix(system.K).count_nonzero() / system.rows
 
 
 def cantilever(body: str, cells: int, element: str) -> tuple[float, SemiDiscreteSystem]:
-    """(first frequency [rad/s], system) of a bending cantilever with so many cells over its
-    height."""
+    """Return the first frequency [rad/s] and the system of a bending cantilever.
+
+    It has so many cells over its height.
+    """
     d, section, nu = SECTIONS[body]
     degree, simplices = ELEMENTS[element]
     lengths = (float(SLENDER), *(1.0,) * (d - 1))
@@ -91,7 +93,7 @@ def cantilever(body: str, cells: int, element: str) -> tuple[float, SemiDiscrete
 
 
 def bending(cells: list[int]) -> list[Row]:
-    """Error of the first frequency in per cent."""
+    """Return rows with the error of the first frequency in per cent."""
     rows = []
     for body in SECTIONS:
         exact, _ = cantilever(body, 6 if body == "in space" else 16, "Q2")
@@ -112,7 +114,7 @@ def bending(cells: list[int]) -> list[Row]:
 
 
 def hertz(cells: list[int]) -> list[Row]:
-    """Error of the pressure of a cylinder in L2, in per cent of its norm."""
+    """Return rows with the error of a cylinder's pressure in L2, in per cent of its norm."""
     a, R, span = 0.02, 1.0, 30.0
     exact, rows = HertzLine(force=np.pi * a**2 / (4.0 * R), modulus=1.0, radius=R), []
     for n in cells:
@@ -157,7 +159,7 @@ def hertz(cells: list[int]) -> list[Row]:
 
 
 def impact(cells: list[int]) -> list[Row]:
-    """Errors of the force of a thrown strip, in per cent of the exact force."""
+    """Return rows with errors of the force of a thrown strip, in per cent of the exact force."""
     case, rows = ThrownBar(), []
     for n in cells:
         for element, (degree, triangles) in ELEMENTS.items():
@@ -196,7 +198,7 @@ def impact(cells: list[int]) -> list[Row]:
 
 
 def line(row: Row) -> str:
-    """One row for people."""
+    """Return one row as a line for people."""
     told = ("frequency", "pressure", "force", "ringing", "in contact")
     values = " ".join(f"{name} {row[name]:.3g}" for name in told if name in row)
     return (
@@ -206,6 +208,7 @@ def line(row: Row) -> str:
 
 
 def main() -> None:
+    """Print a line for each row of the three problems, and write all of them with --json."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Measure what a step of a small system costs, as a multiple of the same mathematics in bare numpy,
-in one run.
+"""Measure what a step of a small system costs, in steps of the same mathematics in bare numpy.
+
+Both are timed in one run.
 
     python3 benchmarks/small_systems.py [--steps 400] [--rounds 11] [--json FILE]
 
@@ -47,7 +48,7 @@ SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 
 
 class Bare:
-    """The wall as arrays, and its steps as 40 lines of numpy and scipy."""
+    """Hold the wall as arrays, and step it in 40 lines of numpy and scipy."""
 
     def __init__(self, problem: vc.ContactProblem, dt: float) -> None:
         equations, self.dt, self.load = problem.equations, dt, problem.equations.load
@@ -109,7 +110,7 @@ class Bare:
     def _certificate(
         self, Ax: Any, b: Any, x: Any, r: Any, guess: Any, active: Any, largest: float
     ) -> float:
-        """The residuals of vi_contact's certificate without friction."""
+        """Return the largest residual of vi_contact's certificate without friction."""
         residual, gap = Ax - b, self.gap0 - x[self.points]
         residual[self.points] += r
         x_max, b_max, r_max = np.abs(x).max(), np.abs(b).max(), np.abs(r).max()
@@ -143,8 +144,10 @@ main(["run", "wall", "--quiet", "--out", sys.argv[1]])
 
 
 def start_up(rounds: int) -> tuple[float, list[float]]:
-    """Processor time [s] from command to first step, the median, and its ratios to that of
-    importing the libraries."""
+    """Return the processor time [s] from command to first step, the median, and its ratios.
+
+    They are ratios to the time of importing the libraries.
+    """
     found: dict[str, list[float]] = {LIBRARIES: [], FIRST_STEP: []}
     with tempfile.TemporaryDirectory() as folder:
         cached = {
@@ -163,7 +166,7 @@ def start_up(rounds: int) -> tuple[float, list[float]]:
 
 
 def spent(work: Callable[[], Any]) -> tuple[float, Any]:
-    """(processor time [s], result)."""
+    """Return the processor time [s] of a call, and its result."""
     begin = time.thread_time()
     result = work()
     return time.thread_time() - begin, result
@@ -231,6 +234,7 @@ def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
 
 
 def main() -> None:
+    """Print the rows of the methods and the line of the start-up."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=400)
     parser.add_argument("--rounds", type=int, default=11)
