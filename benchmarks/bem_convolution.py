@@ -7,8 +7,8 @@ The body is the unit square with k elements on a side, c_P dt = h, T = 6, N = 6 
 symmetric form. Every row is computed by one thread in a process of its own, and its seconds are
 processor time. Errors are those of bem.py. The contact problem is the pressed square under Tresca's
 friction. Its columns are the impulse at t = 4, the energy at t = 2, and the iterations of Uzawa's
-method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than
-2000. The last column is the greatest eigenvalue of W_0.
+method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than 2000.
+The last column is the greatest eigenvalue of W_0.
 """
 
 from __future__ import annotations

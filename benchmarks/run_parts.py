@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Measure where the processor time of a run goes: a bar for every size, and a figure.
 
-    python3 benchmarks/run_parts.py [--steps 200] [--figure docs/figures/run_parts.png] [--json
-    FILE]
+    python3 benchmarks/run_parts.py [--steps 200] [--figure docs/figures/run_parts.png]
+        [--json FILE]
 
 The runs are the wall and the block in space of step_cost.py, without friction. ``simulate`` has its
 default records and a run folder; mesh and assembly are not counted. The time of a part is the time

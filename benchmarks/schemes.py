@@ -2,7 +2,7 @@
 """Measure what time schemes do in an impact, against exact solutions, and what a step costs.
 
     python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--no-bars]
-    [--json FILE]
+        [--json FILE]
 
 There are two tables, in the form of docs/guide/schemes.md:
 

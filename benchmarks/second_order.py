@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Measure what displacements of second order gain: elements of degree 1 and 2 on the same nodes.
 
-    python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100] [--json
-    FILE]
+    python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100]
+        [--json FILE]
 
 The numbers are cells of degree 1. Cells of degree 2 are half as many on a side and have the same
 nodes, so that all elements have as many unknowns (nearly as many on the graded meshes of hertz). A

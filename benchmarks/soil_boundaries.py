@@ -3,8 +3,8 @@
 
 The reflection of dashpots depends on the angle of the waves.
 
-    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only
-    dashpots|sides|boxes]
+    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14]
+        [--only dashpots|sides|boxes]
 
 dashpots: a group of plane waves runs in a strip that is one wavelength wide along the boundary, and
 whose sides are tied. The column is the energy that is left after the reflection, over the energy

@@ -3,8 +3,8 @@
 
 Both are timed in one run.
 
-    python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square] [--json
-    FILE]
+    python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square]
+        [--json FILE]
 
 The problems are the wall of docs/start/first_wall.md with its whole right side in possible contact,
 the buried channel (two bodies and an impact law, after the gravity stage), and a block in space
