@@ -27,7 +27,8 @@ from demos import beam  # noqa: E402
 from demos.beam.contract import beam_problem  # noqa: E402
 from demos.problems import published_beam as source  # noqa: E402
 
-STEPS, DT = 1000, 0.002
+STEPS = 1000
+DT = 0.002
 
 
 def best(action: Callable[[], object], repeat: int) -> float:
@@ -45,7 +46,8 @@ def runs(count: int) -> list[Callable[[], object]]:
 
     Readings A and C and the exact law go by block elimination, the exact law also by the package.
     """
-    elements, start = source.published_elements(count), source.published_start()
+    elements = source.published_elements(count)
+    start = source.published_start()
     body = beam.TimoshenkoBeam(viscosity=0.001)
     law = vc.Coulomb(0.3)
     problem = beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)

@@ -159,7 +159,8 @@ def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
     """Return the relative L2 errors of plane P and S pulses that cross the square until T = 4."""
     errors = {}
     for name, shear in (("pulse P", False), ("pulse S", True)):
-        wave, mesh = pulse(shear=shear), blocks.mesh
+        wave = pulse(shear=shear)
+        mesh = blocks.mesh
         forces = bem.traction_forces(mesh, wave.traction, dt=blocks.dt, steps=4 * k)
         exact = np.array(
             [wave.displacement(mesh.points, blocks.dt * (j + 1)).T for j in range(4 * k)]
@@ -174,7 +175,8 @@ def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
 
     The step also gives the error of the force at the base and its maximum, which is exactly 2.
     """
-    errors, mesh = {}, blocks.mesh
+    errors = {}
+    mesh = blocks.mesh
     loads = {
         "step": (lambda t: 1.0, lambda t: np.maximum(t, 0.0)),
         "sin²": (smooth_load, smooth_integral),
@@ -206,7 +208,8 @@ def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
     )
     motion = rod(blocks, smooth_load).solve()
     size = np.abs(motion.displacement[:, 1]).max(axis=1)
-    early, late = (motion.times > 2.0) & (motion.times < 12.0), motion.times > end - 10.0
+    early = (motion.times > 2.0) & (motion.times < 12.0)
+    late = motion.times > end - 10.0
     return (
         f"{ratio:5.2f} {blocks.steps:5d}  {size[early].max():.4f} {size[late].max():.4f}  "
         f"{motion.work[early].max():.4f} {motion.work[late].max():.4f}"
@@ -216,7 +219,8 @@ def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
 def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
     """Return the errors of the top of a rod of the width h/share by both methods, as a line."""
     half = 0.5 * h / share
-    mesh, errors = bem.polygon([(-half, -0.5), (half, -0.5), (half, 0.5), (-half, 0.5)], h), []
+    mesh = bem.polygon([(-half, -0.5), (half, -0.5), (half, 0.5), (-half, 0.5)], h)
+    errors = []
     for dt in (h, 0.5 * h):
         blocks = bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=round(end / dt))
         errors.append(rod_errors(blocks)["sin²"])

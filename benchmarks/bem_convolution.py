@@ -68,7 +68,9 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
 
     The loads are made of mean forces of any number of steps.
     """
-    mesh, dt, steps = bem.polygon(SQUARE, 1.0 / k), 1.0 / k, 6 * k
+    mesh = bem.polygon(SQUARE, 1.0 / k)
+    dt = 1.0 / k
+    steps = 6 * k
     if method == "energetic":
         operator = bem.PoincareSteklov(
             bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho
@@ -102,7 +104,8 @@ def row(method: str, k: int) -> dict[str, float]:
 
 def pulse_error(problem: Problem, loads: Callable, k: int, *, shear: bool) -> float:
     """Return the relative L2 error of a plane pulse, P or (``shear``) S, until T = 4."""
-    wave, mesh = pulse(shear=shear), bem.polygon(SQUARE, 1.0 / k)
+    wave = pulse(shear=shear)
+    mesh = bem.polygon(SQUARE, 1.0 / k)
     forces = loads(lambda dt, steps: bem.traction_forces(mesh, wave.traction, dt=dt, steps=steps))
     exact = np.array([wave.displacement(mesh.points, (j + 1) / k).T for j in range(4 * k)])
     return float(
@@ -132,12 +135,14 @@ def rod_errors(
         )
     )
     motion = problem(forces, fixed=np.stack([sides[1] | sides[3], sides[0]])).solve()
-    exact, top = echoes(motion.times, integral)[:, None], motion.displacement[:, 1][:, sides[2]]
+    exact = echoes(motion.times, integral)[:, None]
+    top = motion.displacement[:, 1][:, sides[2]]
     result[name] = float(
         np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
     )
     if name == "step":
-        base, middle = -motion.forces[:, 1][:, sides[0]].sum(axis=1), motion.times - 0.5 / k
+        base = -motion.forces[:, 1][:, sides[0]].sum(axis=1)
+        middle = motion.times - 0.5 / k
         exact_base = np.where((middle > 1.0) & ((middle - 1.0) % 4.0 < 2.0), 2.0, 0.0)
         result["base"] = float(np.linalg.norm(base - exact_base) / np.linalg.norm(exact_base))
         result["max base"] = float(base.max())
@@ -157,10 +162,8 @@ def pressed_square(result: dict, problem: Problem, k: int) -> None:
     contact = BoundaryContact(whole.condensed(), friction=Tresca(0.05))
     result["condense"] = time.process_time() - start
     run = march_contact(contact)
-    result["impulse"], result["E(2)"] = (
-        run.impulse[4 * k - 1, 1],
-        whole.solve(run.forces).work[2 * k - 1],
-    )
+    result["impulse"] = run.impulse[4 * k - 1, 1]
+    result["E(2)"] = whole.solve(run.forces).work[2 * k - 1]
     result["W_0"] = float(np.linalg.eigvalsh(contact.compliance.W[0])[-1])
     for name, share in (("Uzawa", 1.0), ("Uzawa/5", 0.2)):
         try:

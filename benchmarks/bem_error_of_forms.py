@@ -68,14 +68,12 @@ def main() -> None:
     if options.json and options.json.exists():
         rows = json.loads(options.json.read_text())
     for example in options.examples:
-        start, supports = (
-            time.process_time(),
-            [
-                one
-                for one in EXAMPLES[example].supports
-                if one in (options.supports or EXAMPLES[example].supports)
-            ],
-        )
+        start = time.process_time()
+        supports = [
+            one
+            for one in EXAMPLES[example].supports
+            if one in (options.supports or EXAMPLES[example].supports)
+        ]
         found = measure(example, options.levels, *supports)
         rows = [row for row in rows if row["case"] not in {new["case"] for new in found}] + found
         print(

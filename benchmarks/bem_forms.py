@@ -96,7 +96,8 @@ def contact(k: int, laws: list[str]) -> Iterator[dict[str, Any]]:
         first: tuple[np.ndarray, np.ndarray] | None = None
         for form, problem in problems.items():
             run = bem.march_contact(bem.BoundaryContact(condensed[form], friction=LAWS[law]))
-            impulse, energy = run.impulse, problem.solve(run.forces).work
+            impulse = run.impulse
+            energy = problem.solve(run.forces).work
             first = first or (impulse, energy)
             away = [
                 float(np.abs(one - base).max() / np.abs(base).max())
@@ -143,10 +144,8 @@ def triangle(h: float = 0.05) -> Iterator[dict[str, Any]]:
     blocks = bem.energetic_blocks(bem.polygon(TRIANGLE, h), MATERIAL, dt=h, steps=steps)
     for form in FORMS:
         for shear in (False, True):
-            wave, operator = (
-                pulse(shear=shear),
-                bem.PoincareSteklov(blocks, 1.0, symmetric=form == "symmetric"),
-            )
+            wave = pulse(shear=shear)
+            operator = bem.PoincareSteklov(blocks, 1.0, symmetric=form == "symmetric")
             forces = bem.traction_forces(blocks.mesh, wave.traction, dt=h, steps=steps)
             found = bem.BoundaryProblem(operator, forces).solve().displacement
             exact = np.array(

@@ -56,7 +56,8 @@ T_END = 4.0
 STEP = 0.9  # c_P dt / h: fronts then come inside of intervals, whatever their length
 # of certificates: before the front comes displacements are 1e-20, penetrations round-off of these
 TOLERANCE = 1e-6
-RHO, MOST = 0.4, 2000  # of Uzawa's step, of 1/lambda_max(W[0]); of his iterations
+RHO = 0.4  # of Uzawa's step, in 1/lambda_max(W[0])
+MOST = 2000  # of his iterations
 INNER = 0.375  # |x| up to which pressures are compared: corners of a rubbing square are singular
 KEYS = (
     "k",
@@ -115,10 +116,12 @@ def errors(found: Answer, fine: Answer) -> dict[str, Any]:
     Forces are means over intervals.
     """
     t = found.t[found.t <= T_END * (1.0 + 1e-9)]
-    n, exact = len(t), np.interp(t, fine.t, fine.impulse)
+    n = len(t)
+    exact = np.interp(t, fine.t, fine.impulse)
     force, wrong = (np.diff(history) / np.diff(t) for history in (exact, found.impulse[:n] - exact))
     energy = np.interp(t, fine.t, fine.energy)
-    x, middle = np.linspace(-INNER, INNER, 193), (np.arange(480) + 0.5) / 480 * t[-1]
+    x = np.linspace(-INNER, INNER, 193)
+    middle = (np.arange(480) + 0.5) / 480 * t[-1]
     pressure = fine.pressures(x, middle)
     return {
         "t": t.tolist(),
@@ -154,11 +157,13 @@ class Square:
 
     def row(self, law: str, fine: Answer, **choice: Any) -> dict[str, Any]:
         """Return one row: the answer on a mesh of the multiplier's own, with its errors."""
-        mesh, elements = self.problem.operator.mesh, self.problem.contact
+        mesh = self.problem.operator.mesh
+        elements = self.problem.contact
         own = bem.MultiplierMesh(mesh, elements, self.compliance, **choice)
         contact = bem.BoundaryContact(own.condensed(), friction=LAWS[law])
         run = bem.march_contact(contact, tolerance=TOLERANCE)
-        steps, degree = len(self.compliance.W), own.degree
+        steps = len(self.compliance.W)
+        degree = own.degree
         normal = contact.surface.owned
         first = (
             contact.W[0][np.ix_(normal, normal)]
@@ -236,13 +241,12 @@ def main() -> None:
             for law in LAWS:
                 for choice in choices(k):
                     rows.append(square.row(law, fine[law], **choice))
-                    print(
-                        *(
-                            f"{value:10.3g}" if isinstance(value, float) else f"{value:>10}"
-                            for value in (rows[-1][key] or 0 for key in KEYS)
-                        ),
-                        flush=True,
-                    )
+                    values = [rows[-1][key] or 0 for key in KEYS]
+                    shown = [
+                        f"{value:10.3g}" if isinstance(value, float) else f"{value:>10}"
+                        for value in values
+                    ]
+                    print(*shown, flush=True)
         if chosen.json:
             chosen.json.write_text(json.dumps(rows) + "\n")
     if chosen.figure:

@@ -69,7 +69,8 @@ def main() -> None:
     )
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    material, rows = Square().material, []
+    material = Square().material
+    rows = []
     condensed = {
         k: square_problem(k, material, dt=1.0 / k, steps=round(END * k)).condensed()
         for k in options.elements

@@ -74,12 +74,14 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     usual = processes.TOGETHER
     for way, runs in (("together", usual), ("apart", 1)):
         processes.TOGETHER = runs
-        begin, clock = seconds(), time.perf_counter()
+        begin = seconds()
+        clock = time.perf_counter()
         try:
             rows[way] = run_ida(study, folder / way, jobs=options.jobs, say=lambda line: None)
         finally:
             processes.TOGETHER = usual
-        spent[way], passed[way] = seconds() - begin, time.perf_counter() - clock
+        spent[way] = seconds() - begin
+        passed[way] = time.perf_counter() - clock
     failed = [
         row["reason"] for found in rows.values() for row in found if row["status"] != "finished"
     ]

@@ -55,7 +55,9 @@ SOLVERS: dict[str, Any] = {
 # energy, in free flight
 KEEPING = ("Trapezoidal", "Midpoint", "Contact", "Zienkiewicz", "Moreau", "SS22", "Newmark")
 SOFT = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
-COURANT, DIVISIONS, HEIGHT = 0.02, (16, 8), 1.0
+COURANT = 0.02
+DIVISIONS = (16, 8)
+HEIGHT = 1.0
 
 
 def block(*, free: bool) -> vc.ContactProblem:

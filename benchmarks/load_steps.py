@@ -89,7 +89,8 @@ def block(comm: Any, cells: int) -> Block:
 
     # W = mu/2 (tr FᵀF - 2) - mu ln J + lambda/2 (ln J)²
     E, nu = 1.0, 0.3
-    mu, lam = E / (2.0 * (1.0 + nu)), E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    mu = E / (2.0 * (1.0 + nu))
+    lam = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     gradient = ufl.Identity(2) + ufl.grad(u)
     J = ufl.det(gradient)
     W = (
@@ -115,12 +116,12 @@ class Snes:
     """Solve a block by SNES vinewtonrsls; ``solve`` starts from what is in u."""
 
     def __init__(self, posed: Block) -> None:
-        self.posed, self.factors, V = posed, 0, posed.u.function_space
+        self.posed = posed
+        self.factors = 0
+        V = posed.u.function_space
         self.n = V.dofmap.index_map_bs * V.dofmap.index_map.size_local
-        self.F, self.J = (
-            compat.compile_form(posed.F),
-            compat.compile_form(ufl.derivative(posed.F, posed.u)),
-        )
+        self.F = compat.compile_form(posed.F)
+        self.J = compat.compile_form(ufl.derivative(posed.F, posed.u))
         held = compat.bc_values(posed.bc, len(posed.u.x.array))[0]
         self.held = held[held < self.n]
         self.A = compat.assemble_matrix(self.J)
@@ -163,7 +164,8 @@ class Snes:
 
     def solve(self) -> tuple[bool, int]:
         """Return whether SNES converged, and its iterations."""
-        database, snes = PETSc.Options(), PETSc.SNES().create(COMM)
+        database = PETSc.Options()
+        snes = PETSc.SNES().create(COMM)
         snes.setOptionsPrefix("plain_")
         snes.setType("vinewtonrsls")
         for key, value in OPTIONS.items():

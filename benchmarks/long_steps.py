@@ -89,7 +89,8 @@ def block() -> vc.ContactProblem:
     A wave needs 1.7 ms for an element.
     """
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(16, 16)), MPI.COMM_WORLD)
-    rubber, weight = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0), fem.BodyForce((0.0, -10.0))
+    rubber = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0)
+    weight = fem.BodyForce((0.0, -10.0))
     system = fem.assemble(
         mesh, rubber, section=vc.PlaneStrain(), loads=weight, initial_velocity=(0.1, -1.0)
     )

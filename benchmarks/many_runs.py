@@ -67,7 +67,8 @@ def seconds_per_step(loop: Iterator[Any], count: int) -> float:
     """
     for _ in range(count):
         next(loop)
-    begin, steps = time.thread_time(), 0
+    begin = time.thread_time()
+    steps = 0
     for _ in loop:
         steps += 1
     return (time.thread_time() - begin) / steps
@@ -113,7 +114,8 @@ def measured(size: float, rounds: int) -> list[dict[str, Any]]:
 
 def difference(chosen: list[vc.ContactProblem], dt: float, steps: int) -> float:
     """Return the largest difference of steps from single steps that begin with the same states."""
-    worst, every = 0.0, max(steps // CHECKED, 1)
+    worst = 0.0
+    every = max(steps // CHECKED, 1)
     for number, report in vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps):
         if report.new.k % every == 0 and number < 2:
             alone, _ = next(

@@ -65,9 +65,11 @@ def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
 
     x has the free and the clamped unknowns.
     """
-    A, V = compat.assemble_matrix(compat.compile_form(posed.a)), posed.u.function_space
+    A = compat.assemble_matrix(compat.compile_form(posed.a))
+    V = posed.u.function_space
     n = V.dofmap.index_map.size_local
-    clamped, values = np.zeros(n, dtype=bool), posed.exact.x.array[:n]
+    clamped = np.zeros(n, dtype=bool)
+    values = posed.exact.x.array[:n]
     held = compat.bc_values(posed.bc, len(posed.u.x.array))[0]
     clamped[held[held < n]] = True
     x, b = A.createVecs()
@@ -81,7 +83,9 @@ def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
     lower, upper = x.duplicate(), x.duplicate()
     lower.array[:] = np.where(clamped, PETSc.NINFINITY, posed.lower.x.array[:n])
     upper.set(PETSc.INFINITY)
-    snes, F, database = PETSc.SNES().create(COMM), b.duplicate(), PETSc.Options()
+    snes = PETSc.SNES().create(COMM)
+    F = b.duplicate()
+    database = PETSc.Options()
     snes.setOptionsPrefix("plain_")
     snes.setType("vinewtonrsls")
     for key, value in options.items():
@@ -119,7 +123,8 @@ def cost(cells: int) -> dict[str, Any]:
     posed = build(COMM, cells)
     start = time.process_time()
     result = vi.solve((posed.a, posed.L), posed.u, lower=posed.lower, bcs=[posed.bc])
-    ours, answer = spent(start), np.array(posed.u.x.array)
+    ours = spent(start)
+    answer = np.array(posed.u.x.array)
     posed.u.x.array[:] = 0.0  # a mesh made again might be cut into other parts
     start = time.process_time()
     reason, iterations, x = plain(posed, QUICKEST)
@@ -155,7 +160,8 @@ def failures(cells: int) -> list[dict[str, Any]]:
             posed.u.x.array[:] = 0.0
         reason, iterations, x = plain(posed, DEFAULTS)
         n = len(x)
-        ours, theirs = result.lambda_lower.x.array[:n] > 0.0, x <= posed.lower.x.array[:n]
+        ours = result.lambda_lower.x.array[:n] > 0.0
+        theirs = x <= posed.lower.x.array[:n]
         error, size = (
             COMM.allreduce(float(np.max(np.abs(one))), op=MPI.MAX)
             for one in (x - answer[:n], answer[:n])

@@ -81,17 +81,25 @@ def cost(
     marching = vc.march(
         problem, dt=raft.DT, steps=steps, state=thrown(problem, state), solver=solver
     )
-    surface, begin = problem.surface, process_time()
-    stamps, open_shares, changes, iterations, worst, method = [begin], [], [], [], 0.0, ""
+    surface = problem.surface
+    begin = process_time()
+    stamps = [begin]
+    open_shares = []
+    changes = []
+    iterations = []
+    worst = 0.0
+    method = ""
     for new, report in marching:
         stamps.append(process_time())
         if COMM.rank == 0:
             print(f"  step to t = {new.t:<29.4g} {stamps[-1] - stamps[-2]:.4g}", flush=True)
-        closed, before = surface.everywhere(new.active), surface.everywhere(report.old.active)
+        closed = surface.everywhere(new.active)
+        before = surface.everywhere(report.old.active)
         open_shares.append(1.0 - closed.mean())
         changes.append(int(np.sum(closed != before)))
         iterations.append(report.result.iterations)
-        worst, method = max(worst, report.certificate.worst), report.result.method
+        worst = max(worst, report.certificate.worst)
+        method = report.result.method
     each = np.diff(stamps)
     return {
         "factor": finer,

@@ -54,11 +54,9 @@ class Clock:
     """Count the processor time of parts; a part that begins stops the one that called it."""
 
     def __init__(self) -> None:
-        self.seconds, self._open, self._since = (
-            dict.fromkeys(PARTS, 0.0),
-            ["records"],
-            time.thread_time(),
-        )
+        self.seconds = dict.fromkeys(PARTS, 0.0)
+        self._open = ["records"]
+        self._since = time.thread_time()
 
     def _book(self) -> None:
         now = time.thread_time()

@@ -53,7 +53,8 @@ COMM = MPI.COMM_WORLD
 NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
 # of P waves in the upper layer
 SPEED = float(np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))))
-COURANTS, FAR = (1.0, 10.0), 100.0
+COURANTS = (1.0, 10.0)
+FAR = 100.0
 PUSH = 5e-4  # of the top in a step at C = 100 and in a static one
 # unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries
 LARGE = 5e5
@@ -142,11 +143,10 @@ def divisions(unknowns: float, dimension: int) -> tuple[int, ...]:
 
 def box(cells: tuple[int, ...], element: str) -> Any:
     """Return the mesh, built on all ranks together."""
-    top, ghosts = (
-        [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]],
-        dolfinx.mesh.GhostMode.shared_facet,
-    )
-    corners, kind = [np.zeros(len(cells)), np.array(top)], getattr(dolfinx.mesh.CellType, element)
+    top = [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]]
+    ghosts = dolfinx.mesh.GhostMode.shared_facet
+    corners = [np.zeros(len(cells)), np.array(top)]
+    kind = getattr(dolfinx.mesh.CellType, element)
     make = dolfinx.mesh.create_box if len(cells) == 3 else dolfinx.mesh.create_rectangle
     return make(COMM, corners, list(cells), kind, ghost_mode=ghosts)
 
@@ -159,7 +159,9 @@ def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int
         if dimension == 3
         else {"hexahedra": "quadrilateral", "tetrahedra": "triangle"}[element]
     )
-    mesh, up, h = box(cells, kind), dimension - 1, 1.0 / cells[0]
+    mesh = box(cells, kind)
+    up = dimension - 1
+    h = 1.0 / cells[0]
     height = cells[-1] * h
 
     def face(name: str, z: float) -> Any:
@@ -177,7 +179,8 @@ def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int
     halves = 0.5 * height
     soft, hard = (vc.LinearElastic(E=E, nu=NU, rho=1.0) for E in (1.0, CONTRAST))
     materials = [(layer("soft", -1.0, halves), soft), (layer("hard", halves, 2.0), hard)]
-    side, tilt = np.eye(dimension)[0], np.eye(dimension)[up]
+    side = np.eye(dimension)[0]
+    tilt = np.eye(dimension)[up]
     speed = -PUSH / (FAR * h / SPEED) * tilt
     held = fem.Prescribed(
         face("top", height), lambda x, t: np.tile(speed * t, (len(x), 1)), tuple(speed)
@@ -202,7 +205,8 @@ class Watched:
     """
 
     def __init__(self, solver: Any) -> None:
-        self.solver, self.check = solver, solver.check
+        self.solver = solver
+        self.check = solver.check
         self.prepared: Any = None
         self.setup = 0.0
         self.rows: list[dict[str, float]] = []
@@ -217,12 +221,12 @@ class Watched:
 
     def solve(self, step: Any) -> Any:
         """Solve a step, and add a row of its seconds, operations, iterations and counts."""
-        before, operations, start = self.counts(), PETSc.Log.getFlops(), time.process_time()
+        before = self.counts()
+        operations = PETSc.Log.getFlops()
+        start = time.process_time()
         result = self.prepared.solve(step)
-        spent, flops = (
-            busiest(time.process_time() - start),
-            busiest(PETSc.Log.getFlops() - operations),
-        )
+        spent = busiest(time.process_time() - start)
+        flops = busiest(PETSc.Log.getFlops() - operations)
         counts = {key: value - before[key] for key, value in self.counts().items()}
         self.rows.append(
             {"seconds": spent, "flops": flops, "iterations": result.iterations, **counts}
@@ -274,7 +278,9 @@ def dynamic(
     given: Block, state: vc.State | None, courant: float, solver: Any, steps: int, warm: int
 ) -> dict[str, Any]:
     """Return a row of steps from a state, of which the first ``warm`` do not count."""
-    watched, worst, closed = Watched(solver), 0.0, []
+    watched = Watched(solver)
+    worst = 0.0
+    closed = []
     dt = given.dt(courant)
     for _, report in vc.march(
         given.problem, solver=watched, dt=dt, steps=warm + steps, state=state
@@ -289,11 +295,15 @@ def dynamic(
 
 def static(given: Block, solver: Any, steps: int) -> dict[str, Any]:
     """Return a row of static steps: the weight grows, each step starts from the one before."""
-    problem, watched, worst = given.problem, Watched(solver), 0.0
+    problem = given.problem
+    watched = Watched(solver)
+    worst = 0.0
     equations, surface = problem.equations, problem.surface
     A = equations.effective(m=0.0, c=0.0, k=1.0)
     watched.prepare(A, surface, 1.0)
-    x, active, closed = np.zeros(equations.rows), np.zeros(len(surface.gap0), dtype=bool), []
+    x = np.zeros(equations.rows)
+    active = np.zeros(len(surface.gap0), dtype=bool)
+    closed = []
     for k in range(steps + 1):
         load = equations.load((k + 4) * given.dt(FAR))
         step = vc.StepProblem(A, load, surface.gap0, surface, 1.0, x, active, 0.0, k)
@@ -310,7 +320,8 @@ def row(
 ) -> dict[str, Any]:
     """Return what the table shows of the steps that ``watched`` solved, as means of a step."""
     resident = MEMORY.peak()
-    product, solver = product_seconds(A), watched.solver
+    product = product_seconds(A)
+    solver = watched.solver
     linear = linear_iterations(watched)
     mean = {key: float(np.mean([one[key] for one in watched.rows])) for key in watched.rows[0]}
     own = hasattr(watched.prepared, "work")

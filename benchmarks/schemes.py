@@ -96,11 +96,15 @@ def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -
     dt = bar.time_step(courant)
     per_bounce = round(3.0 / dt)
     problem = build(bar, MPI.COMM_WORLD).problem(mass=mass)
-    energies, error, size, peak = [], 0.0, 0.0, 0.0
+    energies = []
+    error = 0.0
+    size = 0.0
+    peak = 0.0
     for k, (state, report) in enumerate(march(problem, scheme, dt, count * per_bounce), start=1):
         if k <= 4 * per_bounce:
             exact = float(bar.case.force(state.t - 0.5 * dt))
-            error, size = error + (force(report.balance) - exact) ** 2, size + exact**2
+            error = error + (force(report.balance) - exact) ** 2
+            size = size + exact**2
             peak = max(peak, force(state) / 0.5)
         if k % per_bounce == 0:
             energies.append(energy(report) / 0.125)
@@ -112,7 +116,9 @@ def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -
 
 def linear_step(report: Any, scheme: Any, dt: float) -> float:
     """Return the seconds of the plain linear step with the same matrix from the same state."""
-    problem, old, A = report.problem, report.old, report.step.A
+    problem = report.problem
+    old = report.old
+    A = report.step.A
     none = np.zeros(problem.surface.count)
     begin = time.perf_counter()
     step = scheme.step(problem, old, A, dt)
@@ -134,7 +140,11 @@ def block(
     problem = vc.ContactProblem(
         system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=mass
     )
-    largest, seconds, linear, worst, flight = 0.0, [], [], 0.0, None
+    largest = 0.0
+    seconds = []
+    linear = []
+    worst = 0.0
+    flight = None
     loop = iter(march(problem, scheme, dt, steps))
     for _ in range(steps):
         begin = time.perf_counter()
@@ -142,7 +152,8 @@ def block(
         spent = time.perf_counter() - begin
         # linear steps start from it: no scheme has anything to do for contact there
         flight = flight or report
-        largest, worst = max(largest, force(state)), max(worst, report.certificate.worst)
+        largest = max(largest, force(state))
+        worst = max(worst, report.certificate.worst)
         if problem.surface.some(state.active):
             seconds.append(spent)
             linear.append(linear_step(flight, scheme, dt))

@@ -116,10 +116,12 @@ def bending(cells: list[int]) -> list[Row]:
 def hertz(cells: list[int]) -> list[Row]:
     """Return rows with the error of a cylinder's pressure in L2, in per cent of its norm."""
     a, R, span = 0.02, 1.0, 30.0
-    exact, rows = HertzLine(force=np.pi * a**2 / (4.0 * R), modulus=1.0, radius=R), []
+    exact = HertzLine(force=np.pi * a**2 / (4.0 * R), modulus=1.0, radius=R)
+    rows = []
     for n in cells:
         for element, (degree, simplices) in ELEMENTS.items():
-            h, growth = a / n * degree, 1.15**degree
+            h = a / n * degree
+            growth = 1.15**degree
             axes = [
                 even_then_growing(h, 1.5 * a, span * a, growth=growth),
                 growing(h, span * a, growth=growth),
@@ -142,7 +144,8 @@ def hertz(cells: list[int]) -> list[Row]:
             )
             ground = vc.AnalyticGap(lambda x: x[:, 0] ** 2 / (2.0 * R))
             surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
-            state, w = vc.static_equilibrium(vc.ContactProblem(system, surface)), surface.weights
+            state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+            w = surface.weights
             p = exact.pressure(surface.points[:, 0])
             rows.append(
                 {
@@ -160,7 +163,8 @@ def hertz(cells: list[int]) -> list[Row]:
 
 def impact(cells: list[int]) -> list[Row]:
     """Return rows with errors of the force of a thrown strip, in per cent of the exact force."""
-    case, rows = ThrownBar(), []
+    case = ThrownBar()
+    rows = []
     for n in cells:
         for element, (degree, triangles) in ELEMENTS.items():
             bar = Bar(
@@ -171,17 +175,16 @@ def impact(cells: list[int]) -> list[Row]:
                 triangles=triangles,
                 degree=degree,
             )
-            model, dt = build(bar, MPI.COMM_SELF), bar.time_step(0.5 / degree)
+            model = build(bar, MPI.COMM_SELF)
+            dt = bar.time_step(0.5 / degree)
             found = np.array(
                 [
                     (state.t, state.r_n.sum())
                     for state, _ in vc.march(model.problem(), dt=dt, steps=round(1.5 / dt))
                 ]
             )
-            t, away = (
-                found[:, 0],
-                (found[:, 1] / bar.section - case.force(found[:, 0])) / case.pressure,
-            )
+            t = found[:, 0]
+            away = (found[:, 1] / bar.section - case.force(found[:, 0])) / case.pressure
             span, middle = (t > 0.3) & (t < 1.4), (t > 0.6) & (t < 1.067)
             rows.append(
                 {

@@ -47,8 +47,11 @@ NU = 0.25
 LENGTH = 2.5  # of the packet, in wavelengths
 SOIL = vc.LinearElastic.from_wave_speeds(280.0, 150.0, 1900.0)
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.2, rho=2400.0)
-DEPTH, BOX, H = 10.0, (6.0, 4.0), 1.0  # m: soil, box, cells
-DT, STEPS = 5e-3, 400
+DEPTH = 10.0  # of the soil [m]
+BOX = (6.0, 4.0)  # [m]
+H = 1.0  # of the cells [m]
+DT = 5e-3
+STEPS = 400
 PAIRS = (("left", "right"), ("back", "front"))
 SHAKE = vc.Ricker(1.0, 4.0)
 
@@ -90,7 +93,8 @@ def shaken_box_in_space(distance: float) -> np.ndarray:
 
     It is 8 m x 8 m x 4 m in 8 m of soil.
     """
-    width, h = 8.0 + 2.0 * distance, 2.0
+    width = 8.0 + 2.0 * distance
+    h = 2.0
     block = BlockMesh(
         lengths=(width, 8.0, width),
         divisions=(round(width / h), 4, round(width / h)),
@@ -175,7 +179,8 @@ def dashpot_table(angles: Sequence[float], cells: int) -> None:
     for angle in angles:
         row = [f"{angle:g}°"]
         for wave in "PS":
-            material, slope = vc.LinearElastic(E=1.0, nu=NU, rho=1.0), math.radians(angle)
+            material = vc.LinearElastic(E=1.0, nu=NU, rho=1.0)
+            slope = math.radians(angle)
             exact = dashpot_energy(material, slope, wave=wave)
             measured, packet = energy_sent_back(
                 MPI.COMM_WORLD, material, wave, slope, length=LENGTH, cells=cells

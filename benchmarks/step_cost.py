@@ -109,7 +109,8 @@ def buried(size: float, friction: Any) -> Problem:
 
 def block(size: float, friction: Any) -> Problem:
     """Return a cube, clamped at its top, shaken over the ground that it just touches."""
-    n, f = math.floor((size / 3.0) ** (1.0 / 3.0) - 2.0 / 3.0), 400.0
+    n = math.floor((size / 3.0) ** (1.0 / 3.0) - 2.0 / 3.0)
+    f = 400.0
     mesh, tags = fem.build_mesh(
         BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(n, n, n)), MPI.COMM_SELF
     )
@@ -143,7 +144,8 @@ class Cholmod:
     def __init__(self, matrix: Any) -> None:
         ends, columns, values = matrix.mat.getValuesCSR()
         A = sp.csr_matrix((values, columns, ends), shape=(len(ends) - 1,) * 2)
-        mine, contact_last.SHORT_COLUMNS = contact_last.SHORT_COLUMNS, 0.0
+        mine = contact_last.SHORT_COLUMNS
+        contact_last.SHORT_COLUMNS = 0.0
         self.factor = contact_last.ContactLast(
             cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64)
         )
@@ -268,7 +270,9 @@ class StepsWithContact:
         state: vc.State | None = None,
     ) -> None:
         self.loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=10**6, state=state)
-        self.count, self.linear, self.worst = count, linear, 0.0
+        self.count = count
+        self.linear = linear
+        self.worst = 0.0
         self.seconds: list[float] = []
         self.active: list[int] = []
 
@@ -309,11 +313,15 @@ def measured(name: str, size: float, count: int) -> Iterator[dict[str, Any]]:
 def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str, Any]:
     """Return the row of the steps with contact of one problem, and once more its set-up."""
     problem, dt, state = given
-    linear, surface = Linear(problem, dt, factors.by), problem.surface
+    linear = Linear(problem, dt, factors.by)
+    surface = problem.surface
     steps = StepsWithContact(problem, vc.Condensed(), dt, count, linear, state)
     scale = [report.step.scale for report in steps][-1]
-    setup, own = set_up(problem, dt, scale), factors.setup.get("PETSc")
-    median, mean, plain = np.median(steps.seconds), np.mean(steps.seconds), steps.plain
+    setup = set_up(problem, dt, scale)
+    own = factors.setup.get("PETSc")
+    median = np.median(steps.seconds)
+    mean = np.mean(steps.seconds)
+    plain = steps.plain
     return {
         "unknowns": linear.A.matrix.rows,
         "points": surface.total,

@@ -29,7 +29,8 @@ from vi_contact.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------
-ELEMENTS, DT = 1000, 0.002
+ELEMENTS = 1000
+DT = 0.002
 OUT = Path("results/beam_statements")
 
 

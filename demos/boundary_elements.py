@@ -268,8 +268,9 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
         "finite elements (dots)",
     )
     pairs = (("square", "steel"), ("concrete", "ball"))
+    panels = [[energies(name, answers[name]) for name in pair] for pair in pairs]
     plot_panels(
-        [[energies(name, answers[name]) for name in pair] for pair in pairs],
+        panels,
         out / "energies.png",
         title="Energy with and without friction: boundary elements (lines), finite elements (dots)",
     )
@@ -277,7 +278,9 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
 
 def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
     """Return the deformed bodies at some times."""
-    run, contact, scale = answer.run, answer.run.contact, MAGNIFIED[name]
+    run = answer.run
+    contact = answer.run.contact
+    scale = MAGNIFIED[name]
     steps = [int(np.argmin(np.abs(run.times - t))) for t in times]
     inside = [points_inside(problem.operator.mesh) for problem, _ in answer.bodies]
     moved = [

@@ -71,7 +71,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     """
     comm = MPI.COMM_WORLD
     model = build(CHANNEL, comm)
-    dt, histories, numbers = CHANNEL.time_step(), {}, {}
+    dt = CHANNEL.time_step()
+    histories = {}
+    numbers = {}
     for name, options in RUNS.items():
         problem = model.problem(excitation=CHANNEL.harmonic(AMPLITUDE), **options)
         # the channel's weight, contact active
@@ -129,10 +131,8 @@ def key_numbers(history: History) -> dict[str, float]:
 
     The openings are those of the walls' tops and feet; it says how often both walls' are open.
     """
-    left, right = (
-        pictures.opening(history, "19", (-1.0, 0.0)),
-        pictures.opening(history, "13", (1.0, 0.0)),
-    )
+    left = pictures.opening(history, "19", (-1.0, 0.0))
+    right = pictures.opening(history, "13", (1.0, 0.0))
     u_1, u_7 = history["u_y_1"], history["u_y_7"]
     tiny = 1e-9 * max(left.max(), right.max())
     return {

@@ -48,7 +48,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     for cells in MESHES[:1] if quick else MESHES:
         name = f"{cells} cells in the contact radius"
         model = build(replace(BALL, cells=cells), comm)
-        problem, dt = model.problem(), model.time_step(STEPS // 2 if quick else STEPS)
+        problem = model.problem()
+        dt = model.time_step(STEPS // 2 if quick else STEPS)
         solution = vc.simulate(
             problem,
             dt=dt,
@@ -81,7 +82,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 def curves_of(model: BallModel, problem: vc.ContactProblem, solution: vc.Solution) -> ImpactCurves:
     """Return the histories of the whole ball; time and approach count from the first touch."""
-    history, points = solution.history, problem.surface.whole().points
+    history = solution.history
+    points = problem.surface.whole().points
     force = QUARTERS * history["contact_resultant"]
     return ImpactCurves(
         t=history["t"] - model.ball.height / model.ball.speed,

@@ -78,7 +78,8 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
 
     They are in closed form, with its distance from integration.
     """
-    numbers, worst = {}, 0.0
+    numbers = {}
+    worst = 0.0
     print("     k      c        e      e_p(f̂)   t_c [s]    t_f [s]  x_min [m]")
     for k in stiffnesses:
         for c in DAMPERS:

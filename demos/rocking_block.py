@@ -153,7 +153,9 @@ def pulses(
     """
     unit = SHAPE.onset_acceleration
     shortest = SHAPE.overturning_time(STRENGTH * SHAPE.gravity * SHAPE.alpha)
-    lifted, turned, numbers = {}, {}, {"onset": model.onset_acceleration}
+    lifted = {}
+    turned = {}
+    numbers = {"onset": model.onset_acceleration}
     for share in ONSET:
         ramp = vc.Tabulated((0.0, 0.4, 0.8, 1.2), (0.0, share * unit, share * unit, 0.0))
         solution = run(

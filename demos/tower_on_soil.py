@@ -60,7 +60,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     static, state, problem = stages(mesh, tags, dt)
     problem, start = fem.release(static, state, problem)
 
-    middle, top = 0.5 * LAYER[0], LAYER[1]
+    middle = 0.5 * LAYER[0]
+    top = LAYER[1]
     points = {
         "base": (0.0, 0.0),
         "surface": (0.0, top),

@@ -138,8 +138,11 @@ def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
     The latter is the step of case b that presses most, drawn as a structure with its loads and one
     with its reactions; it returns by how much their sum misses the answer of the step, relatively.
     """
-    problem, most, pressed = model.problem("b", excitation=model.harmonic(AMPLITUDE)), -1.0, None
-    scheme, dt = vc.ZienkiewiczWoodTaylor(phi=0.5), model.time_step()
+    problem = model.problem("b", excitation=model.harmonic(AMPLITUDE))
+    most = -1.0
+    pressed = None
+    scheme = vc.ZienkiewiczWoodTaylor(phi=0.5)
+    dt = model.time_step()
     for state, report in vc.march(
         problem, scheme=scheme, solver=vc.Condensed(), dt=dt, steps=steps
     ):

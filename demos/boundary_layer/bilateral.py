@@ -59,10 +59,8 @@ def bilateral_motion(
     Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the
     integrator stops.
     """
-    owner, k = (
-        "bilateral_motion",
-        len(several("bilateral_motion", "systems", systems, "give a list of them")),
-    )
+    owner = "bilateral_motion"
+    k = len(several("bilateral_motion", "systems", systems, "give a list of them"))
     for system in systems:
         instance(owner, "a system", system, ConstrainedSystem, "give ConstrainedSystem(...)")
     if not systems or any(system.rates is not None for system in systems):
@@ -82,7 +80,8 @@ def bilateral_motion(
     check_tolerance(owner, rtol)
     for system in systems:
         system.check(q, v, float(times[0]))
-    n, evaluations = len(q), Evaluations()
+    n = len(q)
+    evaluations = Evaluations()
 
     def rates(t: float, y: Array) -> Array:
         evaluations.spend(t)
@@ -128,7 +127,8 @@ def _solved(
     both = np.linalg.solve(
         first.matrix(q), np.column_stack([first.generalised_force(t, q, v), a.T])
     )
-    free, along = both[:, 0], both[:, 1:]
+    free = both[:, 0]
+    along = both[:, 1:]
     masses = 1.0 / np.einsum("ri,ir->r", a, along)
     c = along * masses
     damping, stiffness, pull = _along(first, t, q, v, c)
@@ -145,7 +145,8 @@ def _solved(
 
 def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) -> Array:
     """(c̄, k̄, f̄) of (32), (3, k)."""
-    values, force = np.zeros((3, c.shape[1])), system.force
+    values = np.zeros((3, c.shape[1]))
+    force = system.force
     if force is None:
         return values
     for R, way in enumerate(c.T):

@@ -101,7 +101,9 @@ class Layer:
 
     def cut_off(self, x: Array | float) -> Array:
         """Return delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
-        x, a, b = np.asarray(x, dtype=float), self.a, self.width
+        x = np.asarray(x, dtype=float)
+        a = self.a
+        b = self.width
         between = (x > a) & (x < b)
         z = np.where(between, (x - a) / (b - a if b > a else 1.0), 0.5)
         z = np.clip(z, 1e-3, 1.0 - 1e-3)  # beyond that exp(-1000) and 1 - exp(-1000)

@@ -48,7 +48,8 @@ class Metric(Enum):
         It is that of g ρ̈ = g ``free`` + lambda; g = g_11 [kg]; ``free`` is the acceleration [m/s²]
         without layer.
         """
-        force, ratio = float(layer.force(rho, rate)), (layer.width / rho) ** 2
+        force = float(layer.force(rho, rate))
+        ratio = (layer.width / rho) ** 2
         if self is Metric.DOMINANT:
             return g * (rate**2 / rho + force / (g * ratio) + free / ratio - free)
         ratio *= {Metric.FULL: 1.0, Metric.FLAT: 0.0}.get(self, float(layer.cut_off(rho)))

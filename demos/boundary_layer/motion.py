@@ -69,7 +69,8 @@ class ConstrainedSystem:
 
         That is, at this state, other shapes, texts, NaN or infinity.
         """
-        owner, n = "ConstrainedSystem", len(v)
+        owner = "ConstrainedSystem"
+        n = len(v)
         if self.rates is None and len(q) != n:
             raise InputError(
                 f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)"
@@ -116,7 +117,8 @@ class ConstrainedSystem:
         if not callable(self.mass):
             return f
         # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
-        h, slopes = (self.difference(q), np.empty((len(q), len(v), len(v))))
+        h = self.difference(q)
+        slopes = np.empty((len(q), len(v), len(v)))
         for K in range(len(q)):
             side = np.zeros_like(q)
             side[K] = h
@@ -148,11 +150,13 @@ class Evaluations:
     """
 
     def __init__(self) -> None:
-        self.spent, self.t = 0, 0.0
+        self.spent = 0
+        self.t = 0.0
 
     def spend(self, t: float) -> None:
         """Count one evaluation; StepFailure, naming the time, when everything is spent."""
-        self.spent, self.t = self.spent + 1, t
+        self.spent = self.spent + 1
+        self.t = t
         if self.spent > EVALUATIONS:
             raise StepFailure(
                 f"the motion did not get beyond t = {t:.6g} s in {EVALUATIONS} evaluations of its "

@@ -95,19 +95,22 @@ class ParticleImpact:
 
     def position(self, t: Array | float) -> Array:
         """Return x [m] at times 0 <= t <= t_f."""
-        T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
+        T = np.asarray(t, dtype=float) / self._time
+        s = self.damping_ratio
         return np.asarray(self.layer.a * np.exp(self._kappa * ((1.0 + s) * T**2 * _phi(s * T) - T)))
 
     def velocity(self, t: Array | float) -> Array:
         """Return ẋ [m/s] at times 0 <= t <= t_f."""
-        T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
+        T = np.asarray(t, dtype=float) / self._time
+        s = self.damping_ratio
         return np.asarray(
             self.speed / self.layer.a * self.position(t) * ((1.0 + s) * T * exprel(-s * T) - 1.0)
         )
 
     def boundary_force(self, t: Array | float) -> Array:
         """Return f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
-        x, layer = self.position(t), self.layer.at(self.speed)
+        x = self.position(t)
+        layer = self.layer.at(self.speed)
         return np.asarray(layer.width**2 * (layer.k - layer.c / layer.v * self.velocity(t) / x) / x)
 
     @property
@@ -199,7 +202,9 @@ def _phi(z: Array) -> Array:
     """(exp(-z) - 1 + z)/z², ½ at z = 0."""
     small = np.abs(z) < 0.05
     large = np.where(small, 1.0, z)
-    series, term = np.zeros_like(z), np.full_like(z, 0.5)
+    series = np.zeros_like(z)
+    term = np.full_like(z, 0.5)
     for n in range(10):
-        series, term = series + term, -term * z / (n + 3.0)
+        series = series + term
+        term = -term * z / (n + 3.0)
     return np.where(small, series, (np.expm1(-large) + large) / large**2)

@@ -179,5 +179,7 @@ def rotation(p: Array) -> Array:
 
 def _rates(q: Array, v: Array) -> Array:
     """(ṙ_c, ½ p ∘ (0, Omega))."""
-    w, u, spin = q[3], q[4:], v[3:]
+    w = q[3]
+    u = q[4:]
+    spin = v[3:]
     return np.concatenate([v[:3], 0.5 * np.r_[-(u @ spin), w * spin + np.cross(u, spin)]])

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-DISK_LIMIT, SQUARE_LIMIT = 2.0 * np.pi / 3.0, 8.0 / 3.0
+DISK_LIMIT = 2.0 * np.pi / 3.0
+SQUARE_LIMIT = 8.0 / 3.0
 
 
 def disk_torque(w: Any) -> Any:

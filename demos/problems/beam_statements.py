@@ -105,12 +105,18 @@ def turning_points(u: Array, least: float = 0.0) -> int:
 
     It does so where it moved by more than ``least`` before and does so after.
     """
-    count, way, low, high = 0, 0, float(u[0]), float(u[0])
+    count = 0
+    way = 0
+    low = float(u[0])
+    high = float(u[0])
     for value in map(float, u[1:]):
         low, high = min(low, value), max(high, value)
         turned = value < high - least and way >= 0, value > low + least and way <= 0
         if any(turned):
-            count, way, low, high = count + (way != 0), 1 if turned[1] else -1, value, value
+            count = count + (way != 0)
+            way = 1 if turned[1] else -1
+            low = value
+            high = value
     return count
 
 
@@ -148,7 +154,8 @@ def row(
         factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history
         for factor in factors
     }
-    tips, whole = [run["u_tip"] for run in runs.values()], runs[1.0]
+    tips = [run["u_tip"] for run in runs.values()]
+    whole = runs[1.0]
     return Row(
         reading,
         a2,

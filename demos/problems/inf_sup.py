@@ -61,7 +61,8 @@ def refined(mesh: BoundaryMesh) -> BoundaryMesh:
 
 def half_norm(mesh: BoundaryMesh) -> Array:
     """Return the matrix (n, n) of the norm of H^(1/2) by interpolation, for one component."""
-    n, h = len(mesh), mesh.lengths
+    n = len(mesh)
+    h = mesh.lengths
     M, K = np.zeros((n, n)), np.zeros((n, n))
     for a in range(2):
         for b in range(2):

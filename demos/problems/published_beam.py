@@ -21,7 +21,8 @@ from vi_contact.core.checks import number
 
 Force = Callable[[float], float]
 FORCE = 1.0e5  # |r_N(0)| [N]
-DT, STEPS = 0.002, 1000
+DT = 0.002
+STEPS = 1000
 
 
 def published_mu(t: float, rate: float) -> float:

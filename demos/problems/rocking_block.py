@@ -139,11 +139,9 @@ class RockingModel:
 
         It turns at ``rate`` [rad/s].
         """
-        u, v, none = (
-            self.rest.u + theta * self._turn,
-            rate * self._turn,
-            np.zeros(self.problem.surface.count),
-        )
+        u = self.rest.u + theta * self._turn
+        v = rate * self._turn
+        none = np.zeros(self.problem.surface.count)
         return replace(self.rest, u=u, v=v, r_n=none, active=none.astype(bool))
 
     @property
@@ -285,7 +283,9 @@ def restitution(block: RockingBlock, history: Mapping[str, Array], impact: float
     theta = 0, sqrt(theta'² + p² theta (2b/h - theta)), which is constant between impacts:
     vibrations have left the mean by then.
     """
-    t, theta, unit = history["t"], np.abs(history["theta"]), 1.0 / block.p
+    t = history["t"]
+    theta = np.abs(history["theta"])
+    unit = 1.0 / block.p
     speed = np.sqrt(
         history["theta_rate"] ** 2 + theta * (2.0 * block.overturning_angle - theta) / unit**2
     )
