@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Measure accuracy and cost of boundary elements against numbers of elements and steps, and motions
-over long times.
+"""Measure accuracy and cost of boundary elements against elements, steps and long times.
 
     python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long] [--thin]
     python3 benchmarks/bem.py --json [--k 40 80] [--n 240 480]
@@ -63,7 +62,7 @@ ERRORS = ("pulse P", "pulse S", "step", "sin²", "base", "max base")
 
 
 def row(k: int, steps: int, *, errors: bool) -> dict[str, float]:
-    """Times [s], memory and errors of one size."""
+    """Return times [s], memory and errors of k elements a side and so many steps."""
     start = time.process_time()
     blocks = bem.energetic_blocks(bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=steps)
     result = {"k": k, "steps": steps, "assembly": time.process_time() - start}
@@ -88,7 +87,7 @@ def row(k: int, steps: int, *, errors: bool) -> dict[str, float]:
 
 
 def cost(k: int, steps: int, way: str) -> dict[str, float | str]:
-    """Seconds and memory of one size with dense ("direct") or compressed blocks."""
+    """Return seconds and memory of one size with dense ("direct") or compressed blocks."""
     start = time.process_time()
     blocks = bem.energetic_blocks(
         bem.polygon(SQUARE, 1.0 / k),
@@ -129,13 +128,13 @@ def cost(k: int, steps: int, way: str) -> dict[str, float | str]:
 
 
 def measured(*arguments: object) -> dict:
-    """What this script prints as JSON in a process of its own."""
+    """Return what this script prints as JSON in another process, whose memory is its own."""
     command = [sys.executable, __file__, *map(str, arguments)]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
 def costs(sides: list[int], steps: list[int]) -> dict:
-    """All rows of --json, and the growth in the number of steps."""
+    """Return all rows of --json, and the growth in the number of steps."""
     direct = measured("--cost", *DIRECT, "direct")
     rows = [direct, measured("--cost", *DIRECT, "compressed")]
     rows += [measured("--cost", k, n, "compressed") for k, n in zip(sides, steps, strict=True)]
@@ -157,9 +156,11 @@ def costs(sides: list[int], steps: list[int]) -> dict:
 
 
 def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
+    """Return the relative L2 errors of plane P and S pulses that cross the square until T = 4."""
     errors = {}
     for name, shear in (("pulse P", False), ("pulse S", True)):
-        wave, mesh = pulse(shear=shear), blocks.mesh
+        wave = pulse(shear=shear)
+        mesh = blocks.mesh
         forces = bem.traction_forces(mesh, wave.traction, dt=blocks.dt, steps=4 * k)
         exact = np.array(
             [wave.displacement(mesh.points, blocks.dt * (j + 1)).T for j in range(4 * k)]
@@ -170,7 +171,12 @@ def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
 
 
 def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
-    errors, mesh = {}, blocks.mesh
+    """Return the errors of the top of the rod under a step and under a sin² load.
+
+    The step also gives the error of the force at the base and its maximum, which is exactly 2.
+    """
+    errors = {}
+    mesh = blocks.mesh
     loads = {
         "step": (lambda t: 1.0, lambda t: np.maximum(t, 0.0)),
         "sin²": (smooth_load, smooth_integral),
@@ -192,15 +198,18 @@ def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
 
 
 def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
-    """Greatest displacement (exact: 1) and work after the load in the first and last ten time
-    units."""
+    """Return the greatest displacement (exact: 1) and the work after the load, as a line.
+
+    Both are those of the first and of the last ten time units.
+    """
     dt = ratio / k
     blocks = bem.energetic_blocks(
         bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=dt, steps=round(end / dt)
     )
     motion = rod(blocks, smooth_load).solve()
     size = np.abs(motion.displacement[:, 1]).max(axis=1)
-    early, late = (motion.times > 2.0) & (motion.times < 12.0), motion.times > end - 10.0
+    early = (motion.times > 2.0) & (motion.times < 12.0)
+    late = motion.times > end - 10.0
     return (
         f"{ratio:5.2f} {blocks.steps:5d}  {size[early].max():.4f} {size[late].max():.4f}  "
         f"{motion.work[early].max():.4f} {motion.work[late].max():.4f}"
@@ -208,9 +217,10 @@ def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
 
 
 def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
-    """Error of the top of a rod of the width h/share, by both methods."""
+    """Return the errors of the top of a rod of the width h/share by both methods, as a line."""
     half = 0.5 * h / share
-    mesh, errors = bem.polygon([(-half, -0.5), (half, -0.5), (half, 0.5), (-half, 0.5)], h), []
+    mesh = bem.polygon([(-half, -0.5), (half, -0.5), (half, 0.5), (-half, 0.5)], h)
+    errors = []
     for dt in (h, 0.5 * h):
         blocks = bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=round(end / dt))
         errors.append(rod_errors(blocks)["sin²"])
@@ -225,6 +235,7 @@ def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
 
 
 def main() -> None:
+    """Print the rows that the options ask for, each computed in its own process."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

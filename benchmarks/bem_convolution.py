@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Compare convolution quadrature with the energetic boundary elements: accuracy and cost on the
-problems of bem.py.
+"""Compare convolution quadrature with the energetic boundary elements on the problems of bem.py.
 
     python3 benchmarks/bem_convolution.py [--sides 10 20] [--methods convolution energetic]
 
@@ -8,8 +7,8 @@ The body is the unit square with k elements on a side, c_P dt = h, T = 6, N = 6 
 symmetric form. Every row is computed by one thread in a process of its own, and its seconds are
 processor time. Errors are those of bem.py. The contact problem is the pressed square under Tresca's
 friction. Its columns are the impulse at t = 4, the energy at t = 2, and the iterations of Uzawa's
-method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than
-2000. The last column is the greatest eigenvalue of W_0.
+method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than 2000.
+The last column is the greatest eigenvalue of W_0.
 """
 
 from __future__ import annotations
@@ -65,9 +64,13 @@ Forces = Callable[[float, int], np.ndarray]
 
 
 def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.ndarray]]:
-    """problem(forces, fixed=, contact=), and the loads it takes from mean forces of any number of
-    steps."""
-    mesh, dt, steps = bem.polygon(SQUARE, 1.0 / k), 1.0 / k, 6 * k
+    """Return problem(forces, fixed=, contact=) of a method, and the loads that it takes.
+
+    The loads are made of mean forces of any number of steps.
+    """
+    mesh = bem.polygon(SQUARE, 1.0 / k)
+    dt = 1.0 / k
+    steps = 6 * k
     if method == "energetic":
         operator = bem.PoincareSteklov(
             bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho
@@ -83,7 +86,7 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
 
 
 def row(method: str, k: int) -> dict[str, float]:
-    """Times [s], memory and errors of one method at one size."""
+    """Return times [s], memory and errors of one method with k elements a side."""
     start = time.process_time()
     problem, loads = discretised(method, k)
     result = {"k": k, "assembly": time.process_time() - start}
@@ -100,7 +103,9 @@ def row(method: str, k: int) -> dict[str, float]:
 
 
 def pulse_error(problem: Problem, loads: Callable, k: int, *, shear: bool) -> float:
-    wave, mesh = pulse(shear=shear), bem.polygon(SQUARE, 1.0 / k)
+    """Return the relative L2 error of a plane pulse, P or (``shear``) S, until T = 4."""
+    wave = pulse(shear=shear)
+    mesh = bem.polygon(SQUARE, 1.0 / k)
     forces = loads(lambda dt, steps: bem.traction_forces(mesh, wave.traction, dt=dt, steps=steps))
     exact = np.array([wave.displacement(mesh.points, (j + 1) / k).T for j in range(4 * k)])
     return float(
@@ -118,6 +123,10 @@ def rod_errors(
     integral: Callable,
     k: int,
 ):
+    """Put the error of the top of the rod under one load into the result.
+
+    The load "step" also gives the error of the force at the base.
+    """
     mesh = bem.polygon(SQUARE, 1.0 / k)
     sides = [mesh.nodes_of(mesh.labels == side) for side in range(4)]
     forces = loads(
@@ -126,18 +135,24 @@ def rod_errors(
         )
     )
     motion = problem(forces, fixed=np.stack([sides[1] | sides[3], sides[0]])).solve()
-    exact, top = echoes(motion.times, integral)[:, None], motion.displacement[:, 1][:, sides[2]]
+    exact = echoes(motion.times, integral)[:, None]
+    top = motion.displacement[:, 1][:, sides[2]]
     result[name] = float(
         np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
     )
     if name == "step":
-        base, middle = -motion.forces[:, 1][:, sides[0]].sum(axis=1), motion.times - 0.5 / k
+        base = -motion.forces[:, 1][:, sides[0]].sum(axis=1)
+        middle = motion.times - 0.5 / k
         exact_base = np.where((middle > 1.0) & ((middle - 1.0) % 4.0 < 2.0), 2.0, 0.0)
         result["base"] = float(np.linalg.norm(base - exact_base) / np.linalg.norm(exact_base))
         result["max base"] = float(base.max())
 
 
 def pressed_square(result: dict, problem: Problem, k: int) -> None:
+    """Put impulse at t = 4, energy at t = 2, W_0 and iterations of Uzawa's method into the result.
+
+    The square is pressed under Tresca's friction; nan means that Uzawa's method did not end.
+    """
     mesh = bem.polygon(SQUARE, 1.0 / k)
     forces = bem.traction_forces(
         mesh, lambda x, n, t: -n, dt=1.0 / k, steps=6 * k, elements=mesh.labels == 2
@@ -147,10 +162,8 @@ def pressed_square(result: dict, problem: Problem, k: int) -> None:
     contact = BoundaryContact(whole.condensed(), friction=Tresca(0.05))
     result["condense"] = time.process_time() - start
     run = march_contact(contact)
-    result["impulse"], result["E(2)"] = (
-        run.impulse[4 * k - 1, 1],
-        whole.solve(run.forces).work[2 * k - 1],
-    )
+    result["impulse"] = run.impulse[4 * k - 1, 1]
+    result["E(2)"] = whole.solve(run.forces).work[2 * k - 1]
     result["W_0"] = float(np.linalg.eigvalsh(contact.compliance.W[0])[-1])
     for name, share in (("Uzawa", 1.0), ("Uzawa/5", 0.2)):
         try:
@@ -161,6 +174,7 @@ def pressed_square(result: dict, problem: Problem, k: int) -> None:
 
 
 def main() -> None:
+    """Print a row for each size and method, each computed in its own process."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

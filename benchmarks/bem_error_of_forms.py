@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Measure the error of both forms of the Poincaré-Steklov operator: its squared energy norm against
-h, and the slope.
+"""Measure the squared energy error of both forms of the Poincaré-Steklov operator against h.
 
-    python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40] [--examples square "concrete on
-    steel"]
-        [--supports rollers clamped "Tresca 0.05"] [--json FILE] [--figure
-        docs/figures/bem_error_of_forms.png]
+The slope is measured as well.
+
+    python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40]
+        [--examples square "concrete on steel"] [--supports rollers clamped "Tresca 0.05"]
+        [--json FILE] [--figure docs/figures/bem_error_of_forms.png]
 
 The examples are the pressed square under a step and the concrete box under its slow load. c_P dt /
 h is fixed, and a side has k elements. The base is on rollers, clamped, or in contact with friction.
@@ -36,9 +36,10 @@ from demos.problems.error_of_forms import EXAMPLES, measure  # noqa: E402
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """A line per row."""
+    """Return a heading and a line for each row, with the local slopes at its end."""
     lines = [
-        f"{'case':<32}{'form':<13}{'k':>4}{'error²':>11}{'reference':>11}{'energy':>11}{'slope':>7}  local"
+        f"{'case':<32}{'form':<13}{'k':>4}{'error²':>11}{'reference':>11}{'energy':>11}"
+        f"{'slope':>7}  local"
     ]
     for row in rows:
         local = " ".join(f"{slope:.2f}" for slope in row["local_slopes"])
@@ -51,6 +52,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
+    """Compute the cases that are asked for, and keep the rows of all others in the file."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -66,14 +68,12 @@ def main() -> None:
     if options.json and options.json.exists():
         rows = json.loads(options.json.read_text())
     for example in options.examples:
-        start, supports = (
-            time.process_time(),
-            [
-                one
-                for one in EXAMPLES[example].supports
-                if one in (options.supports or EXAMPLES[example].supports)
-            ],
-        )
+        start = time.process_time()
+        supports = [
+            one
+            for one in EXAMPLES[example].supports
+            if one in (options.supports or EXAMPLES[example].supports)
+        ]
         found = measure(example, options.levels, *supports)
         rows = [row for row in rows if row["case"] not in {new["case"] for new in found}] + found
         print(

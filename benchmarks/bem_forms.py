@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Compare both forms of the Poincaré-Steklov operator: contact by each form, positivity, thin and
-sharp bodies.
+"""Compare both forms of the Poincaré-Steklov operator in contact, positivity and thin bodies.
 
     python3 benchmarks/bem_forms.py [--sides 5 10 20] [--laws none Tresca Coulomb] [--json] [--thin]
 
@@ -64,8 +63,10 @@ TRIANGLE = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.12)]
 
 
 def spectrum(blocks: bem.EnergeticBlocks, form: str, steps: int) -> np.ndarray:
-    """Eigenvalues of the symmetric part of the space-time matrix of S, on the whole boundary, in
-    increments."""
+    """Return the eigenvalues of the symmetric part of the space-time matrix of S, in increments.
+
+    The matrix is that of the whole boundary.
+    """
     n = 2 * len(blocks.mesh)
     held = np.broadcast_to(np.eye(n), (steps, n, n))
     columns = marched(
@@ -80,7 +81,7 @@ def spectrum(blocks: bem.EnergeticBlocks, form: str, steps: int) -> np.ndarray:
 
 
 def contact(k: int, laws: list[str]) -> Iterator[dict[str, Any]]:
-    """A row for each law and form."""
+    """Yield a row for each friction law and form, with their difference from the symmetric form."""
     given = square_problem(k, MATERIAL, dt=1.0 / k, steps=6 * k)
     other = replace(
         given, operator=bem.PoincareSteklov(given.operator.blocks, MATERIAL.rho, symmetric=False)
@@ -95,7 +96,8 @@ def contact(k: int, laws: list[str]) -> Iterator[dict[str, Any]]:
         first: tuple[np.ndarray, np.ndarray] | None = None
         for form, problem in problems.items():
             run = bem.march_contact(bem.BoundaryContact(condensed[form], friction=LAWS[law]))
-            impulse, energy = run.impulse, problem.solve(run.forces).work
+            impulse = run.impulse
+            energy = problem.solve(run.forces).work
             first = first or (impulse, energy)
             away = [
                 float(np.abs(one - base).max() / np.abs(base).max())
@@ -116,7 +118,7 @@ def contact(k: int, laws: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def thin_rods() -> Iterator[dict[str, Any]]:
-    """Errors and eigenvalues of rods of the width h/share."""
+    """Yield errors and eigenvalues of rods of the width h/share."""
     for share in (1.0, 2.0, 5.0, 10.0, 20.0):
 
         def mesh(h: float, share: float = share) -> bem.BoundaryMesh:
@@ -137,15 +139,13 @@ def thin_rods() -> Iterator[dict[str, Any]]:
 
 
 def triangle(h: float = 0.05) -> Iterator[dict[str, Any]]:
-    """Errors of both pulses to T = 4 and eigenvalues of the sharp triangle."""
+    """Yield errors of both pulses until T = 4 and eigenvalues of the sharp triangle."""
     steps = round(4.0 / h)
     blocks = bem.energetic_blocks(bem.polygon(TRIANGLE, h), MATERIAL, dt=h, steps=steps)
     for form in FORMS:
         for shear in (False, True):
-            wave, operator = (
-                pulse(shear=shear),
-                bem.PoincareSteklov(blocks, 1.0, symmetric=form == "symmetric"),
-            )
+            wave = pulse(shear=shear)
+            operator = bem.PoincareSteklov(blocks, 1.0, symmetric=form == "symmetric")
             forces = bem.traction_forces(blocks.mesh, wave.traction, dt=h, steps=steps)
             found = bem.BoundaryProblem(operator, forces).solve().displacement
             exact = np.array(
@@ -159,14 +159,16 @@ def triangle(h: float = 0.05) -> Iterator[dict[str, Any]]:
 
 
 def positivity(mesh: bem.BoundaryMesh, form: str) -> dict[str, Any]:
-    """What the space-time matrix of 12 steps with c_P dt = 1/8 has below zero."""
+    """Return what the space-time matrix of 12 steps with c_P dt = 1/8 has below zero."""
     values = spectrum(bem.energetic_blocks(mesh, MATERIAL, dt=0.125, steps=12), form, 12)
     return below_zero(values)
 
 
 def below_zero(values: np.ndarray) -> dict[str, Any]:
-    """How many of these eigenvalues are negative, the smallest, and how many there are; none where
-    not computed."""
+    """Return how many of these eigenvalues are negative, the smallest, and how many there are.
+
+    All three are None where no eigenvalues were computed.
+    """
     if not len(values):
         return dict.fromkeys(("negative_eigenvalues", "smallest_eigenvalue", "eigenvalues"))
     return {
@@ -177,6 +179,7 @@ def below_zero(values: np.ndarray) -> dict[str, Any]:
 
 
 def main() -> None:
+    """Print the rows of all sizes as lines, or with --json as one list."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

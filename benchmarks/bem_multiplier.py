@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
-"""Measure what the mesh (H, DT) of the contact multiplier does beside the mesh (h, dt) of the
-displacements.
+"""Measure what the mesh (H, DT) of the contact multiplier does beside (h, dt) of displacements.
 
-    python3 benchmarks/bem_multiplier.py [--sides 8 16 24] [--finest 32] [--json FILE] [--figure
-    FILE]
+    python3 benchmarks/bem_multiplier.py [--sides 8 16 24] [--finest 32]
+        [--json FILE] [--figure FILE]
 
 A square is under the pressure 1 until t = 4, with c_P dt = 0.9 h and h = 1/k, without friction and
 with Tresca's threshold 0.05. H/h and DT/dt are 1, 2, 3, 4 and 8, in space alone, in time alone and
@@ -57,7 +56,8 @@ T_END = 4.0
 STEP = 0.9  # c_P dt / h: fronts then come inside of intervals, whatever their length
 # of certificates: before the front comes displacements are 1e-20, penetrations round-off of these
 TOLERANCE = 1e-6
-RHO, MOST = 0.4, 2000  # of Uzawa's step, of 1/lambda_max(W[0]); of his iterations
+RHO = 0.4  # of Uzawa's step, in 1/lambda_max(W[0])
+MOST = 2000  # of his iterations
 INNER = 0.375  # |x| up to which pressures are compared: corners of a rubbing square are singular
 KEYS = (
     "k",
@@ -79,8 +79,10 @@ KEYS = (
 
 @dataclass(frozen=True)
 class Answer:
-    """Impulse, energy and pressure of a run at times t, the first 0; pressure: of points x in each
-    interval."""
+    """Hold impulse, energy and pressure of a run at times t, of which the first is 0.
+
+    The pressure is that of the points x in each interval.
+    """
 
     t: np.ndarray
     impulse: np.ndarray
@@ -89,7 +91,7 @@ class Answer:
     pressure: np.ndarray
 
     def pressures(self, x: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """(len(t), len(x)) pressures of the patches or nodes nearest to x, at times t."""
+        """Return the pressures of patches or nodes nearest to x, at times t: (len(t), len(x))."""
         nearest = np.abs(x[:, None] - self.x).argmin(axis=1)
         return self.pressure[np.searchsorted(self.t[1:], t)][:, nearest]
 
@@ -97,7 +99,7 @@ class Answer:
 def answer(
     problem: bem.BoundaryProblem, run: bem.ContactRun, forces: np.ndarray, every: int = 1
 ) -> Answer:
-    """The answer of a run whose nodal forces are these."""
+    """Return impulse, work and pressure of a run, whose nodal forces are these."""
     work = np.concatenate([[0.0], problem.solve(forces).work[every - 1 :: every]])
     return Answer(
         np.concatenate([[0.0], run.times]),
@@ -109,13 +111,17 @@ def answer(
 
 
 def errors(found: Answer, fine: Answer) -> dict[str, Any]:
-    """Histories of the contact force (means over intervals), oscillation and errors beside the
-    finest answer."""
+    """Return histories of the contact force, oscillation and errors beside the finest answer.
+
+    Forces are means over intervals.
+    """
     t = found.t[found.t <= T_END * (1.0 + 1e-9)]
-    n, exact = len(t), np.interp(t, fine.t, fine.impulse)
+    n = len(t)
+    exact = np.interp(t, fine.t, fine.impulse)
     force, wrong = (np.diff(history) / np.diff(t) for history in (exact, found.impulse[:n] - exact))
     energy = np.interp(t, fine.t, fine.energy)
-    x, middle = np.linspace(-INNER, INNER, 193), (np.arange(480) + 0.5) / 480 * t[-1]
+    x = np.linspace(-INNER, INNER, 193)
+    middle = (np.arange(480) + 0.5) / 480 * t[-1]
     pressure = fine.pressures(x, middle)
     return {
         "t": t.tolist(),
@@ -132,7 +138,7 @@ def errors(found: Answer, fine: Answer) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Square:
-    """The pressed square with k elements a side, condensed."""
+    """Hold the pressed square with k elements a side, condensed to its contact."""
 
     k: int
 
@@ -143,19 +149,21 @@ class Square:
         object.__setattr__(self, "compliance", problem.condensed())
 
     def finest(self, law: str) -> Answer:
-        """The answer with nodal forces at the ends of steps."""
+        """Return the answer with nodal forces at the ends of steps, the one to compare with."""
         run = bem.march_contact(
             bem.BoundaryContact(self.compliance, friction=LAWS[law]), tolerance=TOLERANCE
         )
         return answer(self.problem, run, run.forces)
 
     def row(self, law: str, fine: Answer, **choice: Any) -> dict[str, Any]:
-        """One answer on a mesh of the multiplier's own."""
-        mesh, elements = self.problem.operator.mesh, self.problem.contact
+        """Return one row: the answer on a mesh of the multiplier's own, with its errors."""
+        mesh = self.problem.operator.mesh
+        elements = self.problem.contact
         own = bem.MultiplierMesh(mesh, elements, self.compliance, **choice)
         contact = bem.BoundaryContact(own.condensed(), friction=LAWS[law])
         run = bem.march_contact(contact, tolerance=TOLERANCE)
-        steps, degree = len(self.compliance.W), own.degree
+        steps = len(self.compliance.W)
+        degree = own.degree
         normal = contact.surface.owned
         first = (
             contact.W[0][np.ix_(normal, normal)]
@@ -184,7 +192,7 @@ class Square:
 
 
 def iterations(contact: bem.BoundaryContact) -> int | None:
-    """Iterations of Uzawa's method; None: not within MOST."""
+    """Return the iterations of Uzawa's method, or None where they are more than MOST."""
     rho = RHO / float(np.linalg.eigvalsh(contact.W[0])[-1])
     try:
         return int(bem.SpaceTimeUzawa(rho=rho, max_iterations=MOST).solve(contact).iterations[0])
@@ -193,7 +201,7 @@ def iterations(contact: bem.BoundaryContact) -> int | None:
 
 
 def choices(k: int) -> list[dict[str, Any]]:
-    """Space alone, time alone, both; then linear multipliers; then weights."""
+    """Return the meshes in space, in time and in both; then linear multipliers; then weights."""
     pairs = [(r, 1) for r in RATIOS] + [(1, r) for r in RATIOS[1:]] + [(r, r) for r in RATIOS[1:]]
     found: list[dict[str, Any]] = [
         {"patch": patch, "interval": interval, "testing": testing}
@@ -208,6 +216,7 @@ def choices(k: int) -> list[dict[str, Any]]:
 
 
 def main() -> None:
+    """Print the rows of all sides, or read them, and draw the errors of the finest side."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -232,13 +241,12 @@ def main() -> None:
             for law in LAWS:
                 for choice in choices(k):
                     rows.append(square.row(law, fine[law], **choice))
-                    print(
-                        *(
-                            f"{value:10.3g}" if isinstance(value, float) else f"{value:>10}"
-                            for value in (rows[-1][key] or 0 for key in KEYS)
-                        ),
-                        flush=True,
-                    )
+                    values = [rows[-1][key] or 0 for key in KEYS]
+                    shown = [
+                        f"{value:10.3g}" if isinstance(value, float) else f"{value:>10}"
+                        for value in values
+                    ]
+                    print(*shown, flush=True)
         if chosen.json:
             chosen.json.write_text(json.dumps(rows) + "\n")
     if chosen.figure:

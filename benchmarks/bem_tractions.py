@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Compare contact tractions of boundary elements with those of finite elements on the pressed
-square.
+"""Compare contact tractions of boundary and finite elements on the pressed square.
 
     python3 benchmarks/bem_tractions.py [--elements 20 40] [--cells 80 160] [--json FILE]
 
@@ -36,8 +35,10 @@ COLUMNS = ("step", "0.1 s", "0.2 s", "patches", "early", "late")
 
 
 def row(both: Tractions) -> dict[str, float]:
-    """Differences in means over windows, patches, and apart: before and after the unloading wave,
-    without the ends."""
+    """Return the differences in means over windows and over patches.
+
+    "early" and "late" are before and after the unloading wave, without the ends of the side.
+    """
     inner = np.abs(both.x) < 0.5 - 1.5 * np.diff(both.x)[0]
     windows = {"step": 0.0, "0.1 s": 0.1, "0.2 s": 0.2}
     return {name: both.difference(window=window) for name, window in windows.items()} | {
@@ -48,6 +49,7 @@ def row(both: Tractions) -> dict[str, float]:
 
 
 def main() -> None:
+    """Print the differences of every number of boundary elements from every number of cells."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -67,7 +69,8 @@ def main() -> None:
     )
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    material, rows = Square().material, []
+    material = Square().material
+    rows = []
     condensed = {
         k: square_problem(k, material, dt=1.0 / k, steps=round(END * k)).condensed()
         for k in options.elements

@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
-"""Measure the error of contact of spheres on meshes that do not match, and how it falls with the
-cells.
+"""Measure the error of contact of spheres on meshes that do not match, and its order in cells.
 
     python3 benchmarks/contact_in_space.py [--hertz 4 8 16] [--mindlin 4 8 12] [--torsion 4 6 8]
-    [--json FILE]
+        [--json FILE]
 
 The numbers are cells across the radius a of contact. A problem without numbers is left out. Hertz
 has three problems: a sphere on a rigid plane, two spheres, and a sphere of steel on a block of
@@ -11,8 +10,8 @@ aluminium; the error is the mean over twelve approaches. Cattaneo and Mindlin pr
 push them by Q along x, and back. Torsion turns two spheres with Coulomb friction.
 tests/support/spheres.py says what is measured. P, Q and T are the forces and the moment by which
 the contact answers to given motions of the bodies far away. Errors are in per cent, and c/a is in
-per cent of
-1. "order" is the order of the absolute error between this number of cells and the one before.
+per cent of 1. "order" is the order of the absolute error between this number of cells and the one
+before.
 """
 
 from __future__ import annotations
@@ -44,18 +43,18 @@ Measure = Callable[[float], list[Row]]
 
 
 def pressed(kind: str, *, simplices: bool = False) -> Measure:
-    """The rows of a Hertz contact."""
+    """Return the measure of a Hertz contact, which gives one row for so many cells across a."""
     case = f"{kind}, tetrahedra" if simplices else kind
     return lambda n: [{"case": case, **hertz(kind, n, simplices=simplices)}]
 
 
 def sheared(n: float) -> list[Row]:
-    """The rows of partial slip."""
+    """Return the rows of partial slip, one for each tangential force Q."""
     return [{"case": f"Q = {row['Q']:.2f} mu P", **row} for row in PartialSlip(n).compared()]
 
 
 def twisted(n: float) -> list[Row]:
-    """The rows of torsion, the last one without slip."""
+    """Return the rows of torsion, the last one without slip."""
     problem = Torsion(n)
     rows = [
         {"case": f"T = {row['T']:.2f} of sliding, c = {row['c']:.1f} a", **row}
@@ -75,7 +74,7 @@ PROBLEMS: dict[str, list[Measure]] = {
 
 
 def measured(name: str, measure: Measure, levels: list[float]) -> list[Row]:
-    """The rows of all levels, with the order of each error."""
+    """Return the rows of all levels, with the order of each error from one level to the next."""
     rows: list[Row] = []
     for n in levels:
         start = time.perf_counter()
@@ -95,14 +94,14 @@ def measured(name: str, measure: Measure, levels: list[float]) -> list[Row]:
 
 
 def header(name: str) -> str:
-    """The titles of a table."""
+    """Return the titles of a table, each with the order beside it."""
     return f"{name:<34} {'cells':>5} " + " ".join(
         f"{title + ' %':>9} order" for title in TITLES[name].values()
     )
 
 
 def line(name: str, row: Row) -> str:
-    """One row of it."""
+    """Return one row of the table, errors in per cent, with its seconds."""
     cells = [(row.get(key), row.get(f"order_{key}")) for key in TITLES[name]]
     shown = (
         f"{'-' if error is None else format(100.0 * error, '.3f'):>9} "
@@ -113,7 +112,7 @@ def line(name: str, row: Row) -> str:
 
 
 def main() -> None:
-    """Prints the tables and writes them with --json."""
+    """Print the tables, and write their rows with --json."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     usual = {"hertz": [4.0, 8.0, 16.0], "mindlin": [4.0, 8.0, 12.0], "torsion": [4.0, 6.0, 8.0]}
     for name, levels in usual.items():

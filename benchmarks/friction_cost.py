@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Measure what a step with Coulomb friction costs, as a multiple of a plain linear step with the
-same matrix.
+"""Measure what a step with Coulomb friction costs, in plain linear steps with the same matrix.
 
     python3 benchmarks/friction_cost.py [--sizes 2e4 2e5] [--steps 60] [--mu 0.3]
 
@@ -45,8 +44,10 @@ HEADER = (
 def measured(
     problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: Linear
 ) -> dict[str, Any]:
-    """``count`` steps with contact, each beside a linear step; a third as many before them are not
-    counted."""
+    """Return the costs of ``count`` steps with contact, each beside a linear step.
+
+    A third as many steps before them are not counted.
+    """
     steps = StepsWithContact(problem, solver, dt, count, linear)
     iterations, slipping = [], []
     for report in steps:
@@ -69,7 +70,7 @@ def measured(
 
 
 def measure(size: float, steps: int, mu: float) -> None:
-    """One size: without friction, and every route."""
+    """Print the lines of one size: without friction, and by every route with it."""
     model = build(Wall(divisions=wall_cells(size)), MPI.COMM_SELF, base_inertia="catalogue")
     shaken = model.problem("face")
     vertical = vc.Harmonic(3.0, 20.0, direction=(0.0, 1.0))
@@ -90,7 +91,7 @@ def measure(size: float, steps: int, mu: float) -> None:
 
 
 def main() -> None:
-    """Prints the table."""
+    """Print the table, size by size."""
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     arguments.add_argument("--sizes", type=float, nargs="+", default=[2e4, 2e5])
     arguments.add_argument(

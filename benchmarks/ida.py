@@ -1,11 +1,9 @@
 #!/usr/bin/env python3
-"""Measure what an incremental dynamic analysis costs with eight runs in a process, and with a
-process for each.
+r"""Measure what an incremental dynamic analysis costs with eight runs in a process, or with one.
 
     python3 benchmarks/ida.py [--records 20] [--scales 5] [--duration 4] [--mesh 4 6] [--json FILE]
-    python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= --scales 10
-    --step 0.2 \
-        --duration 10 --jobs 2
+    python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= \
+        --scales 10 --step 0.2 --duration 10 --jobs 2
 
 The case is the wall of demos/cases/wall_record.toml, which begins under its weight and slides with
 Coulomb friction, under synthetic motions. It may be another case with contact and with a probe
@@ -48,7 +46,7 @@ DEMANDS = ("contact_uplift:max", "contact_resultant:max", "u_x_top:min")
 
 
 def motions(folder: Path, count: int, duration: float) -> list[Path]:
-    """Files of synthetic motions with a peak of 3 m/s²."""
+    """Write synthetic motions with a peak of 3 m/s², and return their files."""
     ground = ground_motion.KanaiTajimi(s0=0.01, omega_g=25.0)
     envelope = ground_motion.Envelope(
         rise=0.1 * duration, end=0.6 * duration, decay=10.0 / duration
@@ -61,13 +59,13 @@ def motions(folder: Path, count: int, duration: float) -> list[Path]:
 
 
 def seconds() -> float:
-    """Processor time of this process and of those that it has waited for."""
+    """Return the processor time [s] of this process and of those that it has waited for."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """The row."""
+    """Return the row of both ways to run one study, and how far their demands differ."""
     mesh = [f"mesh.divisions={options.mesh}"] if options.case == CASE else []
     case = read_case(options.case, [*mesh, *options.settings])
     scales = tuple(options.step * k for k in range(1, options.scales + 1))
@@ -76,12 +74,14 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     usual = processes.TOGETHER
     for way, runs in (("together", usual), ("apart", 1)):
         processes.TOGETHER = runs
-        begin, clock = seconds(), time.perf_counter()
+        begin = seconds()
+        clock = time.perf_counter()
         try:
             rows[way] = run_ida(study, folder / way, jobs=options.jobs, say=lambda line: None)
         finally:
             processes.TOGETHER = usual
-        spent[way], passed[way] = seconds() - begin, time.perf_counter() - clock
+        spent[way] = seconds() - begin
+        passed[way] = time.perf_counter() - clock
     failed = [
         row["reason"] for found in rows.values() for row in found if row["status"] != "finished"
     ]
@@ -113,6 +113,7 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def main() -> None:
+    """Print the row, a line for each number."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument(
         "--case", type=lambda text: Path(text).resolve(), default=CASE, help="a case file"

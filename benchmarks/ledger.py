@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""How far rounding carries the energy, and how far the energy ledger closes, for every time scheme
-and solver.
+"""Measure how far rounding carries the energy, and how far the energy ledger closes.
 
     python3 benchmarks/ledger.py [--steps 1000] [--only Midpoint] [--json]
 
-Two runs of a block of 16 x 8 bilinear elements, 1 m high, without damping: *free*, it swings on a
-clamped side and touches nothing; *thrown*, it falls obliquely on a plane and rubs on it. Time steps
-have the Courant number 0.02, so that the quickest wave takes fifty of them for an element. Printed
-are
+Every time scheme runs with every solver. Two runs of a block of 16 x 8 bilinear elements, 1 m high,
+without damping: *free*, it swings on a clamped side and touches nothing; *thrown*, it falls
+obliquely on a plane and rubs on it. Time steps have the Courant number 0.02, so that the quickest
+wave takes fifty of them for an element. Printed are
 
     drift   largest |E/E(0) - 1| of the free run, E its energy, for schemes that keep the energy
-    defect  what the ledger of all steps cannot explain, over the largest energy, of the free and of the thrown run
+    defect  what the ledger of all steps cannot explain, over the largest energy,
+            of the free and of the thrown run
 
 The table of docs/guide/schemes.md has the numbers. They are rounding errors: another BLAS gives
 others of their size.
@@ -55,11 +55,13 @@ SOLVERS: dict[str, Any] = {
 # energy, in free flight
 KEEPING = ("Trapezoidal", "Midpoint", "Contact", "Zienkiewicz", "Moreau", "SS22", "Newmark")
 SOFT = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
-COURANT, DIVISIONS, HEIGHT = 0.02, (16, 8), 1.0
+COURANT = 0.02
+DIVISIONS = (16, 8)
+HEIGHT = 1.0
 
 
 def block(*, free: bool) -> vc.ContactProblem:
-    """The block; free: with a side clamped, in front of a plane that is out of reach."""
+    """Return the block, thrown on a plane, or ``free`` of it and clamped at one side."""
     mesh, tags = fem.build_mesh(
         BlockMesh(lengths=(2.0, HEIGHT), divisions=DIVISIONS), MPI.COMM_WORLD
     )
@@ -75,7 +77,7 @@ def block(*, free: bool) -> vc.ContactProblem:
 
 
 def measured(scheme: Any, solver: Any, steps: int) -> dict[str, float]:
-    """Drift and defects of one scheme and solver."""
+    """Return the drift and both defects of one scheme and solver."""
     found: dict[str, float] = {}
     speed = np.sqrt(SOFT.E * (1.0 - SOFT.nu) / ((1.0 + SOFT.nu) * (1.0 - 2.0 * SOFT.nu)) / SOFT.rho)
     dt = COURANT * HEIGHT / DIVISIONS[1] / speed
@@ -98,6 +100,7 @@ def measured(scheme: Any, solver: Any, steps: int) -> dict[str, float]:
 
 
 def main() -> None:
+    """Print the drift and the defects of all pairs of a scheme and a solver."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=1000, help="of each run")
     parser.add_argument(

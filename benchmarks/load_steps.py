@@ -64,8 +64,10 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Block:
-    """Hold the block: its displacement u, energy and F, the condition at the top with its values g,
-    and the floor."""
+    """Hold the block: its displacement u, its energy, F, and the floor.
+
+    ``bc`` is the condition at the top, and g has its values.
+    """
 
     u: Any
     energy: Any
@@ -87,7 +89,8 @@ def block(comm: Any, cells: int) -> Block:
 
     # W = mu/2 (tr FᵀF - 2) - mu ln J + lambda/2 (ln J)²
     E, nu = 1.0, 0.3
-    mu, lam = E / (2.0 * (1.0 + nu)), E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    mu = E / (2.0 * (1.0 + nu))
+    lam = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     gradient = ufl.Identity(2) + ufl.grad(u)
     J = ufl.det(gradient)
     W = (
@@ -113,12 +116,12 @@ class Snes:
     """Solve a block by SNES vinewtonrsls; ``solve`` starts from what is in u."""
 
     def __init__(self, posed: Block) -> None:
-        self.posed, self.factors, V = posed, 0, posed.u.function_space
+        self.posed = posed
+        self.factors = 0
+        V = posed.u.function_space
         self.n = V.dofmap.index_map_bs * V.dofmap.index_map.size_local
-        self.F, self.J = (
-            compat.compile_form(posed.F),
-            compat.compile_form(ufl.derivative(posed.F, posed.u)),
-        )
+        self.F = compat.compile_form(posed.F)
+        self.J = compat.compile_form(ufl.derivative(posed.F, posed.u))
         held = compat.bc_values(posed.bc, len(posed.u.x.array))[0]
         self.held = held[held < self.n]
         self.A = compat.assemble_matrix(self.J)
@@ -131,8 +134,10 @@ class Snes:
         self.posed.u.x.scatter_forward()
 
     def function(self, _snes: Any, x: Any, R: Any) -> None:
-        """F at free unknowns, with what the linear step to the prescribed values adds; u - g at
-        held ones."""
+        """Evaluate F at free unknowns and u - g at held ones.
+
+        F has what the linear step to the prescribed values adds.
+        """
         self.put(x)
         F = compat.assemble_vector(self.F)
         off = x.array_r[self.held] - self.posed.g.x.array[self.held]
@@ -149,7 +154,7 @@ class Snes:
         R.array[self.held] = off
 
     def jacobian(self, _snes: Any, x: Any, A: Any, _P: Any) -> None:
-        """J with the rows and columns of the identity at held unknowns."""
+        """Evaluate J with the rows and columns of the identity at held unknowns."""
         self.put(x)
         J = compat.assemble_matrix(self.J)
         J.zeroRowsColumns((self.first + self.held).astype(PETSc.IntType), diag=1.0)
@@ -159,7 +164,8 @@ class Snes:
 
     def solve(self) -> tuple[bool, int]:
         """Return whether SNES converged, and its iterations."""
-        database, snes = PETSc.Options(), PETSc.SNES().create(COMM)
+        database = PETSc.Options()
+        snes = PETSc.SNES().create(COMM)
         snes.setOptionsPrefix("plain_")
         snes.setType("vinewtonrsls")
         for key, value in OPTIONS.items():
@@ -189,8 +195,10 @@ class Snes:
 def run(
     posed: Block, count: int, solve: Callable[[], Any]
 ) -> tuple[list[Any], list[float], list[Any], int]:
-    """Take the load steps until one fails; return what each gave, its time on the busiest rank, u,
-    and failures."""
+    """Take the load steps until one fails; return answers, times, displacements and failures.
+
+    A time [s] is that of the busiest rank.
+    """
     given, seconds, fields = [], [], []
     for k in range(count):
         posed.lower_top(DOWN * (k + 1) / count)
@@ -246,7 +254,7 @@ def row(cells: int, step: float) -> dict[str, Any]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, and write the rows if asked to."""
+    """Print the measurements, and write the rows if asked to."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
         "--cells", type=int, nargs="+", default=[16, 32, 64], help="squares across the block"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Which time schemes create energy in contact when a wave crosses many elements in a step.
+"""Find the time schemes that create energy in contact when a wave crosses many elements in a step.
 
     python3 benchmarks/long_steps.py [--t-end 3] [--only HHT]
     python3 benchmarks/long_steps.py --others     # a stockier wall, a free block and two bars
@@ -48,7 +48,7 @@ SHORTEST = 0.25  # m: edge of an element across the wall
 
 
 def wall(divisions: tuple[int, int] = (2, 12), degree: int = 1) -> vc.ContactProblem:
-    """The wall beside the ground, with 3 % of damping."""
+    """Return the wall beside the ground, with 3 % of damping."""
     mesh, groups = fem.build_mesh(
         WallMesh(height=6.0, width=0.5, divisions=divisions), MPI.COMM_WORLD
     )
@@ -66,8 +66,10 @@ def wall(divisions: tuple[int, int] = (2, 12), degree: int = 1) -> vc.ContactPro
 
 
 def readme_wall() -> vc.ContactProblem:
-    """The wall of README, of 8 x 12 elements; a wave needs 0.26 ms for the shorter edge of an
-    element."""
+    """Return the wall of README, of 8 x 12 elements.
+
+    A wave needs 0.26 ms for the shorter edge of an element.
+    """
     mesh, tags = fem.build_mesh(WallMesh(height=9.0, width=6.0, divisions=(8, 12)), MPI.COMM_WORLD)
     concrete = vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
     system = fem.assemble(
@@ -82,10 +84,13 @@ def readme_wall() -> vc.ContactProblem:
 
 
 def block() -> vc.ContactProblem:
-    """A unit square of 16 x 16 elements that falls on the ground; a wave needs 1.7 ms for an
-    element."""
+    """Return a unit square of 16 x 16 elements that falls on the ground.
+
+    A wave needs 1.7 ms for an element.
+    """
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(16, 16)), MPI.COMM_WORLD)
-    rubber, weight = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0), fem.BodyForce((0.0, -10.0))
+    rubber = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0)
+    weight = fem.BodyForce((0.0, -10.0))
     system = fem.assemble(
         mesh, rubber, section=vc.PlaneStrain(), loads=weight, initial_velocity=(0.1, -1.0)
     )
@@ -94,7 +99,7 @@ def block() -> vc.ContactProblem:
 
 
 def bar(case: Any) -> vc.ContactProblem:
-    """A bar of 100 elements in one dimension."""
+    """Return a bar of 100 elements in one dimension, thrown or bouncing as its case says."""
     return build(Bar(case, elements=100, dimension=1), MPI.COMM_WORLD).problem()
 
 
@@ -108,7 +113,7 @@ OTHERS: dict[str, tuple[Any, float, float]] = {
 
 
 def run(scheme: Any, dt: float, t_end: float, problem: Any = wall) -> vc.Solution:
-    """The problem with this scheme and time step."""
+    """Run a problem with this scheme and time step [s], with energies and contact kept."""
     return vc.simulate(
         problem(),
         scheme=scheme,
@@ -120,12 +125,12 @@ def run(scheme: Any, dt: float, t_end: float, problem: Any = wall) -> vc.Solutio
 
 
 def told(created: float) -> str:
-    """The class of a share of the largest energy."""
+    """Return the class of a share of the largest energy, as growth is chaotic."""
     return "none" if created < 1e-4 else "below 1 %" if created < 0.01 else "**grows**"
 
 
 def main() -> None:
-    """The table."""
+    """Print the table, a row for each scheme."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--t-end", type=float, default=3.0, help="of the motion [s]")
     parser.add_argument(

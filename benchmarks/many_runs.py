@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Measure what a step costs when several runs are marched together, as a multiple of the step of a
-run alone.
+"""Measure what a step costs when several runs are marched together, in steps of a run alone.
 
     python3 benchmarks/many_runs.py [--sizes 2e3] [--rounds 5] [--json FILE]
 
@@ -41,13 +40,13 @@ CHECKED = 8  # steps that are made once more, alone, of two runs
 
 
 def divisions(size: float) -> tuple[int, int]:
-    """Cells of a wall of about so many unknowns, half as high again as wide."""
+    """Return the cells of a wall of about so many unknowns, half as high again as wide."""
     across = max(round((size / 3.0) ** 0.5), 4)
     return across, round(1.5 * across)
 
 
 def problems(size: float, count: int) -> tuple[list[vc.ContactProblem], float]:
-    """Runs of one wall, and their time step."""
+    """Return runs of one wall under different motions, and their time step [s]."""
     model = build(Wall(divisions=divisions(size)), MPI.COMM_SELF, base_inertia="catalogue")
     one = model.problem("face")
     motions = (
@@ -62,17 +61,21 @@ def problems(size: float, count: int) -> tuple[list[vc.ContactProblem], float]:
 
 
 def seconds_per_step(loop: Iterator[Any], count: int) -> float:
-    """Processor time of a step, after the first of each run, in which everything is set up."""
+    """Return the processor time of a step [s].
+
+    The first step of each run, in which everything is set up, is left out.
+    """
     for _ in range(count):
         next(loop)
-    begin, steps = time.thread_time(), 0
+    begin = time.thread_time()
+    steps = 0
     for _ in loop:
         steps += 1
     return (time.thread_time() - begin) / steps
 
 
 def measured(size: float, rounds: int) -> list[dict[str, Any]]:
-    """The rows of one size."""
+    """Return the rows of one size, one for each number of runs."""
     every, dt = problems(size, max(RUNS))
     steps = round(min(max(4.8e5 / size, 12.0), 200.0))
     rows = []
@@ -110,8 +113,9 @@ def measured(size: float, rounds: int) -> list[dict[str, Any]]:
 
 
 def difference(chosen: list[vc.ContactProblem], dt: float, steps: int) -> float:
-    """Largest difference of steps from the single steps that begin with the same states."""
-    worst, every = 0.0, max(steps // CHECKED, 1)
+    """Return the largest difference of steps from single steps that begin with the same states."""
+    worst = 0.0
+    every = max(steps // CHECKED, 1)
     for number, report in vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps):
         if report.new.k % every == 0 and number < 2:
             alone, _ = next(
@@ -123,7 +127,7 @@ def difference(chosen: list[vc.ContactProblem], dt: float, steps: int) -> float:
 
 
 def line(row: dict[str, Any]) -> str:
-    """A row of the table."""
+    """Return a row of the table, times in microseconds."""
     return (
         f"{row['unknowns']:>8} {row['runs']:>5} {1e6 * row['seconds_per_step']:>14.0f} "
         f"{1e6 * row['seconds_per_single_step']:>10.0f} {row['cost_ratio']:>6.2f} "
@@ -132,6 +136,7 @@ def line(row: dict[str, Any]) -> str:
 
 
 def main() -> None:
+    """Print the rows of all sizes, and write them with --json."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument(
         "--sizes", type=float, nargs="+", default=list(SIZES), help="numbers of unknowns, about"

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Measure what bounds on a field cost: ``vi.solve`` beside PETSc's SNESVI, on the membrane over a
-ball.
+"""Measure what bounds on a field cost: ``vi.solve`` and PETSc's SNESVI, a membrane over a ball.
 
     python3 benchmarks/obstacle.py [--cells 449] [--json FILE]
     mpirun -n 2 python3 benchmarks/obstacle.py
@@ -62,11 +61,15 @@ CASES = (  # what, size of u, whether it starts from the solution
 
 
 def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
-    """PETSc's reason, iterations and x (free and clamped unknowns) of SNES vinewtonrsls, from
-    posed.u."""
-    A, V = compat.assemble_matrix(compat.compile_form(posed.a)), posed.u.function_space
+    """Return PETSc's reason, iterations and x of SNES vinewtonrsls, which begins with posed.u.
+
+    x has the free and the clamped unknowns.
+    """
+    A = compat.assemble_matrix(compat.compile_form(posed.a))
+    V = posed.u.function_space
     n = V.dofmap.index_map.size_local
-    clamped, values = np.zeros(n, dtype=bool), posed.exact.x.array[:n]
+    clamped = np.zeros(n, dtype=bool)
+    values = posed.exact.x.array[:n]
     held = compat.bc_values(posed.bc, len(posed.u.x.array))[0]
     clamped[held[held < n]] = True
     x, b = A.createVecs()
@@ -80,7 +83,9 @@ def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
     lower, upper = x.duplicate(), x.duplicate()
     lower.array[:] = np.where(clamped, PETSc.NINFINITY, posed.lower.x.array[:n])
     upper.set(PETSc.INFINITY)
-    snes, F, database = PETSc.SNES().create(COMM), b.duplicate(), PETSc.Options()
+    snes = PETSc.SNES().create(COMM)
+    F = b.duplicate()
+    database = PETSc.Options()
     snes.setOptionsPrefix("plain_")
     snes.setType("vinewtonrsls")
     for key, value in options.items():
@@ -107,18 +112,19 @@ def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
 
 
 def spent(start: float) -> float:
-    """Processor time since then of the busiest rank."""
+    """Return the processor time [s] of the busiest rank since then."""
     return float(COMM.allreduce(time.process_time() - start, op=MPI.MAX))
 
 
 def cost(cells: int) -> dict[str, Any]:
-    """Both routes once, cold; forms compiled beforehand."""
+    """Run both routes once, cold, with forms compiled beforehand."""
     small = build(COMM, 4)
     vi.solve((small.a, small.L), small.u, lower=small.lower, bcs=[small.bc])
     posed = build(COMM, cells)
     start = time.process_time()
     result = vi.solve((posed.a, posed.L), posed.u, lower=posed.lower, bcs=[posed.bc])
-    ours, answer = spent(start), np.array(posed.u.x.array)
+    ours = spent(start)
+    answer = np.array(posed.u.x.array)
     posed.u.x.array[:] = 0.0  # a mesh made again might be cut into other parts
     start = time.process_time()
     reason, iterations, x = plain(posed, QUICKEST)
@@ -142,7 +148,7 @@ def cost(cells: int) -> dict[str, Any]:
 
 
 def failures(cells: int) -> list[dict[str, Any]]:
-    """SNESVI with all of PETSc's defaults beside vi.solve, on a small mesh."""
+    """Return the rows of SNESVI with all of PETSc's defaults beside vi.solve, on a small mesh."""
     rows = []
     for case, unit, warm in CASES:
         posed = build(COMM, cells, unit)
@@ -154,7 +160,8 @@ def failures(cells: int) -> list[dict[str, Any]]:
             posed.u.x.array[:] = 0.0
         reason, iterations, x = plain(posed, DEFAULTS)
         n = len(x)
-        ours, theirs = result.lambda_lower.x.array[:n] > 0.0, x <= posed.lower.x.array[:n]
+        ours = result.lambda_lower.x.array[:n] > 0.0
+        theirs = x <= posed.lower.x.array[:n]
         error, size = (
             COMM.allreduce(float(np.max(np.abs(one))), op=MPI.MAX)
             for one in (x - answer[:n], answer[:n])
@@ -174,7 +181,7 @@ def failures(cells: int) -> list[dict[str, Any]]:
 
 
 def main(arguments: list[str]) -> int:
-    """Measure, print, and write the numbers if asked to."""
+    """Print both measurements, and write the numbers if asked to."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
         "--cells", type=int, default=449, help="squares along a side; 449 are 2e5 unknowns"

@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
-"""Measure the building on a raft of demos/raft.py: what it costs at several sizes, and what halving
-h and dt changes.
+"""Measure what the building on a raft of demos/raft.py costs, and what halving h and dt changes.
 
-    python3 benchmarks/raft.py                          # costs at 2e4 and 1e5 unknowns
-    python3 benchmarks/raft.py --sizes 2e4 1e5 3e5 --steps 8    # the table of the guide: seven minutes, 7 GB
-    python3 benchmarks/raft.py --sizes 2e4 1e5 --iterative      # the same steps without any factor
+    python3 benchmarks/raft.py                              # costs at 2e4 and 1e5 unknowns
+    python3 benchmarks/raft.py --sizes 2e4 1e5 3e5 --steps 8    # the table of the guide
+    python3 benchmarks/raft.py --sizes 2e4 1e5 --iterative  # the same steps without any factor
     python3 benchmarks/raft.py --sizes 1e6 --steps 2 --iterative --no-gravity
-    python3 benchmarks/raft.py --halving                # runs of 5 s on three meshes, and with three time steps
-    python3 benchmarks/raft.py --json raft.json         # all of it as a file too
+    python3 benchmarks/raft.py --halving                    # runs of 5 s on three meshes
+    python3 benchmarks/raft.py --json raft.json             # all of it as a file too
 
-Costs are seconds of processor time of rank 0: of the stages of set-up, of the first step, which
-prepares its solver, and the mean of those after it. For them the building starts from its rest with
-a rocking velocity about x and y, which lifts half of the raft at once: contact sets change from
-step to step, and no earthquake has to arrive first.
+The table of the guide takes seven minutes and 7 GB; --halving also has three time steps. Costs are
+seconds of processor time of rank 0: of the stages of set-up, of the first step, which prepares its
+solver, and the mean of those after it. For them the building starts from its rest with a rocking
+velocity about x and y, which lifts half of the raft at once: contact sets change from step to step,
+and no earthquake has to arrive first.
 """
 
 from __future__ import annotations
@@ -66,8 +66,10 @@ class Timer:
 def cost(
     finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity: bool
 ) -> dict[str, Any]:
-    """Return what set-up and steps of one mesh cost; without ``gravity`` its stage is left out, and
-    the weight falls on bodies without stresses."""
+    """Return what set-up and steps of one mesh cost.
+
+    Without ``gravity`` its stage is left out, and the weight falls on bodies without stresses.
+    """
     timer = Timer()
     mesh, tags = timer("mesh", raft.meshed, finer, COMM)
     static, problem = timer("assembling, contact", raft.problems, mesh, tags)
@@ -79,17 +81,25 @@ def cost(
     marching = vc.march(
         problem, dt=raft.DT, steps=steps, state=thrown(problem, state), solver=solver
     )
-    surface, begin = problem.surface, process_time()
-    stamps, open_shares, changes, iterations, worst, method = [begin], [], [], [], 0.0, ""
+    surface = problem.surface
+    begin = process_time()
+    stamps = [begin]
+    open_shares = []
+    changes = []
+    iterations = []
+    worst = 0.0
+    method = ""
     for new, report in marching:
         stamps.append(process_time())
         if COMM.rank == 0:
             print(f"  step to t = {new.t:<29.4g} {stamps[-1] - stamps[-2]:.4g}", flush=True)
-        closed, before = surface.everywhere(new.active), surface.everywhere(report.old.active)
+        closed = surface.everywhere(new.active)
+        before = surface.everywhere(report.old.active)
         open_shares.append(1.0 - closed.mean())
         changes.append(int(np.sum(closed != before)))
         iterations.append(report.result.iterations)
-        worst, method = max(worst, report.certificate.worst), report.result.method
+        worst = max(worst, report.certificate.worst)
+        method = report.result.method
     each = np.diff(stamps)
     return {
         "factor": finer,
@@ -150,7 +160,7 @@ def halved() -> Iterator[dict[str, Any]]:
 
 
 def told(found: dict[str, Any]) -> str:
-    """A row as lines of text."""
+    """Return a row as lines of text, one for each number."""
 
     def text(value: Any) -> str:
         return f"{value:.4g}" if isinstance(value, float) else str(value)
@@ -159,6 +169,7 @@ def told(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
+    """Print the costs of all sizes, or with --halving the key numbers of whole runs."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument(
         "--sizes", nargs="+", choices=raft.SIZES, default=["2e4", "1e5"], help="unknowns, about"

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Measure where the processor time of a run goes: a bar for every size, and a figure.
 
-    python3 benchmarks/run_parts.py [--steps 200] [--figure docs/figures/run_parts.png] [--json
-    FILE]
+    python3 benchmarks/run_parts.py [--steps 200] [--figure docs/figures/run_parts.png]
+        [--json FILE]
 
 The runs are the wall and the block in space of step_cost.py, without friction. ``simulate`` has its
 default records and a run folder; mesh and assembly are not counted. The time of a part is the time
@@ -51,14 +51,12 @@ COLOURS = ("#4d4d4d", "#1f77b4", "#ff7f0e", "#17becf", "#2ca02c", "#9467bd", "#b
 
 
 class Clock:
-    """Counts the processor time of parts; a part that begins stops the one that called it."""
+    """Count the processor time of parts; a part that begins stops the one that called it."""
 
     def __init__(self) -> None:
-        self.seconds, self._open, self._since = (
-            dict.fromkeys(PARTS, 0.0),
-            ["records"],
-            time.thread_time(),
-        )
+        self.seconds = dict.fromkeys(PARTS, 0.0)
+        self._open = ["records"]
+        self._since = time.thread_time()
 
     def _book(self) -> None:
         now = time.thread_time()
@@ -66,13 +64,13 @@ class Clock:
         self._since = now
 
     def forget(self) -> None:
-        """Begins anew."""
+        """Begin to count anew, with the parts that are open now."""
         self._book()
         self.seconds = dict.fromkeys(PARTS, 0.0)
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
-        """Counts what happens inside as this part."""
+        """Count what happens inside as this part."""
         self._book()
         self._open.append(name)
         try:
@@ -82,7 +80,7 @@ class Clock:
             self._open.pop()
 
     def counted(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function, counted."""
+        """Return the function, whose time counts as this part."""
 
         def timed(*given: Any, **named: Any) -> Any:
             with self.part(name):
@@ -91,7 +89,7 @@ class Clock:
         return timed
 
     def loop(self, iterate: Callable[[Any], Iterator[Any]]) -> Callable[[Any], Iterator[Any]]:
-        """The generator of steps, counted step by step."""
+        """Return the generator of steps, whose own time counts as "scheme and loop"."""
 
         def steps(march: Any) -> Iterator[Any]:
             inner = iterate(march)
@@ -107,7 +105,7 @@ class Clock:
 
 @contextmanager
 def watched(clock: Clock) -> Iterator[None]:
-    """Counts the functions that make up the parts."""
+    """Count the functions that make up the parts, and give them back at the end."""
     places: list[tuple[str, Any, str]] = [
         ("set-up", condensed, "condense"),
         ("set-up", ActiveSet, "prepare"),
@@ -135,7 +133,7 @@ def watched(clock: Clock) -> Iterator[None]:
 def measured(
     name: str, build: Callable[[float, Any], Any], size: float, steps: int
 ) -> dict[str, Any]:
-    """The parts of one run."""
+    """Return the seconds of the parts of one run."""
     clock = Clock()
     with tempfile.TemporaryDirectory() as folder, watched(clock), clock.part("records"):
         problem, dt, _ = build(size, None)
@@ -164,7 +162,7 @@ def measured(
 
 
 def draw(rows: list[dict[str, Any]], file: Path) -> None:
-    """A bar for every run, its parts in percent."""
+    """Draw a bar for every run, its parts in percent."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -189,7 +187,7 @@ def draw(rows: list[dict[str, Any]], file: Path) -> None:
 
 
 def main() -> None:
-    """Prints milliseconds a step of every part, and draws."""
+    """Print milliseconds a step of every part, and draw the figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--figure", type=Path)

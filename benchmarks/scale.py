@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Measure what a contact step costs in three dimensions without any factor, in products with the
-matrix of the step.
+"""Measure what a contact step in three dimensions costs without any factor.
+
+The unit of cost is a product with the matrix of the step.
 
     python3 benchmarks/scale.py [--sizes 6e4 1e6] [--json FILE]
     mpirun -n 2 python3 benchmarks/scale.py --sizes 2e5
@@ -52,7 +53,8 @@ COMM = MPI.COMM_WORLD
 NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
 # of P waves in the upper layer
 SPEED = float(np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))))
-COURANTS, FAR = (1.0, 10.0), 100.0
+COURANTS = (1.0, 10.0)
+FAR = 100.0
 PUSH = 5e-4  # of the top in a step at C = 100 and in a static one
 # unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries
 LARGE = 5e5
@@ -61,24 +63,29 @@ ELEMENTS = {"hexahedra": "hexahedron", "tetrahedra": "tetrahedron"}
 
 
 def busiest(seconds: float) -> float:
-    """The largest value of all ranks."""
+    """Return the largest value of all ranks [s]."""
     return float(COMM.allreduce(seconds, op=MPI.MAX))
 
 
 class Memory:
-    """Largest resident memory of all ranks together since the last ``forget`` [bytes]; zero where
-    it is not told. ``bare``: what Python and its libraries take before there is any mesh."""
+    """Hold the largest resident memory of all ranks together since the last ``forget`` [bytes].
+
+    It is zero where the system does not tell it. ``bare``: what Python and its libraries take
+    before there is any mesh.
+    """
 
     def __init__(self) -> None:
         self.bare = self.peak()
 
     def forget(self) -> None:
+        """Free what nobody holds, and begin a new largest value."""
         gc.collect()
         give_back(kept(COMM))
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
 
     def peak(self) -> float:
+        """Return the largest value [bytes], VmHWM of Linux, summed over the ranks."""
         try:
             lines = Path("/proc/self/status").read_text().splitlines()
         except OSError:
@@ -92,7 +99,7 @@ MEMORY = Memory()
 
 @dataclass(frozen=True)
 class Block:
-    """A problem and the size of its cells [m]."""
+    """Hold a problem and the size of its cells [m]."""
 
     problem: vc.ContactProblem
     h: float
@@ -100,29 +107,31 @@ class Block:
 
     @property
     def mu(self) -> float:
-        """Coulomb's coefficient, 0 without friction."""
+        """Return Coulomb's coefficient, 0 without friction."""
         return float(getattr(self.problem.friction, "mu", 0.0))
 
     def rubbing(self, mu: float) -> Block:
-        """The block with friction."""
+        """Return the block with Coulomb friction of this coefficient."""
         return replace(self, problem=replace(self.problem, friction=vc.Coulomb(mu)))
 
     @property
     def unknowns(self) -> int:
+        """Return the number of unknowns of the system on all ranks."""
         return int(self.problem.system.space.unknowns)
 
     def dt(self, courant: float) -> float:
+        """Return the time step [s] of a Courant number, C h / c_P."""
         return courant * self.h / SPEED
 
 
 def wavy(x: Any) -> Any:
-    """Gap of the plane below the face [m]."""
+    """Return the gap of the wavy plane below the face [m]."""
     waves = 1.0 - np.cos(12.0 * np.pi * x[:, 0]) * np.cos(10.0 * np.pi * x[:, 1])
     return 2e-2 * ((x[:, 0] - 0.5) ** 2 + (x[:, 1] - 0.45) ** 2) + 4e-3 * waves
 
 
 def divisions(unknowns: float, dimension: int) -> tuple[int, ...]:
-    """Cells along the axes of a flat block with about so many unknowns."""
+    """Return the cells along the axes of a flat block with about so many unknowns."""
     n = (
         round((2.75 * unknowns) ** (1.0 / 3.0))
         if dimension == 3
@@ -133,25 +142,26 @@ def divisions(unknowns: float, dimension: int) -> tuple[int, ...]:
 
 
 def box(cells: tuple[int, ...], element: str) -> Any:
-    """The mesh, built on all ranks together."""
-    top, ghosts = (
-        [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]],
-        dolfinx.mesh.GhostMode.shared_facet,
-    )
-    corners, kind = [np.zeros(len(cells)), np.array(top)], getattr(dolfinx.mesh.CellType, element)
+    """Return the mesh, built on all ranks together."""
+    top = [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]]
+    ghosts = dolfinx.mesh.GhostMode.shared_facet
+    corners = [np.zeros(len(cells)), np.array(top)]
+    kind = getattr(dolfinx.mesh.CellType, element)
     make = dolfinx.mesh.create_box if len(cells) == 3 else dolfinx.mesh.create_rectangle
     return make(COMM, corners, list(cells), kind, ghost_mode=ghosts)
 
 
 def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int = 3) -> Block:
-    """The block, thrown, or at rest with its top pushed down slowly."""
+    """Return the block, thrown, or at rest with its top pushed down slowly."""
     cells = divisions(unknowns, dimension)
     kind = (
         ELEMENTS[element]
         if dimension == 3
         else {"hexahedra": "quadrilateral", "tetrahedra": "triangle"}[element]
     )
-    mesh, up, h = box(cells, kind), dimension - 1, 1.0 / cells[0]
+    mesh = box(cells, kind)
+    up = dimension - 1
+    h = 1.0 / cells[0]
     height = cells[-1] * h
 
     def face(name: str, z: float) -> Any:
@@ -169,7 +179,8 @@ def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int
     halves = 0.5 * height
     soft, hard = (vc.LinearElastic(E=E, nu=NU, rho=1.0) for E in (1.0, CONTRAST))
     materials = [(layer("soft", -1.0, halves), soft), (layer("hard", halves, 2.0), hard)]
-    side, tilt = np.eye(dimension)[0], np.eye(dimension)[up]
+    side = np.eye(dimension)[0]
+    tilt = np.eye(dimension)[up]
     speed = -PUSH / (FAR * h / SPEED) * tilt
     held = fem.Prescribed(
         face("top", height), lambda x, t: np.tile(speed * t, (len(x), 1)), tuple(speed)
@@ -188,29 +199,34 @@ def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int
 
 
 class Watched:
-    """A solver that remembers what it prepared, and the steps it solved last with the processor
-    time they took."""
+    """Solve steps with another solver, and remember what it prepared and solved.
+
+    The last steps are kept, with the processor time [s] that they took.
+    """
 
     def __init__(self, solver: Any) -> None:
-        self.solver, self.check = solver, solver.check
+        self.solver = solver
+        self.check = solver.check
         self.prepared: Any = None
         self.setup = 0.0
         self.rows: list[dict[str, float]] = []
         self.last: list[Any] = []
 
     def prepare(self, *given: Any) -> Watched:
+        """Prepare the solver, and keep the processor time [s] of it as ``setup``."""
         start = time.process_time()
         self.prepared = self.solver.prepare(*given)
         self.setup = time.process_time() - start
         return self
 
     def solve(self, step: Any) -> Any:
-        before, operations, start = self.counts(), PETSc.Log.getFlops(), time.process_time()
+        """Solve a step, and add a row of its seconds, operations, iterations and counts."""
+        before = self.counts()
+        operations = PETSc.Log.getFlops()
+        start = time.process_time()
         result = self.prepared.solve(step)
-        spent, flops = (
-            busiest(time.process_time() - start),
-            busiest(PETSc.Log.getFlops() - operations),
-        )
+        spent = busiest(time.process_time() - start)
+        flops = busiest(PETSc.Log.getFlops() - operations)
         counts = {key: value - before[key] for key, value in self.counts().items()}
         self.rows.append(
             {"seconds": spent, "flops": flops, "iterations": result.iterations, **counts}
@@ -219,6 +235,7 @@ class Watched:
         return result
 
     def counts(self) -> dict[str, float]:
+        """Return iterations, products and renewals so far, all 0 of a solver that counts none."""
         work = getattr(self.prepared, "work", None)
         return {
             name: getattr(work, name, 0) for name in ("linear_iterations", "products", "renewals")
@@ -226,7 +243,7 @@ class Watched:
 
 
 def product_seconds(A: Any) -> float:
-    """Processor time of one product with A as it was assembled."""
+    """Return the processor time [s] of one product with A as it was assembled."""
     mat = A.matrix.mat
     x, y = mat.createVecs()
     x.set(1.0)
@@ -240,7 +257,7 @@ def product_seconds(A: Any) -> float:
 
 
 def linear_iterations(watched: Watched) -> float | None:
-    """Mean iterations of the same steps without contact: the plain linear problem."""
+    """Return the mean iterations of the same steps without contact: the plain linear problem."""
     if not hasattr(watched.prepared, "work") or watched.last[0].slip0 is not None:
         return None
     before = watched.counts()["linear_iterations"]
@@ -250,7 +267,7 @@ def linear_iterations(watched: Watched) -> float | None:
 
 
 def history(given: Block) -> vc.State:
-    """The state after the steps at C = 10 that bring the block well into contact."""
+    """Return the state after the steps at C = 10 that bring the block well into contact."""
     steps = max(3, round(0.25 / given.dt(10.0)))
     solver = vc.Iterative("icc", tolerance=1e-7)
     marched = vc.march(given.problem, solver=solver, dt=given.dt(10.0), steps=steps, tolerance=1e-6)
@@ -260,8 +277,10 @@ def history(given: Block) -> vc.State:
 def dynamic(
     given: Block, state: vc.State | None, courant: float, solver: Any, steps: int, warm: int
 ) -> dict[str, Any]:
-    """A row of steps from a state."""
-    watched, worst, closed = Watched(solver), 0.0, []
+    """Return a row of steps from a state, of which the first ``warm`` do not count."""
+    watched = Watched(solver)
+    worst = 0.0
+    closed = []
     dt = given.dt(courant)
     for _, report in vc.march(
         given.problem, solver=watched, dt=dt, steps=warm + steps, state=state
@@ -275,12 +294,16 @@ def dynamic(
 
 
 def static(given: Block, solver: Any, steps: int) -> dict[str, Any]:
-    """A row of static steps: the weight grows, each step starts from the one before."""
-    problem, watched, worst = given.problem, Watched(solver), 0.0
+    """Return a row of static steps: the weight grows, each step starts from the one before."""
+    problem = given.problem
+    watched = Watched(solver)
+    worst = 0.0
     equations, surface = problem.equations, problem.surface
     A = equations.effective(m=0.0, c=0.0, k=1.0)
     watched.prepare(A, surface, 1.0)
-    x, active, closed = np.zeros(equations.rows), np.zeros(len(surface.gap0), dtype=bool), []
+    x = np.zeros(equations.rows)
+    active = np.zeros(len(surface.gap0), dtype=bool)
+    closed = []
     for k in range(steps + 1):
         load = equations.load((k + 4) * given.dt(FAR))
         step = vc.StepProblem(A, load, surface.gap0, surface, 1.0, x, active, 0.0, k)
@@ -295,9 +318,10 @@ def static(given: Block, solver: Any, steps: int) -> dict[str, Any]:
 def row(
     given: Block, watched: Watched, courant: float | None, worst: float, closed: float, A: Any
 ) -> dict[str, Any]:
-    """What the table shows of the steps that ``watched`` solved; means a step."""
+    """Return what the table shows of the steps that ``watched`` solved, as means of a step."""
     resident = MEMORY.peak()
-    product, solver = product_seconds(A), watched.solver
+    product = product_seconds(A)
+    solver = watched.solver
     linear = linear_iterations(watched)
     mean = {key: float(np.mean([one[key] for one in watched.rows])) for key in watched.rows[0]}
     own = hasattr(watched.prepared, "work")
@@ -332,7 +356,7 @@ def row(
 
 
 def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
-    """All rows of one size."""
+    """Yield all rows of one size: elements, Courant numbers, friction and statics."""
     for element in ("tetrahedra",) if size > LARGE else ELEMENTS:
         MEMORY.forget()
         given = block(size, element)
@@ -354,7 +378,7 @@ def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
 
 
 def small_rows(steps: int) -> Iterator[dict[str, Any]]:
-    """The condensed and the iterative route side by side."""
+    """Yield rows of the condensed and of the iterative route side by side."""
     for dimension in (2, 3):
         for size in SMALL:
             given = block(size, "tetrahedra", dimension=dimension)
@@ -388,7 +412,7 @@ SHOWN = (
 
 
 def told(found: dict[str, Any]) -> str:
-    """A row as text."""
+    """Return a row as text, with a dash for what it does not have."""
 
     def text(value: Any) -> str:
         return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
@@ -397,6 +421,7 @@ def told(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
+    """Print a row for each run as soon as it is done, and write all of them with --json."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

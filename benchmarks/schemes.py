@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
-"""Measure what each time scheme does in an impact, against exact solutions, and what its step
-costs.
+"""Measure what time schemes do in an impact, against exact solutions, and what a step costs.
 
     python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--no-bars]
-    [--json FILE]
+        [--json FILE]
 
 There are two tables, in the form of docs/guide/schemes.md:
 
@@ -59,23 +58,23 @@ SCHEMES: dict[str, tuple[Any, Any]] = {  # name -> scheme, mass (None: the schem
 
 
 def march(problem: Any, scheme: Any, dt: float, steps: int) -> Any:
-    """Steps with the condensed solver."""
+    """Take steps with the condensed solver."""
     return vc.march(problem, scheme=scheme, solver=vc.Condensed(), dt=dt, steps=steps)
 
 
 def energy(report: Any) -> float:
-    """Kinetic and strain energy after a step [J]."""
+    """Return the kinetic and strain energy after a step [J]."""
     system = report.problem.equations
     return float(system.kinetic_energy(report.new.v) + system.strain_energy(report.new.u))
 
 
 def force(one: Any) -> float:
-    """Contact force of all ranks [N], of a state or a mean of a step."""
+    """Return the contact force of all ranks [N], of a state or a mean of a step."""
     return float(MPI.COMM_WORLD.allreduce(one.r_n.sum()))
 
 
 def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
-    """max |p/300 - 1| of the thrown bar over 0.6 < t < 1.067."""
+    """Return max |p/300 - 1| of the thrown bar over 0.6 < t < 1.067."""
     bar = Bar(ThrownBar(), elements=elements)
     dt = bar.time_step(courant)
     worst = 0.0
@@ -88,17 +87,24 @@ def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
 
 
 def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
-    """Energies of the bouncing bar after 1, 4 and ``count`` bounces over 1/8; relative L2 error of
-    the force of four bounces, and its largest force over the exact one."""
+    """Return the energies of the bouncing bar after 1, 4 and ``count`` bounces over 1/8.
+
+    Beside them are the relative L2 error of the force of four bounces, and its largest force over
+    the exact one.
+    """
     bar = Bar(PeriodicBar(), elements=elements)
     dt = bar.time_step(courant)
     per_bounce = round(3.0 / dt)
     problem = build(bar, MPI.COMM_WORLD).problem(mass=mass)
-    energies, error, size, peak = [], 0.0, 0.0, 0.0
+    energies = []
+    error = 0.0
+    size = 0.0
+    peak = 0.0
     for k, (state, report) in enumerate(march(problem, scheme, dt, count * per_bounce), start=1):
         if k <= 4 * per_bounce:
             exact = float(bar.case.force(state.t - 0.5 * dt))
-            error, size = error + (force(report.balance) - exact) ** 2, size + exact**2
+            error = error + (force(report.balance) - exact) ** 2
+            size = size + exact**2
             peak = max(peak, force(state) / 0.5)
         if k % per_bounce == 0:
             energies.append(energy(report) / 0.125)
@@ -109,8 +115,10 @@ def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -
 
 
 def linear_step(report: Any, scheme: Any, dt: float) -> float:
-    """Seconds of the plain linear step with the same matrix from the same state."""
-    problem, old, A = report.problem, report.old, report.step.A
+    """Return the seconds of the plain linear step with the same matrix from the same state."""
+    problem = report.problem
+    old = report.old
+    A = report.step.A
     none = np.zeros(problem.surface.count)
     begin = time.perf_counter()
     step = scheme.step(problem, old, A, dt)
@@ -123,7 +131,7 @@ def linear_step(report: Any, scheme: Any, dt: float) -> float:
 def block(
     unknowns: float, scheme: Any, mass: Any, *, steps: int = 400, dt: float = 1e-3
 ) -> dict[str, float]:
-    """The thrown unit square: E = 1000, nu = 0.3, rho = 1, gap 0.05, speed 1."""
+    """Throw the unit square: E = 1000, nu = 0.3, rho = 1, gap 0.05, speed 1."""
     n = round(math.sqrt(unknowns / 2.0)) - 1
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(n, n)), MPI.COMM_WORLD)
     rubber = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0)
@@ -132,7 +140,11 @@ def block(
     problem = vc.ContactProblem(
         system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=mass
     )
-    largest, seconds, linear, worst, flight = 0.0, [], [], 0.0, None
+    largest = 0.0
+    seconds = []
+    linear = []
+    worst = 0.0
+    flight = None
     loop = iter(march(problem, scheme, dt, steps))
     for _ in range(steps):
         begin = time.perf_counter()
@@ -140,7 +152,8 @@ def block(
         spent = time.perf_counter() - begin
         # linear steps start from it: no scheme has anything to do for contact there
         flight = flight or report
-        largest, worst = max(largest, force(state)), max(worst, report.certificate.worst)
+        largest = max(largest, force(state))
+        worst = max(worst, report.certificate.worst)
         if problem.surface.some(state.active):
             seconds.append(spent)
             linear.append(linear_step(flight, scheme, dt))
@@ -158,12 +171,12 @@ def block(
 
 
 def number(value: float) -> str:
-    """Four digits, or a dash for what has left the scale."""
+    """Return four digits, or "> 10⁴" for what has left the scale."""
     return "> 10⁴" if value > 1e4 else f"{value:.4g}" if value >= 10 else f"{value:.3f}"
 
 
 def bar_row(elements: int, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
-    """A scheme's row of the first table, Courant numbers 1, ½ and 0.1."""
+    """Return a scheme's row of the first table, for Courant numbers 1, ½ and 0.1."""
     return {
         str(courant): {"oscillation": oscillation(elements, courant, scheme, mass)}
         | bounces(elements, courant, count if courant >= 0.5 else 4, scheme, mass)
@@ -172,6 +185,7 @@ def bar_row(elements: int, count: int, scheme: Any, mass: Any) -> dict[str, Any]
 
 
 def print_bars(rows: dict[str, Any], count: int) -> None:
+    """Print the table of the bars, with three energies where 20 bounces were run."""
     print(
         f"| scheme | Courant | force error in the window | energy after 1, 4, {count} bounces | "
         "L2 error of the force | largest force |\n|---|---|---|---|---|---|"
@@ -189,6 +203,7 @@ def print_bars(rows: dict[str, Any], count: int) -> None:
 
 
 def print_blocks(rows: dict[str, Any]) -> None:
+    """Print the table of the blocks, with the cost of a step over a linear one."""
     print(
         "| scheme | unknowns | energy | mean speed | largest force | ms per step | over a linear "
         "step |\n"
@@ -205,7 +220,7 @@ def print_blocks(rows: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    """Both tables."""
+    """Print both tables, and write them with --json."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--elements", type=int, default=100)
     parser.add_argument("--bounces", type=int, default=20)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Measure what displacements of second order gain: elements of degree 1 and 2 on the same nodes.
 
-    python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100] [--json
-    FILE]
+    python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100]
+        [--json FILE]
 
 The numbers are cells of degree 1. Cells of degree 2 are half as many on a side and have the same
 nodes, so that all elements have as many unknowns (nearly as many on the graded meshes of hertz). A
@@ -59,19 +59,21 @@ SECTIONS = {  # of the cantilever: dimension, section, Poisson's ratio
 
 
 def matrix(one: Any) -> sp.csr_matrix:
-    """A matrix of a system on one rank."""
+    """Return a matrix of a system on one rank in the form of scipy."""
     ends, columns, values = as_petsc(one).mat.getValuesCSR()
     return sp.csr_matrix((values, columns, ends))
 
 
 def entries(system: SemiDiscreteSystem) -> float:
-    """Entries of K that are not zero, for each unknown."""
+    """Return the entries of K that are not zero, for each unknown."""
     return matrix(system.K).count_nonzero() / system.rows
 
 
 def cantilever(body: str, cells: int, element: str) -> tuple[float, SemiDiscreteSystem]:
-    """(first frequency [rad/s], system) of a bending cantilever with so many cells over its
-    height."""
+    """Return the first frequency [rad/s] and the system of a bending cantilever.
+
+    It has so many cells over its height.
+    """
     d, section, nu = SECTIONS[body]
     degree, simplices = ELEMENTS[element]
     lengths = (float(SLENDER), *(1.0,) * (d - 1))
@@ -91,7 +93,7 @@ def cantilever(body: str, cells: int, element: str) -> tuple[float, SemiDiscrete
 
 
 def bending(cells: list[int]) -> list[Row]:
-    """Error of the first frequency in per cent."""
+    """Return rows with the error of the first frequency in per cent."""
     rows = []
     for body in SECTIONS:
         exact, _ = cantilever(body, 6 if body == "in space" else 16, "Q2")
@@ -112,12 +114,14 @@ def bending(cells: list[int]) -> list[Row]:
 
 
 def hertz(cells: list[int]) -> list[Row]:
-    """Error of the pressure of a cylinder in L2, in per cent of its norm."""
+    """Return rows with the error of a cylinder's pressure in L2, in per cent of its norm."""
     a, R, span = 0.02, 1.0, 30.0
-    exact, rows = HertzLine(force=np.pi * a**2 / (4.0 * R), modulus=1.0, radius=R), []
+    exact = HertzLine(force=np.pi * a**2 / (4.0 * R), modulus=1.0, radius=R)
+    rows = []
     for n in cells:
         for element, (degree, simplices) in ELEMENTS.items():
-            h, growth = a / n * degree, 1.15**degree
+            h = a / n * degree
+            growth = 1.15**degree
             axes = [
                 even_then_growing(h, 1.5 * a, span * a, growth=growth),
                 growing(h, span * a, growth=growth),
@@ -140,7 +144,8 @@ def hertz(cells: list[int]) -> list[Row]:
             )
             ground = vc.AnalyticGap(lambda x: x[:, 0] ** 2 / (2.0 * R))
             surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
-            state, w = vc.static_equilibrium(vc.ContactProblem(system, surface)), surface.weights
+            state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+            w = surface.weights
             p = exact.pressure(surface.points[:, 0])
             rows.append(
                 {
@@ -157,8 +162,9 @@ def hertz(cells: list[int]) -> list[Row]:
 
 
 def impact(cells: list[int]) -> list[Row]:
-    """Errors of the force of a thrown strip, in per cent of the exact force."""
-    case, rows = ThrownBar(), []
+    """Return rows with errors of the force of a thrown strip, in per cent of the exact force."""
+    case = ThrownBar()
+    rows = []
     for n in cells:
         for element, (degree, triangles) in ELEMENTS.items():
             bar = Bar(
@@ -169,17 +175,16 @@ def impact(cells: list[int]) -> list[Row]:
                 triangles=triangles,
                 degree=degree,
             )
-            model, dt = build(bar, MPI.COMM_SELF), bar.time_step(0.5 / degree)
+            model = build(bar, MPI.COMM_SELF)
+            dt = bar.time_step(0.5 / degree)
             found = np.array(
                 [
                     (state.t, state.r_n.sum())
                     for state, _ in vc.march(model.problem(), dt=dt, steps=round(1.5 / dt))
                 ]
             )
-            t, away = (
-                found[:, 0],
-                (found[:, 1] / bar.section - case.force(found[:, 0])) / case.pressure,
-            )
+            t = found[:, 0]
+            away = (found[:, 1] / bar.section - case.force(found[:, 0])) / case.pressure
             span, middle = (t > 0.3) & (t < 1.4), (t > 0.6) & (t < 1.067)
             rows.append(
                 {
@@ -196,7 +201,7 @@ def impact(cells: list[int]) -> list[Row]:
 
 
 def line(row: Row) -> str:
-    """One row for people."""
+    """Return one row as a line for people."""
     told = ("frequency", "pressure", "force", "ringing", "in contact")
     values = " ".join(f"{name} {row[name]:.3g}" for name in told if name in row)
     return (
@@ -206,6 +211,7 @@ def line(row: Row) -> str:
 
 
 def main() -> None:
+    """Print a line for each row of the three problems, and write all of them with --json."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Measure what a step of a small system costs, as a multiple of the same mathematics in bare numpy,
-in one run.
+"""Measure what a step of a small system costs, in steps of the same mathematics in bare numpy.
+
+Both are timed in one run.
 
     python3 benchmarks/small_systems.py [--steps 400] [--rounds 11] [--json FILE]
 
@@ -47,17 +48,17 @@ SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 
 
 class Bare:
-    """The wall as arrays, and its steps as 40 lines of numpy and scipy."""
+    """Hold the wall as arrays, and step it in 40 lines of numpy and scipy."""
 
     def __init__(self, problem: vc.ContactProblem, dt: float) -> None:
-        equations, self.dt, self.load = problem.equations, dt, problem.equations.load
+        equations = problem.equations
+        self.dt = dt
+        self.load = problem.equations.load
         self.M, self.K = (self._csr(matrix) for matrix in (equations.M, equations.K))
         self.A = (4.0 / dt**2 * self.M + self.K).tocsr()
-        self.points, self.gap0, self.state = (
-            problem.surface.owned,
-            problem.surface.gap0,
-            initial_state(problem),
-        )
+        self.points = problem.surface.owned
+        self.gap0 = problem.surface.gap0
+        self.state = initial_state(problem)
 
     @staticmethod
     def _csr(matrix: Any) -> sp.csr_matrix:
@@ -71,49 +72,59 @@ class Bare:
         units = np.zeros((A.shape[0], len(points)))
         units[points, np.arange(len(points))] = 1.0
         columns = factor.solve(units)
-        G, norm, largest = (
-            columns[points],
-            np.abs(columns[points]).sum(axis=1).max(),
-            A.diagonal().max(),
-        )
-        u, v, t, worst = self.state.u, self.state.v, 0.0, 0.0
-        active, known = np.zeros(len(points), dtype=bool), b""
+        G = columns[points]
+        norm = np.abs(columns[points]).sum(axis=1).max()
+        largest = A.diagonal().max()
+        u = self.state.u
+        v = self.state.v
+        t = 0.0
+        worst = 0.0
+        active = np.zeros(len(points), dtype=bool)
+        known = b""
         for _ in range(steps):
             guess = u + dt * v
             b = 2.0 * self.load(t + 0.5 * dt) + M @ guess * (4.0 / dt**2) - K @ u
-            x, r = factor.solve(b), np.zeros(len(points))
+            x = factor.solve(b)
+            r = np.zeros(len(points))
             q = gap0 - x[points]
             if active.any() or q.min() < 0.0:
                 while True:
                     if active.tobytes() != known:
-                        known, chosen = active.tobytes(), np.flatnonzero(active)
+                        known = active.tobytes()
+                        chosen = np.flatnonzero(active)
                         rows = G[chosen]
                         lower = lapack.dpotrf(rows[:, chosen], lower=1)[0] if len(chosen) else None
-                    r, w = np.zeros(len(points)), q
+                    r = np.zeros(len(points))
+                    w = q
                     if lower is not None:
                         part = lapack.dpotrs(lower, -q[chosen], lower=1)[0]
-                        r[chosen], w = part, q + part @ rows
+                        r[chosen] = part
+                        w = q + part @ rows
                     wrong = np.where(active, r, w) < -1e-15 * norm * np.abs(r).max()
                     if not wrong.any():
                         break
                     active = active ^ wrong
-                active, r = active & (r > 0.0), np.maximum(r, 0.0)
+                active = active & (r > 0.0)
+                r = np.maximum(r, 0.0)
                 x = x - columns @ r
                 x[points[active]] = gap0[active]
             worst = max(worst, self._certificate(A @ x, b, x, r, guess, active, largest))
             v = v + 2.0 * ((x - u) / dt - v)
             v[points[active]] = 0.0
-            u, t = x, t + dt
+            u = x
+            t = t + dt
         return u, worst
 
     def _certificate(
         self, Ax: Any, b: Any, x: Any, r: Any, guess: Any, active: Any, largest: float
     ) -> float:
-        """The residuals of vi_contact's certificate without friction."""
-        residual, gap = Ax - b, self.gap0 - x[self.points]
+        """Return the largest residual of vi_contact's certificate without friction."""
+        residual = Ax - b
+        gap = self.gap0 - x[self.points]
         residual[self.points] += r
         x_max, b_max, r_max = np.abs(x).max(), np.abs(b).max(), np.abs(r).max()
-        x_ref, r_ref = max(x_max, np.abs(guess).max()), max(b_max, r_max)
+        x_ref = max(x_max, np.abs(guess).max())
+        r_ref = max(b_max, r_max)
         if not x_ref > 0.0 < r_ref:
             return 0.0
         balance = np.abs(residual).max() / max(b_max, np.abs(Ax).max(), 1e-5 * largest * x_max)
@@ -143,8 +154,10 @@ main(["run", "wall", "--quiet", "--out", sys.argv[1]])
 
 
 def start_up(rounds: int) -> tuple[float, list[float]]:
-    """Processor time [s] from command to first step, the median, and its ratios to that of
-    importing the libraries."""
+    """Return the processor time [s] from command to first step, the median, and its ratios.
+
+    They are ratios to the time of importing the libraries.
+    """
     found: dict[str, list[float]] = {LIBRARIES: [], FIRST_STEP: []}
     with tempfile.TemporaryDirectory() as folder:
         cached = {
@@ -163,7 +176,7 @@ def start_up(rounds: int) -> tuple[float, list[float]]:
 
 
 def spent(work: Callable[[], Any]) -> tuple[float, Any]:
-    """(processor time [s], result)."""
+    """Return the processor time [s] of a call, and its result."""
     begin = time.thread_time()
     result = work()
     return time.thread_time() - begin, result
@@ -172,8 +185,10 @@ def spent(work: Callable[[], Any]) -> tuple[float, Any]:
 def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
     """Return the rows of march and simulate."""
     model = build(Wall(divisions=(8, 12)), MPI.COMM_WORLD)
-    problem, dt = model.problem("b"), model.time_step()
-    bare, worst = Bare(problem, dt), [0.0]
+    problem = model.problem("b")
+    dt = model.time_step()
+    bare = Bare(problem, dt)
+    worst = [0.0]
 
     def march() -> np.ndarray:
         for _, report in vc.march(problem, scheme=SCHEME, dt=dt, steps=steps):
@@ -187,11 +202,9 @@ def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
             ).state.u
 
     routes: dict[str, Callable[[], Any]] = {"march": march, "simulate": simulate}
-    found, ratios, expected = (
-        {name: [] for name in ("bare", *routes)},
-        {name: [] for name in routes},
-        bare.march(steps),
-    )
+    found = {name: [] for name in ("bare", *routes)}
+    ratios = {name: [] for name in routes}
+    expected = bare.march(steps)
     for name, work in routes.items():
         off = np.abs(work() - expected[0]).max() / np.abs(expected[0]).max()
         if not off < 1e-9:
@@ -231,6 +244,7 @@ def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
 
 
 def main() -> None:
+    """Print the rows of the methods and the line of the start-up."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=400)
     parser.add_argument("--rounds", type=int, default=11)

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Measure what soil boundaries reflect: dashpots at an angle, and how far away the sides of a soil
-must be.
+"""Measure what soil boundaries reflect, and how far away the sides of a soil must be.
 
-    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only
-    dashpots|sides|boxes]
+The reflection of dashpots depends on the angle of the waves.
+
+    python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14]
+        [--only dashpots|sides|boxes]
 
 dashpots: a group of plane waves runs in a strip that is one wavelength wide along the boundary, and
 whose sides are tied. The column is the energy that is left after the reflection, over the energy
@@ -46,15 +47,20 @@ NU = 0.25
 LENGTH = 2.5  # of the packet, in wavelengths
 SOIL = vc.LinearElastic.from_wave_speeds(280.0, 150.0, 1900.0)
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.2, rho=2400.0)
-DEPTH, BOX, H = 10.0, (6.0, 4.0), 1.0  # m: soil, box, cells
-DT, STEPS = 5e-3, 400
+DEPTH = 10.0  # of the soil [m]
+BOX = (6.0, 4.0)  # [m]
+H = 1.0  # of the cells [m]
+DT = 5e-3
+STEPS = 400
 PAIRS = (("left", "right"), ("back", "front"))
 SHAKE = vc.Ricker(1.0, 4.0)
 
 
 def shaken_box(sides: str, distance: float) -> np.ndarray:
-    """History of the box's displacement (steps, 2) with sides of some kind at ``distance`` [m] from
-    it."""
+    """Return the history of the box's displacement (steps, 2) with sides of some kind.
+
+    The sides are at ``distance`` [m] from it.
+    """
     width = BOX[0] + 2.0 * distance
     divisions = round(width / H), round(DEPTH / H)
     block = BlockMesh(lengths=(width, DEPTH), divisions=divisions, corner=(-0.5 * width, -DEPTH))
@@ -83,9 +89,12 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
 
 
 def shaken_box_in_space(distance: float) -> np.ndarray:
-    """History of the displacement (steps, 3) of a box, 8 m x 8 m x 4 m in 8 m of soil, tied sides
-    at ``distance``."""
-    width, h = 8.0 + 2.0 * distance, 2.0
+    """Return the displacements (steps, 3) of a box with tied sides at ``distance`` [m].
+
+    It is 8 m x 8 m x 4 m in 8 m of soil.
+    """
+    width = 8.0 + 2.0 * distance
+    h = 2.0
     block = BlockMesh(
         lengths=(width, 8.0, width),
         divisions=(round(width / h), 4, round(width / h)),
@@ -110,8 +119,10 @@ def shaken_box_in_space(distance: float) -> np.ndarray:
 
 
 def level_box(width: float, sides: str) -> np.ndarray:
-    """History of the velocity (steps, 3) in the middle of the surface of 8 m of level soil on a
-    compliant base."""
+    """Return the velocities (steps, 3) in the middle of the surface of level soil.
+
+    The soil is 8 m deep, on a compliant base.
+    """
     block = BlockMesh(
         lengths=(width, 8.0, width),
         divisions=(round(width / 2.0), 8, round(width / 2.0)),
@@ -129,7 +140,7 @@ def level_box(width: float, sides: str) -> np.ndarray:
 
 
 def surface_history(system: Any, march: Any, derivative: int) -> np.ndarray:
-    """u or v (steps, 3) in the middle of the surface."""
+    """Return u or v, its ``derivative`` 0 or 1, in the middle of the surface: (steps, 3)."""
     node = system.space.find_nodes(np.zeros((1, 3)))
     return np.array(
         [
@@ -140,6 +151,7 @@ def surface_history(system: Any, march: Any, derivative: int) -> np.ndarray:
 
 
 def box_tables() -> None:
+    """Print errors of tied sides near a box in space, and of other sides beside level ground."""
     reference = shaken_box_in_space(48.0)[:, 0]
     for depths in (0.5, 1.0, 2.0, 3.0):
         error = (
@@ -158,6 +170,7 @@ def box_tables() -> None:
 
 
 def dashpot_table(angles: Sequence[float], cells: int) -> None:
+    """Print the energy that dashpots send back at each angle: exact, of the packet, measured."""
     print(
         "| angle | P table | P packet | P measured | S table | S packet | S measured |\n"
         + "|---" * 7
@@ -166,7 +179,8 @@ def dashpot_table(angles: Sequence[float], cells: int) -> None:
     for angle in angles:
         row = [f"{angle:g}°"]
         for wave in "PS":
-            material, slope = vc.LinearElastic(E=1.0, nu=NU, rho=1.0), math.radians(angle)
+            material = vc.LinearElastic(E=1.0, nu=NU, rho=1.0)
+            slope = math.radians(angle)
             exact = dashpot_energy(material, slope, wave=wave)
             measured, packet = energy_sent_back(
                 MPI.COMM_WORLD, material, wave, slope, length=LENGTH, cells=cells
@@ -176,6 +190,7 @@ def dashpot_table(angles: Sequence[float], cells: int) -> None:
 
 
 def side_table(depths: Sequence[float]) -> None:
+    """Print the errors of five kinds of sides, against a free field twelve depths away."""
     reference = shaken_box("free field", 12.0 * DEPTH)
     largest = np.abs(reference[:, 0]).max()
     print(f"largest displacement {largest:.4g} m", flush=True)
@@ -193,6 +208,7 @@ def side_table(depths: Sequence[float]) -> None:
 
 
 def main() -> None:
+    """Print the tables that are asked for, by default all of them."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--angles", type=float, nargs="+", default=[15.0, 30.0, 45.0, 60.0, 75.0])
     parser.add_argument("--cells", type=int, default=12, help="number of cells in a wavelength")

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Measure what a unilateral step costs, as a multiple of a plain linear step with the same matrix,
-in one run.
+"""Measure what a unilateral step costs, in plain linear steps with the same matrix.
 
-    python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square] [--json
-    FILE]
+Both are timed in one run.
+
+    python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square]
+        [--json FILE]
 
 The problems are the wall of docs/start/first_wall.md with its whole right side in possible contact,
 the buried channel (two bodies and an impact law, after the gravity stage), and a block in space
@@ -77,14 +78,14 @@ Problem = tuple[vc.ContactProblem, float, Any]  # with its dt and the state it s
 
 
 def timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """(seconds of processor time, result)."""
+    """Return the seconds of processor time of a call, and its result."""
     start = time.thread_time()
     result = work()
     return time.thread_time() - start, result
 
 
 def wall_cells(size: float) -> tuple[int, int]:
-    """The cells of the wall along its axes; 600 contact points from 1e5 unknowns on."""
+    """Return the cells of the wall along its axes; 600 contact points from 1e5 unknowns on."""
     if size >= 1e5:
         return math.ceil(size / 1200.0), 600
     wide = math.ceil(math.sqrt(0.25 + size / 3.0) - 0.5)
@@ -92,13 +93,13 @@ def wall_cells(size: float) -> tuple[int, int]:
 
 
 def wall(size: float, friction: Any) -> Problem:
-    """The wall, its whole right side in possible contact."""
+    """Return the wall, its whole right side in possible contact."""
     model = build(Wall(divisions=wall_cells(size)), MPI.COMM_SELF, base_inertia="catalogue")
     return rubbing(model.problem("face"), friction), model.time_step(), None
 
 
 def buried(size: float, friction: Any) -> Problem:
-    """The buried channel at rest under its weight; at 2e5 unknowns 232 contact points."""
+    """Return the buried channel at rest under its weight; at 2e5 unknowns 232 contact points."""
     model = channel.build(
         channel.Channel(ChannelMesh(size=0.14 * math.sqrt(2e4 / size))), MPI.COMM_SELF
     )
@@ -107,8 +108,9 @@ def buried(size: float, friction: Any) -> Problem:
 
 
 def block(size: float, friction: Any) -> Problem:
-    """A cube, clamped at its top, shaken over the ground that it just touches."""
-    n, f = math.floor((size / 3.0) ** (1.0 / 3.0) - 2.0 / 3.0), 400.0
+    """Return a cube, clamped at its top, shaken over the ground that it just touches."""
+    n = math.floor((size / 3.0) ** (1.0 / 3.0) - 2.0 / 3.0)
+    f = 400.0
     mesh, tags = fem.build_mesh(
         BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(n, n, n)), MPI.COMM_SELF
     )
@@ -125,7 +127,7 @@ def block(size: float, friction: Any) -> Problem:
 
 
 def rubbing(problem: vc.ContactProblem, friction: Any) -> vc.ContactProblem:
-    """The problem with friction, when there is some."""
+    """Return the problem with friction, when there is some."""
     return problem if friction is None else replace(problem, friction=friction)
 
 
@@ -137,26 +139,27 @@ PROBLEMS: dict[str, Callable[[float, Any], Problem]] = {
 
 
 class Cholmod:
-    """CHOLMOD's own factor in free ordering, and its own substitutions."""
+    """Factorise by CHOLMOD in free ordering, and use its own substitutions."""
 
     def __init__(self, matrix: Any) -> None:
         ends, columns, values = matrix.mat.getValuesCSR()
         A = sp.csr_matrix((values, columns, ends), shape=(len(ends) - 1,) * 2)
-        mine, contact_last.SHORT_COLUMNS = contact_last.SHORT_COLUMNS, 0.0
+        mine = contact_last.SHORT_COLUMNS
+        contact_last.SHORT_COLUMNS = 0.0
         self.factor = contact_last.ContactLast(
             cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64)
         )
         contact_last.SHORT_COLUMNS = mine
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """A⁻¹ b."""
+        """Return A⁻¹ b."""
         x = b.copy()
         self.factor._library.substitute(self.factor._factor, 0, 1, contact_last.at(x))  # CHOLMOD_A
         return x
 
 
 def petsc(kind: str, order: str) -> Callable[[Any], Any]:
-    """What factorises by PETSc's own Cholesky, in this order, or by MUMPS in its own."""
+    """Return what factorises by PETSc's own Cholesky in this order, or by MUMPS in its own."""
 
     def factorise(matrix: Any) -> Any:
         options = {
@@ -177,8 +180,10 @@ def petsc(kind: str, order: str) -> Callable[[Any], Any]:
 
 
 class Factors:
-    """One matrix, factorised in several ways. ``setup``: seconds of each; small ones are made
-    again, as caches warm."""
+    """Hold one matrix, factorised in several ways.
+
+    ``setup``: seconds of each; small ones are made again, as caches warm.
+    """
 
     def __init__(self, matrix: Any, dimension: int) -> None:
         # in space nested dissection is three times as fast
@@ -197,15 +202,17 @@ class Factors:
 
 
 def repeated(work: Callable[[], Any], rows: int) -> tuple[float, Any]:
-    """(median of seconds of processor time, last result)."""
+    """Return the median of seconds of processor time of several calls, and the last result."""
     found = [timed(work) for _ in range(9 if rows < SHORT_STEPS else 3 if rows < 3e4 else 1)]
     return float(np.median([seconds for seconds, _ in found])), found[-1][1]
 
 
 @dataclass
 class Linear:
-    """Plain linear steps by several factors of the matrix of the problem, on a state of their
-    own."""
+    """Take plain linear steps by several factors of the matrix of the problem.
+
+    They march on a state of their own.
+    """
 
     problem: vc.ContactProblem
     dt: float
@@ -230,12 +237,12 @@ class Linear:
         return SCHEME.finish(self.problem, self.state, step, result, self.dt)
 
     def fastest(self) -> str:
-        """The factor whose steps are the fastest."""
+        """Return the name of the factor whose steps are the fastest."""
         return min(self.seconds, key=lambda name: float(np.median(self.seconds[name])))
 
 
 def set_up(problem: vc.ContactProblem, dt: float, scale: float) -> float:
-    """Seconds to order, factorise and condense, once more from nothing."""
+    """Return the seconds to order, factorise and condense, once more from nothing."""
     matrix = SCHEME.effective_matrix(problem, dt)
 
     def condensed() -> Any:
@@ -247,9 +254,11 @@ def set_up(problem: vc.ContactProblem, dt: float, scale: float) -> float:
 
 
 class StepsWithContact:
-    """Iterates over the reports of ``count`` steps with contact after a third as many to warm up,
-    each beside linear steps. ``seconds`` of each; ``plain``: of the linear steps by the fastest
-    factor; ``active``: points in contact; ``worst``: certificate of all steps."""
+    """Iterate over the reports of ``count`` steps with contact, each beside linear steps.
+
+    A third as many before them warm up. ``seconds`` of each; ``plain``: of the linear steps by the
+    fastest factor; ``active``: points in contact; ``worst``: certificate of all steps.
+    """
 
     def __init__(
         self,
@@ -261,7 +270,9 @@ class StepsWithContact:
         state: vc.State | None = None,
     ) -> None:
         self.loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=10**6, state=state)
-        self.count, self.linear, self.worst = count, linear, 0.0
+        self.count = count
+        self.linear = linear
+        self.worst = 0.0
         self.seconds: list[float] = []
         self.active: list[int] = []
 
@@ -281,13 +292,15 @@ class StepsWithContact:
 
     @property
     def plain(self) -> list[float]:
-        """Seconds of the linear steps beside those with contact."""
+        """Return the seconds of the linear steps beside those with contact."""
         return self.linear.seconds[self.linear.fastest()][-len(self.seconds) :]
 
 
 def measured(name: str, size: float, count: int) -> Iterator[dict[str, Any]]:
-    """The rows of one problem of one size, without and with friction, which have the same
-    matrix."""
+    """Yield the rows of one problem of one size, without and with friction.
+
+    They have the same matrix, which is factorised once.
+    """
     factors = None
     for friction in (None, RUBBING):
         problem, dt, state = PROBLEMS[name](size, friction)
@@ -298,13 +311,17 @@ def measured(name: str, size: float, count: int) -> Iterator[dict[str, Any]]:
 
 
 def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str, Any]:
-    """The steps with contact of one problem, and once more its set-up."""
+    """Return the row of the steps with contact of one problem, and once more its set-up."""
     problem, dt, state = given
-    linear, surface = Linear(problem, dt, factors.by), problem.surface
+    linear = Linear(problem, dt, factors.by)
+    surface = problem.surface
     steps = StepsWithContact(problem, vc.Condensed(), dt, count, linear, state)
     scale = [report.step.scale for report in steps][-1]
-    setup, own = set_up(problem, dt, scale), factors.setup.get("PETSc")
-    median, mean, plain = np.median(steps.seconds), np.mean(steps.seconds), steps.plain
+    setup = set_up(problem, dt, scale)
+    own = factors.setup.get("PETSc")
+    median = np.median(steps.seconds)
+    mean = np.mean(steps.seconds)
+    plain = steps.plain
     return {
         "unknowns": linear.A.matrix.rows,
         "points": surface.total,
@@ -326,9 +343,10 @@ def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str
 
 
 class Whole(EffectiveMatrix):
-    """A matrix that orders no unknowns last, for the plain way to condense."""
+    """Hold a matrix that orders no unknowns last, for the plain way to condense."""
 
     def contact_last(self, last: Any) -> None:
+        """Return nothing, so that no order of the contact unknowns is used."""
         return None
 
 
@@ -337,15 +355,15 @@ class Before:
     """Condense by PETSc's factor and two whole substitutions, the plain way."""
 
     def check(self, problem: vc.ContactProblem) -> None:
-        """Everything is right."""
+        """Accept everything."""
 
     def prepare(self, A: EffectiveMatrix, surface: vc.ContactSurface, scale: float) -> Any:
-        """The condensed solver without contact last."""
+        """Prepare the condensed solver without contact last."""
         return vc.Condensed().prepare(Whole(A.matrix, A.algebra), surface, scale)
 
 
 def square(size: float) -> dict[str, Any]:
-    """The static problem of Signorini, both ways in turn."""
+    """Solve the static problem of Signorini, both ways in turn, and return its row."""
     n = math.ceil(math.sqrt(0.5 * size) - 0.5)
     mesh, tags = fem.build_mesh(
         BlockMesh(lengths=(1.0, 1.0), divisions=(n, n), simplices=True), MPI.COMM_SELF
@@ -391,7 +409,7 @@ def square(size: float) -> dict[str, Any]:
 
 
 def certificate(problem: vc.ContactProblem, state: vc.State) -> float:
-    """Residual of equilibrium of a static state, over its largest force."""
+    """Return the residual of equilibrium of a static state, over its largest force."""
     system = problem.static_load
     forces = system.K @ state.u
     residual = (
@@ -419,7 +437,7 @@ COLUMNS = (  # title, width, format, key
 
 
 def line(row: dict[str, Any]) -> str:
-    """One row of the table."""
+    """Return one row of the table, with a dash for what it does not have."""
     shown = row | {"ms": 1e3 * row["seconds_per_step"]}
     cells = ((shown.get(key), width, form) for _, width, form, key in COLUMNS)
     return " ".join(
@@ -429,7 +447,7 @@ def line(row: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Prints the table and writes it with --json."""
+    """Print the table, and write it with --json."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument(
         "--sizes", type=float, nargs="+", help="numbers of unknowns (default: as in the guide)"

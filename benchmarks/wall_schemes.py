@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Run the first wall with every time scheme, with the time step of the article and a sixteenth of
-it.
+"""Run the first wall with every time scheme, with the article's time step and a sixteenth of it.
 
     python3 benchmarks/wall_schemes.py [--only NAME…]
 
@@ -57,8 +56,10 @@ LOSSES = ("loss_contact", "loss_impact", "loss_algorithmic")
 
 
 def run(words: list[str], finer: int = 1) -> tuple[str, str]:
-    """Return the range of the top corner [µm] and the share of the input work that is taken, as the
-    table has them."""
+    """Return the range of the top corner [µm] and the share of the input work that is taken.
+
+    Both are texts as the table has them.
+    """
     steps = ["--steps", str(400 * finer), "--set", f"run.dt.parts={20 * finer}"]
     with tempfile.TemporaryDirectory() as folder:
         said = io.StringIO()

@@ -7,11 +7,11 @@ The text prints the normal force incompletely, so that it can be read in three w
 larger contact forces cause more oscillations of the tip, and that friction takes little energy
 beside viscosity. No reading gives both.
 
-    bash demos/run.sh beam_statements              # the table of docs/theory/beam.md; figure in results/beam_statements
+    bash demos/run.sh beam_statements              # the table of docs/theory/beam.md
     bash demos/run.sh beam_statements --json       # the same as JSON
 
-There are 24 runs of 1000 elements and 1000 steps, which take about 5 s. docs/theory/beam.md
-explains the readings.
+The figure is in results/beam_statements. There are 24 runs of 1000 elements and 1000 steps, which
+take about 5 s. docs/theory/beam.md explains the readings.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, r
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
-ELEMENTS, DT = 1000, 0.002
+# --------------------------------------------------------------------------------------------------
+ELEMENTS = 1000
+DT = 0.002
 OUT = Path("results/beam_statements")
 
 

@@ -8,8 +8,8 @@ The bar is clamped at its top and released from a compressed state; its foot str
 schemes differ in how much the contact force oscillates, and in whether the energy grows, stays or
 falls.
 
-    bash demos/run.sh bouncing_bar                # the figures and a table, into results/bouncing_bar
-    bash demos/run.sh -n 2 bouncing_bar           # the same on two ranks
+    bash demos/run.sh bouncing_bar          # the figures and a table, into results/bouncing_bar
+    bash demos/run.sh -n 2 bouncing_bar     # the same on two ranks
 
 The bar has E = rho = length = 1 (SI).
 """
@@ -32,7 +32,7 @@ from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BAR = Bar(PeriodicBar(), elements=100, dimension=1)  # dimension=2: a strip of 3 elements across
 COURANT = 0.5  # dt c / h
 BOUNCES = 4

@@ -7,7 +7,7 @@ The examples are a pressed square, concrete on steel, concrete in concrete, and 
 moving plane. Boundary elements have unknowns on the boundary only, and they share no matrix with
 the finite elements. So the agreement of both methods shows that the mechanics agree.
 
-    bash demos/run.sh boundary_elements        # three figures and a table, into results/boundary_elements
+    bash demos/run.sh boundary_elements     # figures and a table, into results/boundary_elements
 
 docs/theory/bem.md explains the method, docs/guide/pressed_blocks.md the examples.
 """
@@ -43,7 +43,7 @@ from vi_contact import bem
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
 QUICK = {"square": 6, "steel": 5, "concrete": 4, "ball": 24}
 # of the finite elements; size of those of the ball
@@ -268,8 +268,9 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
         "finite elements (dots)",
     )
     pairs = (("square", "steel"), ("concrete", "ball"))
+    panels = [[energies(name, answers[name]) for name in pair] for pair in pairs]
     plot_panels(
-        [[energies(name, answers[name]) for name in pair] for pair in pairs],
+        panels,
         out / "energies.png",
         title="Energy with and without friction: boundary elements (lines), finite elements (dots)",
     )
@@ -277,7 +278,9 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
 
 def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
     """Return the deformed bodies at some times."""
-    run, contact, scale = answer.run, answer.run.contact, MAGNIFIED[name]
+    run = answer.run
+    contact = answer.run.contact
+    scale = MAGNIFIED[name]
     steps = [int(np.argmin(np.abs(run.times - t))) for t in times]
     inside = [points_inside(problem.operator.mesh) for problem, _ in answer.bodies]
     moved = [

@@ -10,9 +10,10 @@ unknowns, and the two must agree to round-off.
 
     bash demos/run.sh channel                   # three runs with all figures, into results/channel
     bash demos/run.sh -n 3 channel              # the same on three ranks
-    bash demos/run.sh channel --motion H,V --set friction.type=Coulomb --set friction.mu=0.5   # one run, its report
+    bash demos/run.sh channel --motion H,V --set friction.type=Coulomb --set friction.mu=0.5
 
-Units are SI; the case data and what the source leaves open are explained in docs/guide/channel.md.
+The last command makes one run and its report. Units are SI; the case data and what the source
+leaves open are explained in docs/guide/channel.md.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from vi_contact.plots.histories import History
 from vi_contact.run.static import static_equilibrium
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 # [m]
 CHANNEL = Channel(
     ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5)
@@ -70,7 +71,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     """
     comm = MPI.COMM_WORLD
     model = build(CHANNEL, comm)
-    dt, histories, numbers = CHANNEL.time_step(), {}, {}
+    dt = CHANNEL.time_step()
+    histories = {}
+    numbers = {}
     for name, options in RUNS.items():
         problem = model.problem(excitation=CHANNEL.harmonic(AMPLITUDE), **options)
         # the channel's weight, contact active
@@ -128,10 +131,8 @@ def key_numbers(history: History) -> dict[str, float]:
 
     The openings are those of the walls' tops and feet; it says how often both walls' are open.
     """
-    left, right = (
-        pictures.opening(history, "19", (-1.0, 0.0)),
-        pictures.opening(history, "13", (1.0, 0.0)),
-    )
+    left = pictures.opening(history, "19", (-1.0, 0.0))
+    right = pictures.opening(history, "13", (1.0, 0.0))
     u_1, u_7 = history["u_y_1"], history["u_y_7"]
     tiny = 1e-9 * max(left.max(), right.max())
     return {

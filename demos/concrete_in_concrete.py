@@ -7,10 +7,10 @@ They are two elastic bodies in frictional contact.
 it is pressed and leans on the walls, which with friction (Coulomb, mu = 0.75) carry a part of the
 load.
 
-    bash demos/run.sh concrete_in_concrete              # two figures and a table, into results/concrete_in_concrete
-    bash demos/run.sh -n 2 concrete_in_concrete         # the same on two ranks
+    bash demos/run.sh concrete_in_concrete          # two figures and a table
+    bash demos/run.sh -n 2 concrete_in_concrete     # the same on two ranks
 
-docs/guide/pressed_blocks.md explains the numbers.
+Both write into results/concrete_in_concrete. docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 CELLS = 10  # along a side of the box
 FRICTION = {"smooth": vc.Frictionless(), "rough": vc.Coulomb(0.75)}
 DT = 1.0e-4  # [s]

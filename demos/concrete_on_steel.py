@@ -5,10 +5,10 @@
 20 ms, so the box follows its static solution; on steel (Coulomb, mu = 0.3) its base sticks
 everywhere.
 
-    bash demos/run.sh concrete_on_steel                 # two figures and a table, into results/concrete_on_steel
-    bash demos/run.sh -n 2 concrete_on_steel            # the same on two ranks
+    bash demos/run.sh concrete_on_steel         # two figures and a table
+    bash demos/run.sh -n 2 concrete_on_steel    # the same on two ranks
 
-docs/guide/pressed_blocks.md explains the numbers.
+Both write into results/concrete_on_steel. docs/guide/pressed_blocks.md explains the numbers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BOX = concrete(cells=20)
 FRICTION = {"smooth": vc.Frictionless(), "on steel": vc.Coulomb(0.3)}
 DT = 5.0e-5  # [s]

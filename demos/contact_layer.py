@@ -38,7 +38,7 @@ from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BARS = (Bar(ThrownBar(), elements=100), Bar(BouncingBar(), elements=100))
 T_END = {ThrownBar: 1.4, BouncingBar: 16.0 / 3.0}  # one impact, one period [s]
 WIDTHS = (1.0, 0.5, 0.25, 0.1)  # b [m] of the bar's layers
@@ -46,8 +46,10 @@ BLOCK = Bar(ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0), elem
 WANTED = (1.0, 0.8, 0.5, 0.2)  # restitutions of the block
 METRICS = (Metric.BLENDED, Metric.FLAT)
 PASSAGE = 20  # time steps per b/V
-WALL_WIDTHS, WALL_SPEED = (4e-6, 2e-6, 1e-6, 5e-7), 1e-2  # b [m], V [m/s] of the wall's layers
-WALL_STEPS, WALL_PERIODS = 640, 1.5  # time steps per period of the shaking
+WALL_WIDTHS = (4e-6, 2e-6, 1e-6, 5e-7)  # b of the wall's layers [m]
+WALL_SPEED = 1e-2  # V of the wall's layers [m/s]
+WALL_STEPS = 640  # time steps per period of the shaking
+WALL_PERIODS = 1.5  # of the shaking
 OUT = Path("results/contact_layer")
 
 
@@ -76,7 +78,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 def rebounds(wanted: tuple[float, ...], metrics: tuple[Metric, ...]) -> dict[str, float]:
     """Return the block's velocity after the impact over the one before."""
-    model, numbers, width = build(BLOCK, MPI.COMM_WORLD), {}, 0.01
+    model = build(BLOCK, MPI.COMM_WORLD)
+    numbers = {}
+    width = 0.01
     problem = model.problem(mass=vc.ConsistentMass())
     case, system = BLOCK.case, model.system
     weight = case.rho * case.length  # mass over contact area
@@ -101,8 +105,11 @@ def thin_limit(
 
     Beside it stands the exact inequality on the same mesh.
     """
-    model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
-    name, t_end = type(case).__name__, T_END[type(case)]
+    model = build(bar, MPI.COMM_WORLD)
+    numbers = {}
+    case = bar.case
+    name = type(case).__name__
+    t_end = T_END[type(case)]
     speed = (
         case.speed
         if isinstance(case, ThrownBar)
@@ -118,7 +125,8 @@ def thin_limit(
             schemes[f"{metric.name} b {width:g}"] = (BoundaryLayer(law=law), dt)
     fine = np.linspace(0.0, t_end, 2001)
     curve = (fine, case.height + case.displacement(0.0, fine), case.force(fine))
-    impulse, runs = float(np.mean(curve[2])) * t_end, {}
+    impulse = float(np.mean(curve[2])) * t_end
+    runs = {}
     if MPI.COMM_WORLD.rank == 0:
         print(
             f"\n{name:24s} {'rms error of the foot [m]':>26s} {'energy left':>12s} "
@@ -164,8 +172,10 @@ def shaken_wall(
     """
     model = wall.build(wall.Wall(), MPI.COMM_WORLD, base_inertia="catalogue")
     exact = model.problem("b", impact=None, mass=vc.ConsistentMass())
-    concrete, dt = model.wall.material, 1.0 / (model.harmonic().frequency * steps)
-    numbers, errors = {}, []
+    concrete = model.wall.material
+    dt = 1.0 / (model.harmonic().frequency * steps)
+    numbers = {}
+    errors = []
 
     def displacements(problem: vc.ContactProblem, scheme) -> np.ndarray:
         found = vc.march(problem, scheme=scheme, dt=dt, steps=round(periods * steps))
@@ -203,7 +213,9 @@ def marched(
     problem: vc.ContactProblem, scheme, dt: float, t_end: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Return times, gap of the foot, pressure; the energy lost, the weight's included."""
-    system, surface, rows = problem.equations, problem.surface, []
+    system = problem.equations
+    surface = problem.surface
+    rows = []
     weight = system.load.constant
 
     def energy(u: np.ndarray, v: np.ndarray) -> float:

@@ -35,7 +35,7 @@ from vi_contact.fem import compat
 from vi_contact.solvers import ReducedNewton
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 WIDTH = 0.05  # l
 HEIGHT = 0.1
 ACROSS = 8  # cells; the strip has ten times as many along it
@@ -43,7 +43,8 @@ ACROSS = 8  # cells; the strip has ten times as many along it
 STRAINS = (0.4, 0.8, 1.0, 1.3, 1.6, 1.0, 0.4, 1.2, 1.6, 2.0)
 PULLS = (0.5, 0.8, 0.95, 1.02, 1.1, 1.2)  # of the bar that breaks
 LEFT = 1e-8  # of the stiffness where d = 1
-SETTLED, ROUNDS = 1e-5, 1500  # of d, between two rounds; and how many, at most
+SETTLED = 1e-5  # of d, between two rounds
+ROUNDS = 1500  # of u and d in turn, at most
 BROKEN = 0.98  # damage of nodes that count as broken
 OUT = Path("results/crack")
 
@@ -56,7 +57,10 @@ class Bar:
     """
 
     def __init__(self, comm: Any, across: int, held: bool) -> None:
-        self.comm, self.across, self.rounds, self.worst = comm, across, 0, 0.0
+        self.comm = comm
+        self.across = across
+        self.rounds = 0
+        self.worst = 0.0
         on = dolfinx.mesh.create_rectangle(
             comm, [[-0.5, 0.0], [0.5, HEIGHT]], [10 * across, across]
         )
@@ -128,7 +132,8 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 
     It returns stresses and energies.
     """
-    comm, numbers = MPI.COMM_WORLD, {}
+    comm = MPI.COMM_WORLD
+    numbers = {}
     strain, stress = critical(WIDTH)
     even = Bar(comm, 2, held=False)
     found = np.array([even.load(one * strain)[2] for one in STRAINS]) / stress
@@ -136,10 +141,8 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
     numbers["homogeneous: stress error"] = float(np.max(np.abs(found - known)))
     numbers["homogeneous: certificate"] = even.worst
 
-    bar, pulls = (
-        Bar(comm, ACROSS // 2 if quick else ACROSS, held=True),
-        PULLS[-1:] if quick else PULLS,
-    )
+    bar = Bar(comm, ACROSS // 2 if quick else ACROSS, held=True)
+    pulls = PULLS[-1:] if quick else PULLS
     energies = np.array([bar.load(one * strain)[:2] for one in pulls])
     h = HEIGHT / bar.across
     numbers |= {
@@ -150,13 +153,16 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
         "certificate": bar.worst,
     }
     broken = gathered(bar.d)
-    numbers["crack alone"], numbers["1 + h / (2 l)"] = bar.crack_alone(), 1.0 + 0.5 * h / WIDTH
+    numbers["crack alone"] = bar.crack_alone()
+    numbers["1 + h / (2 l)"] = 1.0 + 0.5 * h / WIDTH
     alone = gathered(bar.d)
     if comm.rank == 0:
         assert broken is not None and alone is not None
         axis = np.abs(broken[0][:, 1]) < 1e-9
-        x, open_ = broken[0][axis, 0], broken[1][axis] > BROKEN
-        numbers["middle"], numbers["d"] = float(np.mean(x[open_])), float(np.max(broken[1]))
+        x = broken[0][axis, 0]
+        open_ = broken[1][axis] > BROKEN
+        numbers["middle"] = float(np.mean(x[open_]))
+        numbers["d"] = float(np.max(broken[1]))
         away = np.linspace(-9.0, 9.0, 801)
         near = np.maximum(np.abs(away) - 0.5 * float(np.ptp(x[open_])) / WIDTH, 0.0)
         out.mkdir(parents=True, exist_ok=True)

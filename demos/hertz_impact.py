@@ -7,8 +7,8 @@ A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microse
 145 N on a spot of a third of a millimetre, and rebounds with its full speed. The model is a quarter
 of the ball, with the default scheme.
 
-    bash demos/run.sh hertz_impact                # the figure and a table, into results/hertz_impact
-    bash demos/run.sh -n 2 hertz_impact           # the same on two ranks
+    bash demos/run.sh hertz_impact          # the figure and a table, into results/hertz_impact
+    bash demos/run.sh -n 2 hertz_impact     # the same on two ranks
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BALL = Ball(radius=0.01, speed=0.1, material=vc.LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))
 MESHES = (4, 8)  # cells in the largest contact radius
 STEPS = 200  # in the contact time
@@ -48,7 +48,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     for cells in MESHES[:1] if quick else MESHES:
         name = f"{cells} cells in the contact radius"
         model = build(replace(BALL, cells=cells), comm)
-        problem, dt = model.problem(), model.time_step(STEPS // 2 if quick else STEPS)
+        problem = model.problem()
+        dt = model.time_step(STEPS // 2 if quick else STEPS)
         solution = vc.simulate(
             problem,
             dt=dt,
@@ -81,7 +82,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 def curves_of(model: BallModel, problem: vc.ContactProblem, solution: vc.Solution) -> ImpactCurves:
     """Return the histories of the whole ball; time and approach count from the first touch."""
-    history, points = solution.history, problem.surface.whole().points
+    history = solution.history
+    points = problem.surface.whole().points
     force = QUARTERS * history["contact_resultant"]
     return ImpactCurves(
         t=history["t"] - model.ball.height / model.ball.speed,

@@ -29,7 +29,7 @@ from vi_contact import vi
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 CELLS = (16, 32, 64, 128, 256)  # squares along a side
 DRAWN = 64
 OUT = Path("results/obstacle")
@@ -40,7 +40,9 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 
     It returns errors, the contact radius and the force.
     """
-    comm, known, numbers = MPI.COMM_WORLD, Membrane(), {}
+    comm = MPI.COMM_WORLD
+    known = Membrane()
+    numbers = {}
     meshes = CELLS[:3] if quick else CELLS
     drawn = None
     for cells in meshes:
@@ -49,7 +51,8 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
         V = posed.u.function_space
         n = V.dofmap.index_map.size_local
         off = np.max(np.abs(posed.u.x.array[:n] - posed.exact.x.array[:n]), initial=0.0)
-        push, points = result.lambda_lower.x.array[:n], V.tabulate_dof_coordinates()[:n]
+        push = result.lambda_lower.x.array[:n]
+        points = V.tabulate_dof_coordinates()[:n]
         farthest = np.max(np.hypot(*points[push > 0.0, :2].T), initial=0.0)
         numbers[f"{cells}: error"] = comm.allreduce(float(off), op=MPI.MAX)
         numbers[f"{cells}: radius"] = comm.allreduce(float(farthest), op=MPI.MAX)

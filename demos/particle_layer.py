@@ -32,7 +32,7 @@ from demos.pictures.layer import plot_cut_off, plot_parameters, plot_particle
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 STIFFNESSES = (0.5, 1.0, 2.0, 5.0, 10.0)  # k [N/m]
 DAMPERS = (0.0, 0.5, 1.0, 2.0, 5.0)  # c [N]
 MASS, SPEED, WIDTH = 1.0, 1.0, 1.0  # m [kg], V [m/s], b [m]
@@ -78,7 +78,8 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
 
     They are in closed form, with its distance from integration.
     """
-    numbers, worst = {}, 0.0
+    numbers = {}
+    worst = 0.0
     print("     k      c        e      e_p(f̂)   t_c [s]    t_f [s]  x_min [m]")
     for k in stiffnesses:
         for c in DAMPERS:

@@ -12,9 +12,12 @@ docs/guide/raft.md has the data, the figures, the mesh and the time step.
     bash demos/run.sh raft                          # 2e4 unknowns, 1000 steps, into results/raft
     bash demos/run.sh -n 2 raft --size 1e5          # on two ranks
     bash demos/run.sh raft --size 3e5 --steps 50    # 7 GB, six minutes until the first step
-    bash demos/run.sh raft --size 1e6 --steps 4     # without a factor: minutes a step, and hours for the gravity stage
+    bash demos/run.sh raft --size 1e6 --steps 4     # without a factor: minutes a step
+
+The last one takes hours for the gravity stage. The same stages from a case file:
+
     python3 meshes raft --size 2.4 --soil-size 1.6 --far 8 -o demos/cases/raft.msh
-    vi-contact run demos/cases/raft.toml --out results/raft_case    # the same stages from a case file
+    vi-contact run demos/cases/raft.toml --out results/raft_case
 """
 
 from __future__ import annotations
@@ -41,24 +44,23 @@ from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.faces import plot_faces
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 CONCRETE = vc.LinearElastic(E=2.5e10, nu=0.2, rho=2500.0)
 # [m]
-RAFT, CORE, STOREYS, LAYER = (
-    (12.0, 9.0, 1.5),
-    (0.75, 0.0, 8.0, 6.0),
-    (4.0, 4.0, 4.0),
-    (42.0, 36.0, 12.0),
-)
+RAFT = (12.0, 9.0, 1.5)
+CORE = (0.75, 0.0, 8.0, 6.0)
+STOREYS = (4.0, 4.0, 4.0)
+LAYER = (42.0, 36.0, 12.0)
 # [m] of the building, of the soil under the raft (finer: it is softer) and far off
 CELLS = np.array([1.2, 0.8, 4.0])
 SIZES = {"2e4": 0.7, "1e5": 0.34, "3e5": 0.235, "1e6": 0.16}  # unknowns, about -> factor of CELLS
 # a factor of 1e6: 30 GB
 SOLVERS = {size: vc.Iterative() if size == "1e6" else vc.Condensed() for size in SIZES}
 MU = 0.5
-PEAKS, SEEDS = (2.0, 1.6, 1.0), (1, 2, 3)  # of an outcrop of the rock along x, y, z [m/s²]
+PEAKS = (2.0, 1.6, 1.0)  # of an outcrop of the rock along x, y, z [m/s²]
+SEEDS = (1, 2, 3)  # of the motions along x, y, z
 # 3 % at 4 Hz; alpha would brake the rocking
 DAMPING = vc.Rayleigh(alpha=0.0, beta=0.03 / (np.pi * 4.0))
 DT, T_END = 5e-3, 5.0
@@ -220,7 +222,8 @@ def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
     The film is drawn where there are not too many cells.
     """
     run = vc.read_run(out)
-    history, times = run.history, pictures.instants(run.history)
+    history = run.history
+    times = pictures.instants(run.history)
     pictures.plot_motions(history, out / "motions.png", weight=weight, mu=MU)
     pictures.plot_moments(history, out / "moments.png", weight=weight, sides=RAFT[:2])
     plot_faces(

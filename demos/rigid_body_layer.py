@@ -31,7 +31,7 @@ from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 BODY = RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))
 BEFORE = np.array([0.3, 0.0, -1.0, 0.5, -0.4, 0.2])  # velocity of the mass centre, spin in the body
 RESTITUTION = 0.593624

@@ -34,7 +34,7 @@ from vi_contact import fem
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SHAPE = HousnerBlock(width=0.4, height=2.0)  # [m]
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.0, rho=2400.0)  # [Pa, -, kg/m³]
 BLOCK = rocking.RockingBlock(
@@ -153,7 +153,9 @@ def pulses(
     """
     unit = SHAPE.onset_acceleration
     shortest = SHAPE.overturning_time(STRENGTH * SHAPE.gravity * SHAPE.alpha)
-    lifted, turned, numbers = {}, {}, {"onset": model.onset_acceleration}
+    lifted = {}
+    turned = {}
+    numbers = {"onset": model.onset_acceleration}
     for share in ONSET:
         ramp = vc.Tabulated((0.0, 0.4, 0.8, 1.2), (0.0, share * unit, share * unit, 0.0))
         solution = run(

@@ -36,7 +36,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SQUARE = Square(cells=20, pressure=0.1)  # h = dt = 0.05, as the source has it
 FRICTION = {
     "no friction": vc.Frictionless(),

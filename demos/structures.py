@@ -30,11 +30,12 @@ from demos.problems import structures as posed
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 ELEMENTS = (20, 40, 80, 160)  # of the beam on the ground
 CELLS = (8, 16, 32, 64)  # along the side of a plate on a stop, or the diameter
 GROUND_CELLS = (8, 16, 32)  # of the disk on the ground
-NORMAL, GAP = (0.6, -0.8), 0.02  # of the frame's stop [-], [m]
+NORMAL = (0.6, -0.8)  # of the frame's stop [-]
+GAP = 0.02  # of the frame's stop [m]
 SHARE = 0.3  # of the free deflection of the disk: where the ground is
 BEAM_GAP, BEAM_SPEED = 0.01, 2.0  # of the thrown beam [m], [m/s]
 PLATE_GAP, PLATE_SPEED = 0.004, 1.0  # of the thrown plate
@@ -59,7 +60,8 @@ def frame_on_a_stop(numbers: dict[str, float], shown: Shown) -> None:
     problem = posed.frame_on_a_stop(GAP, NORMAL)
     state, apart, residual = solved(problem)
     section = {name: posed.SECTION[name] for name in ("EA", "EI")}
-    n, F = np.array(NORMAL), arm_flexibility(posed.HEIGHT, posed.ARM, **section)
+    n = np.array(NORMAL)
+    F = arm_flexibility(posed.HEIGHT, posed.ARM, **section)
     exact = stop_force(float(n @ F @ posed.END_LOAD), GAP, float(n @ F @ n))
     numbers |= {
         "frame: force": float(state.r_n[0]),
@@ -67,14 +69,16 @@ def frame_on_a_stop(numbers: dict[str, float], shown: Shown) -> None:
         "frame: apart": apart,
         "frame: residual": residual,
     }
-    space, moved = problem.system.space, problem.cartesian(state.u)
+    space = problem.system.space
+    moved = problem.cartesian(state.u)
     u = np.where(space.free_index >= 0, moved[space.free_index], 0.0).reshape(-1, 2)
     shown.frame = (space.points, u, NORMAL, GAP)
 
 
 def beam_on_the_ground(numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]) -> None:
     """Pull a heavy beam off the ground by its end."""
-    known, errors = posed.HEAVY, []
+    known = posed.HEAVY
+    errors = []
     for count in counts:
         problem = posed.heavy_beam(count)
         state, apart, residual = solved(problem, both=count == counts[0])
@@ -90,14 +94,15 @@ def beam_on_the_ground(numbers: dict[str, float], shown: Shown, counts: tuple[in
             f"beam {count}: residual": residual,
         }
         if count == counts[0]:
-            numbers["beam: apart"], shown.beam = apart, (x, w, known)
+            numbers["beam: apart"] = apart
+            shown.beam = (x, w, known)
     shown.errors["beam on the ground: height of its end"] = (counts, errors)
 
 
 def plates_on_stops(
     comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]
 ) -> None:
-    """Press a simply supported square and a clamped disk on a stop at the middle, and over a gap."""
+    """Press a simply supported square and a clamped disk on a stop at the middle, or over a gap."""
     for name, disk in (("square", False), ("disk", True)):
         for share in (0.0, 0.5):
             errors = []
@@ -139,7 +144,8 @@ def disk_on_the_ground(
             f"{key}: radius": comm.allreduce(float(np.max(r[pushed], initial=0.0)), op=MPI.MAX),
         }
         numbers["ground: exact radius"] = known.b
-        space, moved = problem.system.space, problem.cartesian(state.u)
+        space = problem.system.space
+        moved = problem.cartesian(state.u)
         place = space.free_index.reshape(-1, 3)[:, 2]
         w = np.where(place >= 0, moved[place], 0.0)
         parts = comm.gather((np.hypot(*space.points[:, :2].T), w), root=0)
@@ -187,7 +193,9 @@ def thrown(comm: Any, numbers: dict[str, float], shown: Shown, quick: bool) -> N
 
 def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
     """Solve all problems (``quick``: on the coarse meshes); return the key numbers."""
-    comm, numbers, shown = MPI.COMM_WORLD, dict[str, float](), Shown()
+    comm = MPI.COMM_WORLD
+    numbers = dict[str, float]()
+    shown = Shown()
     frame_on_a_stop(numbers, shown)
     beam_on_the_ground(numbers, shown, ELEMENTS[:2] if quick else ELEMENTS)
     plates_on_stops(comm, numbers, shown, CELLS[:2] if quick else CELLS)

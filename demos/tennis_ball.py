@@ -7,8 +7,8 @@ The plane rises by 0.05 within one second and goes down again; the disk (R = 1/2
 no weight) leaves it on its way down and flies up with a constant velocity and constant energy,
 whether it rubs on the plane or not.
 
-    bash demos/run.sh tennis_ball                # three figures and a table, into results/tennis_ball
-    bash demos/run.sh -n 2 tennis_ball           # the same on two ranks
+    bash demos/run.sh tennis_ball           # three figures and a table, into results/tennis_ball
+    bash demos/run.sh -n 2 tennis_ball      # the same on two ranks
 
 docs/guide/pressed_blocks.md explains the numbers.
 """
@@ -36,7 +36,7 @@ from vi_contact.cli import status_of
 from vi_contact.plots.histories import History
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 DISK = Disk(radius=0.5, size=0.04, push=Push(height=0.05, rise=1.0))  # h = 2 dt = 0.04
 FRICTION = {
     "no friction": vc.Frictionless(),

@@ -44,11 +44,13 @@ from demos.problems.published_beam import (
 from vi_contact.cli import status_of
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 VISCOSITIES = (0.001, 2.0)  # a2 of the source [s]: almost elastic, strongly damped
 READING = "C"  # of the normal force that is drawn; the table has all of them
 SPANS = ((0.0, 0.6), (0.6, 1.5), (1.5, 2.0))  # of Figs. 8.4 to 8.9 [s]
-ELEMENTS, DT, T_END = 1000, 0.002, 2.0
+ELEMENTS = 1000
+DT = 0.002
+T_END = 2.0
 MU, FORCE = 0.3, 100.0  # [-], [N] of the comparison of friction laws
 EPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # [m]
 # pulled to the wall for 1.5 s
@@ -72,7 +74,8 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
     Figs. 8.1 to 8.9 are drawn with READING.
     """
-    steps, forces = round(T_END / dt), readings(dt)
+    steps = round(T_END / dt)
+    forces = readings(dt)
     numbers, drawn = {}, {}
     print(
         f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = "
@@ -97,10 +100,8 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
             )
             history, energy = run.history, run.energy
             defect = float(np.max(np.abs(history["energy_defect"])))
-            tip, lost = (
-                history["u_tip"],
-                (history["loss_friction"][-1], history["loss_damping"][-1]),
-            )
+            tip = history["u_tip"]
+            lost = (history["loss_friction"][-1], history["loss_damping"][-1])
             print(
                 f"  {viscosity:6g}  {name:7s} {energy[0]:8.4f} {energy[-1]:8.4f} {lost[0]:14.4f} "
                 f"{lost[1]:13.4f} "
@@ -138,11 +139,9 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 
     The inequality is solved by Algorithm 10 and by the contract, and eps -> 0.
     """
-    body, elements, start = (
-        beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
-        beam.Elements(count),
-        published_start(),
-    )
+    body = beam.TimoshenkoBeam(viscosity=VISCOSITIES[0])
+    elements = beam.Elements(count)
+    start = published_start()
     steps = round(T_END / dt)
 
     def algorithm(friction: beam.TipFriction) -> beam.BeamRun:

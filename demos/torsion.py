@@ -33,7 +33,7 @@ from vi_contact.cli import status_of
 from vi_contact.fem import compat
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 CELLS = 64  # along a side, or a diameter
 TWISTS = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)  # G theta a / k
 DRAWN = 2.0
@@ -66,14 +66,16 @@ class Bar:
 
     def __init__(self, comm: Any, cells: int, disk: bool) -> None:
         on = section(comm, cells, disk)
-        self.comm, V = comm, compat.lagrange(on, 1)
+        self.comm = comm
+        V = compat.lagrange(on, 1)
         self.u, self.upper, self.lower = (dolfinx.fem.Function(V) for _ in range(3))
         self.upper.interpolate(lambda x: distance(x, disk))
         self.lower.x.array[:] = -self.upper.x.array
         edge = dolfinx.mesh.locate_entities_boundary(on, 1, lambda x: np.full(x.shape[1], True))
         zero = dolfinx.fem.Function(V)
         self.bc = dolfinx.fem.dirichletbc(zero, dolfinx.fem.locate_dofs_topological(V, 1, edge))
-        self.w, v = dolfinx.fem.Constant(on, 0.0), ufl.TestFunction(V)
+        self.w = dolfinx.fem.Constant(on, 0.0)
+        v = ufl.TestFunction(V)
         self.F = ufl.inner(ufl.grad(self.u), ufl.grad(v)) * ufl.dx - 2.0 * self.w * v * ufl.dx
         self.volume = compat.compile_form(2.0 * self.u * ufl.dx)
 
@@ -89,10 +91,12 @@ def relaxed(cells: int, w: float, sweeps: int = 4000) -> Any:
 
     It uses projected over-relaxation of five-point differences.
     """
-    h, omega = 2.0 / cells, 2.0 / (1.0 + np.sin(np.pi / cells))
+    h = 2.0 / cells
+    omega = 2.0 / (1.0 + np.sin(np.pi / cells))
     line = np.linspace(-1.0, 1.0, cells + 1)
     x, y = np.meshgrid(line, line, indexing="ij")
-    bound, u = distance((x, y), disk=False), np.zeros_like(x)
+    bound = distance((x, y), disk=False)
+    u = np.zeros_like(x)
     i, j = np.indices(x.shape)
     inner = (np.abs(x) < 1.0 - 0.5 * h) & (np.abs(y) < 1.0 - 0.5 * h)
     for _ in range(sweeps):
@@ -114,7 +118,10 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 
     It returns torques, zones and their errors.
     """
-    comm, cells, numbers, fields = MPI.COMM_WORLD, CELLS // 2 if quick else CELLS, {}, {}
+    comm = MPI.COMM_WORLD
+    cells = CELLS // 2 if quick else CELLS
+    numbers = {}
+    fields = {}
     torques: dict[str, list[float]] = {}
     for name, disk in (("disk", True), ("square", False)):
         bar = Bar(comm, cells, disk)
@@ -122,14 +129,10 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
             torque, result = bar.twist(w)
             torques.setdefault(name, []).append(torque)
             n = len(bar.u.x.array) - bar.u.function_space.dofmap.index_map.num_ghosts
-            points, plastic = (
-                bar.u.function_space.tabulate_dof_coordinates()[:n],
-                result.lambda_upper.x.array[:n] > 0.0,
-            )
-            numbers[f"{name} {w:g}: torque"], numbers[f"{name} {w:g}: plastic"] = (
-                torque,
-                float(result.active[1]),
-            )
+            points = bar.u.function_space.tabulate_dof_coordinates()[:n]
+            plastic = result.lambda_upper.x.array[:n] > 0.0
+            numbers[f"{name} {w:g}: torque"] = torque
+            numbers[f"{name} {w:g}: plastic"] = float(result.active[1])
             numbers[f"{name} {w:g}: certificate"] = result.certificate.worst
             if disk:
                 r = np.hypot(points[:, 0], points[:, 1])
@@ -146,7 +149,8 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
     numbers["relaxation"] = comm.bcast(numbers.get("relaxation"))
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
-        w, (elastic, _) = np.linspace(0.0, max(TWISTS), 200), square_elastic()
+        w = np.linspace(0.0, max(TWISTS), 200)
+        elastic, _ = square_elastic()
         early = w[w < 1.0]
         plot_torsion(
             fields,

@@ -33,7 +33,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(500.0, 250.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 TOWER = vc.LinearElastic(E=1.5e9, nu=0.2, rho=500.0)  # a building seen as one block
@@ -47,7 +47,7 @@ OUT = Path("results/tower_on_soil")
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
-    """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key numbers."""
+    """Return the key numbers of all three stages (``quick``: cells of 2 m, 110 steps of 10 ms)."""
     comm = MPI.COMM_WORLD
     h, dt, t_end = (2.0, 1e-2, 1.1) if quick else (1.0, DT, T_END)
     lower, upper = (
@@ -60,7 +60,8 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     static, state, problem = stages(mesh, tags, dt)
     problem, start = fem.release(static, state, problem)
 
-    middle, top = 0.5 * LAYER[0], LAYER[1]
+    middle = 0.5 * LAYER[0]
+    top = LAYER[1]
     points = {
         "base": (0.0, 0.0),
         "surface": (0.0, top),

@@ -7,12 +7,12 @@ A concrete wall, 9 m high, is clamped at its base; on its right side it may lift
 not enter it. Every step is solved twice, condensed to the contact points and on all unknowns, and
 the two must agree to round-off.
 
-    bash demos/run.sh wall                      # all figures, into results/wall, results/wall/a and results/wall/b
+    bash demos/run.sh wall                      # all figures, in results/wall and its folders a, b
     bash demos/run.sh -n 3 wall                 # the same on three ranks
-    bash demos/run.sh wall --case a --motion FILE --scale 2   # one run as "vi-contact run wall", and its report
+    bash demos/run.sh wall --case a --motion FILE --scale 2
 
-Units are SI; the case data and what the source leaves open are explained in
-docs/start/first_wall.md.
+The last command makes one run as "vi-contact run wall", and its report. Units are SI; the case data
+and what the source leaves open are explained in docs/start/first_wall.md.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 WALL = wall_model.Wall(height=9.0, width=6.0, thickness=0.20, divisions=(8, 12))  # [m]
 CASES = {
     "a": "Fig. 4: three possible contact points",
@@ -138,8 +138,11 @@ def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
     The latter is the step of case b that presses most, drawn as a structure with its loads and one
     with its reactions; it returns by how much their sum misses the answer of the step, relatively.
     """
-    problem, most, pressed = model.problem("b", excitation=model.harmonic(AMPLITUDE)), -1.0, None
-    scheme, dt = vc.ZienkiewiczWoodTaylor(phi=0.5), model.time_step()
+    problem = model.problem("b", excitation=model.harmonic(AMPLITUDE))
+    most = -1.0
+    pressed = None
+    scheme = vc.ZienkiewiczWoodTaylor(phi=0.5)
+    dt = model.time_step()
     for state, report in vc.march(
         problem, scheme=scheme, solver=vc.Condensed(), dt=dt, steps=steps
     ):

@@ -3,7 +3,8 @@
 
 They are compared with closed forms.
 
-    sigma = C (eps(u) - eps_0),     eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
+    sigma = C (eps(u) - eps_0)
+    eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
 
 A wall below a rigid ceiling is warmed slowly: the gap g closes at (1 + nu) alpha dT H = g, and from
 there on the pressure is E / (1 - nu²) ((1 + nu) alpha dT - g / H). A bar that is warmed at once
@@ -34,12 +35,13 @@ from vi_contact.core.surfaces import empty_surface
 from vi_contact.solvers.volume.route import Volume
 
 # Parameters
-# ----------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 CONCRETE = vc.LinearElastic(E=2.0e10, nu=0.2, rho=2400.0)
 BAR = vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
 ALPHA, WARMER = 1.0e-5, 30.0  # [1/K], [K]
 HEIGHT, GAP = 3.0, 6.0e-4  # of the wall, and above it [m]
-LENGTH, CELLS = 2.0, 200  # of the bar [m]
+LENGTH = 2.0  # of the bar [m]
+CELLS = 200  # of the bar
 JUMP = 2.0e-4  # of the dislocation [m]
 OUT = Path("results/warming")
 
@@ -60,7 +62,8 @@ def slowly(comm: MPI.Comm) -> list[tuple[float, float, float, float]]:
     problem = core.ContactProblem(
         system, fem.contact_surface(system, tags["top"], obstacle=ceiling)
     )
-    warmings, found = [0.25 * WARMER * k for k in range(1, 5)], []
+    warmings = [0.25 * WARMER * k for k in range(1, 5)]
+    found = []
     for solver in (vc.Condensed(), Volume()):
         states = vc.quasi_static(problem, warmings, solver=solver)
         found.append(
@@ -86,8 +89,10 @@ def at_once(
     Its right end has the gap alpha dT L to a wall. The histories are t over the crossing T = L/c,
     pushes of the support and of the wall over their exact size.
     """
-    strain, speed = ALPHA * WARMER, float(np.sqrt(BAR.E / BAR.rho))
-    crossing, push = LENGTH / speed, BAR.E * ALPHA * WARMER
+    strain = ALPHA * WARMER
+    speed = float(np.sqrt(BAR.E / BAR.rho))
+    crossing = LENGTH / speed
+    push = BAR.E * ALPHA * WARMER
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(cells,)), comm)
     system = fem.assemble(mesh, BAR, clamped=tags["left"], loads=fem.InitialStrain(strain))
     wall = core.HalfSpace(point=(LENGTH * (1.0 + strain),), normal=(-1.0,))
@@ -102,7 +107,9 @@ def at_once(
         record=record,
         progress=False,
     ).history
-    t, contact, support = h["t"] / crossing, -h["contact_force_x"], h["reaction_x_support"]
+    t = h["t"] / crossing
+    contact = -h["contact_force_x"]
+    support = h["reaction_x_support"]
 
     def mean(values: np.ndarray, begin: float) -> float:
         return float(np.mean(values[(t > begin + 0.2) & (t < begin + 0.8)]))
@@ -132,7 +139,8 @@ def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
     layer = fem.Cells.where(
         "layer", mesh, lambda x: (x[0] > half - 0.1 * h) & (x[0] < half + 1.1 * h)
     )
-    slip, ends = fem.InitialStrain(JUMP / h, cells=layer), {"free": [], "held": [tags["right"]]}
+    slip = fem.InitialStrain(JUMP / h, cells=layer)
+    ends = {"free": [], "held": [tags["right"]]}
     found = {}
     for name, more in ends.items():
         system = fem.assemble(mesh, BAR, clamped=[tags["left"], *more], loads=slip)

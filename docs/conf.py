@@ -1,5 +1,7 @@
-"""Tell Sphinx how to build the site: ``bash docs/build.sh``. Its source is the clone: links to any
-file work."""
+"""Tell Sphinx how to build the site: ``bash docs/build.sh``.
+
+Its source is the clone: links to any file work.
+"""
 
 import os
 import re
@@ -83,8 +85,7 @@ _NAME = re.compile(rf"(vc|{'|'.join(_ROOMS)})\.[\w.]+|[A-Z]\w+")
 
 
 def link_names(app: Sphinx, document: nodes.document) -> None:
-    """Link what is written as `vc.simulate`, `Condensed()` or `fem.build_mesh(…)` to the entry of
-    that name."""
+    """Link ``vc.simulate``, ``Condensed()`` or ``fem.build_mesh(…)`` to the entry of that name."""
     for node in list(document.findall(nodes.literal)):
         found = _NAME.match(node.astext())
         if found and not isinstance(node.parent, nodes.reference | pending_xref | nodes.title):
@@ -129,7 +130,7 @@ def with_dots(
 
 
 def setup(app: Sphinx) -> None:
-    """Connect it."""
+    """Connect the functions of this file to the events of Sphinx that they answer."""
     app.connect("doctree-read", link_names)
     app.connect("missing-reference", find_in_room)
     app.connect("autodoc-process-docstring", as_restructured_text)

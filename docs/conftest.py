@@ -1,4 +1,4 @@
-"""Run the snippets and commands of the pages, with Sybil: bash docs/test.sh
+"""Run the snippets and commands of the pages, with Sybil (``bash docs/test.sh``).
 
 Each page has a folder that looks like a clone. In the order of the page, ``python`` blocks run and
 share their names, ``sh`` blocks run as a reader types them, and the lines of a ``text`` block must
@@ -58,8 +58,10 @@ export -f vi-contact python3; export vi_python
 
 
 def residuals(size: float, other: float) -> bool:
-    """Say whether two sizes are alike as rounding is, of which another processor makes more or
-    less."""
+    """Say whether two sizes are alike as rounding is.
+
+    Another processor makes more or less of it.
+    """
     least, most = sorted((size, other))
     return most <= BOUND or (most <= SMALL and most <= ORDER * least)
 

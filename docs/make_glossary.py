@@ -1,5 +1,6 @@
-"""Write the two tables of docs/reference/glossary.md, German to English and French to English, from
-its entries.
+"""Write the two tables of docs/reference/glossary.md from its entries.
+
+They lead from German to English and from French to English.
 
     python3 docs/make_glossary.py            # write them: after every change of an entry
     python3 docs/make_glossary.py --check    # say whether they are up to date
@@ -28,8 +29,10 @@ _ENTRY = re.compile(
 
 @dataclass(frozen=True)
 class Entry:
-    """Hold one term: its words in German and French, its symbol, unit and names in the code, and
-    what it means."""
+    """Hold one term and what it means.
+
+    It has the words in German and French, its symbol, its unit and its names in the code.
+    """
 
     term: str
     german: tuple[str, ...]

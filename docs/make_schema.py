@@ -1,7 +1,9 @@
-"""Write the JSON schema of case files, which tells editors tables, keys and types, from the type
-hints that read them.
+"""Write the JSON schema of case files from the type hints that read them.
 
-    python3 docs/make_schema.py            # write the file: after every change of what case files may say
+The schema tells editors the tables, the keys and their types. Write it after every change of what
+case files may say:
+
+    python3 docs/make_schema.py
 
 ``tests/studies/test_schema.py`` tells when the file is not what this writes.
 """
@@ -75,8 +77,7 @@ def text() -> str:
 
 
 def _stage(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a stage: tables of the case that it replaces, or of which it replaces
-    keys."""
+    """Return the schema of a stage: tables of the case that it replaces, whole or by keys."""
     kind = {"anyOf": [{"const": "static"}, {"const": "dynamic"}]}
     keys = {"name": _PLAIN[str], "type": kind, "release": _PLAIN[bool]}
     parts = {key: tables[key] | {"required": []} for key in BY_KEY}
@@ -147,8 +148,10 @@ class _Schema:
         return [_MATERIALS] if member is LinearElastic else []
 
     def _tables(self, members: Sequence[Any]) -> list[dict[str, Any]]:
-        """Return the tables with a ``type`` that these types may be; the type of one may be left
-        out."""
+        """Return the tables with a ``type`` that these types may be.
+
+        The type of one of them may be left out.
+        """
         every = {
             (member, word): target
             for member in members

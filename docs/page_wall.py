@@ -1,5 +1,7 @@
-"""The small wall that snippets of several pages continue; a hidden block of the page imports
-it."""
+"""Make the small wall that snippets of several pages continue.
+
+A hidden block of the page imports it.
+"""
 
 import numpy as np  # noqa: F401
 from mpi4py import MPI

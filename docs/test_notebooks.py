@@ -1,4 +1,7 @@
-"""The notebooks run in Jupyter, by nbmake; the last cell of each checks the numbers of its page."""
+"""Run the notebooks in Jupyter, by nbmake.
+
+The last cell of each checks the numbers of its page.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ NOTEBOOKS = [
 
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda page: page.stem)
 def test_a_notebook_runs(page: Path, tmp_path: Path) -> None:
-    """In the folder of a clone, without anything installed."""
+    """Run it in the folder of a clone, without anything installed."""
     for name in ("vi_contact", "demos", "meshes"):
         (tmp_path / name).symlink_to(ROOT / name)
     book = tmp_path / "docs" / "notebooks" / f"{page.stem}.ipynb"

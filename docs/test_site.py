@@ -1,4 +1,4 @@
-"""The documentation site is built without a warning, and a browser opens its pages.
+"""Build the documentation site without a warning, and open its pages in a browser.
 
 Sphinx looks for every link and picture when it builds; the pages are built without running
 notebooks, which ``bash docs/build.sh`` does. In headless Chromium, on a screen and on a telephone,
@@ -31,17 +31,23 @@ WIDTHS = 1280, 390  # of a screen and of a telephone
 # Opens each page in a frame, waits until it is whole, and tells the server what it finds there.
 PROBE = """<!doctype html><link rel="icon" href="data:,"><script>
 const wait = (ms) => new Promise((done) => setTimeout(done, ms));
-async function until(holds) {  // half a minute, of which an idle machine needs a fraction of a second
+// waits half a minute at most, of which an idle machine needs a fraction of a second
+async function until(holds) {
   for (let k = 0; k < 1500 && !holds(); k++) await wait(20);
 }
 async function probe(url) {
   const frame = document.createElement("iframe");
   frame.style = "height: 800px; border: 0";
-  await new Promise((done) => { frame.onload = done; frame.src = url; document.body.append(frame); });
+  await new Promise((done) => {
+    frame.onload = done;
+    frame.src = url;
+    document.body.append(frame);
+  });
   const here = frame.contentWindow, page = here.document;
   const math = page.querySelectorAll(".math").length;
   const set = () => page.querySelectorAll("mjx-container mjx-math").length;
-  const hits = () => [...page.querySelectorAll("#search-results li a")].map((one) => one.textContent);
+  const results = () => [...page.querySelectorAll("#search-results li a")];
+  const hits = () => results().map((one) => one.textContent);
   await until(() => set() >= math && (hits().length || !url.includes("?q=")));
   page.querySelectorAll("img").forEach((one) => one.loading = "eager");
   await Promise.all([...page.images].map((one) => one.decode().catch(() => 0)));
@@ -57,7 +63,8 @@ async function probe(url) {
   }
   const loaded = here.performance.getEntriesByType("resource").map((one) => one.name);
   found.loaded = loaded.length;
-  found.outside = loaded.filter((one) => !one.startsWith(location.origin) && !/^(data|blob):/.test(one));
+  const own = (one) => one.startsWith(location.origin) || /^(data|blob):/.test(one);
+  found.outside = loaded.filter((one) => !own(one));
   frame.remove();
   return found;
 }
@@ -70,19 +77,21 @@ onload = async () => {
 
 
 class Handler(SimpleHTTPRequestHandler):
-    """Files, silently, and what the probing page tells."""
+    """Serve files, silently, and keep what the probing page tells."""
 
     found: list[dict[str, Any]] = []
     absent: list[str] = []
     told = threading.Event()
 
     def do_POST(self) -> None:
+        """Keep what the page has found, and wake the test that waits for it."""
         self.found.extend(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
         self.send_response(204)
         self.end_headers()
         self.told.set()
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Keep the path of a file that is absent: no page may ask for one."""
         self.absent.append(f"{code} {self.path}")
         super().send_error(code, message, explain)
 
@@ -92,7 +101,7 @@ class Handler(SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site without the outputs of notebooks; a warning stops its build."""
+    """Build the site without the outputs of notebooks; a warning stops the build."""
     folder = tmp_path_factory.mktemp("site") / "site"
     done = subprocess.run(
         ["bash", str(ROOT / "docs" / "build.sh"), "--quick", str(folder)],
@@ -107,12 +116,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("name", ["simulate", "build_mesh", "Condensed"])
 def test_names_are_in_index_and_search(site: Path, name: str) -> None:
+    """Find a public name in the general index and in the words that the search knows."""
     assert f">{name}" in (site / "genindex.html").read_text(encoding="utf-8")
     assert f'"{name}"' in (site / "searchindex.js").read_text(encoding="utf-8")
 
 
 def test_pages_open_in_a_browser(site: Path, tmp_path: Path) -> None:
-    """No other host can be reached."""
+    """Open the pages where no other host can be reached, on wide and on narrow screens."""
     command = browser()
     probe = PROBE.replace("PAGES", json.dumps(PAGES)).replace("WIDTHS", json.dumps(WIDTHS))
     (site / "probe.html").write_text(probe, encoding="utf-8")

@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""Run the peers of this folder, one process a row, and print the comparison. `bash
-benchmarks/peers/run.sh` calls it.
+"""Run the peers of this folder, one process a row, and print the comparison.
 
-python3 benchmarks/peers/compare.py NAME…           # rows of these peers, with the interpreter that runs this
-python3 benchmarks/peers/compare.py --join FILE…    # the table of stored rows; --json FILE stores them as one
-python3 benchmarks/peers/compare.py --page PAGE     # the tables of the page from results.json
+`bash benchmarks/peers/run.sh` calls it. The first command runs the peers with its own interpreter;
+the second prints the table of stored rows, which --json FILE stores as one file; the third prints
+the tables of the page from results.json.
+
+    python3 benchmarks/peers/compare.py NAME…
+    python3 benchmarks/peers/compare.py --join FILE…
+    python3 benchmarks/peers/compare.py --page PAGE
 """
 
 from __future__ import annotations
@@ -29,11 +32,28 @@ WORDS = ("INSTALL", "TITLE", "WAYS", "STOPS", "MISSING", "BY_HAND")
 TIMES = ("solve", "process")
 COLUMNS = {
     "signorini": ("n", *TIMES, "force_error", "penetration", "energy_error", "stops", "lines"),
-    "thrown": (*TIMES, "energy_end", "energy_largest", "impulse_error", "largest_force_error", "penetration",
-               "stops", "lines"),
-    "bar": (*TIMES, "energy_end", "energy_largest", "force_error_first", "force_error", "displacement_error",
-            "penetration", "stops", "lines"),
-}  # fmt: skip
+    "thrown": (
+        *TIMES,
+        "energy_end",
+        "energy_largest",
+        "impulse_error",
+        "largest_force_error",
+        "penetration",
+        "stops",
+        "lines",
+    ),
+    "bar": (
+        *TIMES,
+        "energy_end",
+        "energy_largest",
+        "force_error_first",
+        "force_error",
+        "displacement_error",
+        "penetration",
+        "stops",
+        "lines",
+    ),
+}
 LONG = (
     5.0  # a row that takes longer [s] is run once; others three times, of which the shortest counts
 )

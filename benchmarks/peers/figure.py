@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Draw the figure of the comparison from the stored run: energies of the bar, and errors against
-processor time.
+"""Draw energies of the bar, and errors against processor time, from the stored comparison.
 
-python3 benchmarks/peers/figure.py        # benchmarks/peers/results.json -> docs/figures/peers.png
+It reads benchmarks/peers/results.json and writes docs/figures/peers.png:
+
+    python3 benchmarks/peers/figure.py
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
-"""Solve the three problems with CalculiX: wedges or bricks one layer deep, *CONTACT PAIR with a
-fixed brick below."""
+"""Solve the three problems with CalculiX: wedges or bricks one layer deep.
+
+*CONTACT PAIR joins them to a fixed brick below.
+"""
 
 import subprocess
 from typing import Any
@@ -16,19 +18,27 @@ WAYS = {
             "NODE TO SURFACE, PRESSURE-OVERCLOSURE=LINEAR of 1e17 Pa/m, residual and "
             "correction to 1e-8"
         ),
-        "default": "SURFACE TO SURFACE, PRESSURE-OVERCLOSURE=HARD without a number, default controls",
+        "default": (
+            "SURFACE TO SURFACE, PRESSURE-OVERCLOSURE=HARD without a number, default controls"
+        ),
     },
     "thrown": {
         "best": "NODE TO SURFACE, LINEAR of 10 E/h, *DYNAMIC with its default ALPHA=-0.05, DIRECT, "
         "residual and correction to 1e-8",
-        "default": "SURFACE TO SURFACE, HARD without a number, *DYNAMIC with its default ALPHA=-0.05 and automatic "
-        "increments up to the time step, default controls",
+        "default": (
+            "SURFACE TO SURFACE, HARD without a number, *DYNAMIC with its default ALPHA=-0.05 and "
+            "automatic increments up to the time step, default controls"
+        ),
     },
     "bar": {
-        "best": "NODE TO SURFACE, LINEAR of E/h (10 E/h fails), *DYNAMIC with its default ALPHA=-0.05, DIRECT, "
-        "residual and correction to 1e-8",
-        "default": "SURFACE TO SURFACE, HARD without a number, *DYNAMIC with its default ALPHA=-0.05 and automatic "
-        "increments up to the time step, default controls",
+        "best": (
+            "NODE TO SURFACE, LINEAR of E/h (10 E/h fails), *DYNAMIC with its default ALPHA=-0.05, "
+            "DIRECT, residual and correction to 1e-8"
+        ),
+        "default": (
+            "SURFACE TO SURFACE, HARD without a number, *DYNAMIC with its default ALPHA=-0.05 and "
+            "automatic increments up to the time step, default controls"
+        ),
     },
 }
 STOPS = {
@@ -53,11 +63,13 @@ BY_HAND = {
 
 
 def version() -> str:
+    """Return the version that ccx prints of itself."""
     said = subprocess.run(["ccx", "-v"], capture_output=True, text=True, check=False).stdout
     return said.split("Version")[-1].split()[0]
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square: half the load on each of both faces of the wedges."""
     mesh = Square(n)
     deck = square_deck(mesh, SIGNORINI | {"rho": 1.0, "gap": 0.0}, way, 1e17)
     deck += [f"{node},1,1" for node in both(mesh, mesh.left)]
@@ -72,6 +84,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square, whose gap to the brick is in the deck."""
     mesh = Square(THROWN["n"])
     deck = square_deck(mesh, THROWN, way, 10.0 * THROWN["E"] * THROWN["n"])
     deck += [
@@ -87,6 +100,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar of bricks; energies count its weight from the ground on."""
     n, h = BAR["elements"], BAR["length"] / BAR["elements"]
     deck = ["*NODE,NSET=BODY"]
     deck += [
@@ -180,8 +194,10 @@ def controls(way: str) -> list[str]:
 
 
 def dynamic(way: str, data: dict[str, Any]) -> list[str]:
-    """Return the step of a motion with what is printed, by default in increments that may be
-    smaller than dt."""
+    """Return the step of a motion with what is printed.
+
+    By default its increments may be smaller than dt.
+    """
     dt, end, points = data["dt"], data["dt"] * data["steps"], ""
     deck = [f"*STEP,INC={100 * data['steps']}"]
     if way == "best":

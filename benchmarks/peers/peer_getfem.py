@@ -1,5 +1,7 @@
-"""Solve the three problems with GetFEM, from its user documentation and the help texts of its
-Python interface."""
+"""Solve the three problems with GetFEM.
+
+The sources are its user documentation and the help texts of its Python interface.
+"""
 
 from typing import Any
 
@@ -19,16 +21,26 @@ WAYS = {
         "default, scaled": "the same in units of force in which E = 1",
     },
     "thrown": {
-        "best": "units of force in which E = 1; add_Newmark_scheme(1/4, 1/2) and the nodal contact brick; mass bricks "
-        "by regions: the lowest layer of elements has none, the next one has twice its own",
-        "default": "add_Newmark_scheme(1/4, 1/2), one mass brick, nodal contact brick; solve without options but 10 "
-        "iterations at most",
+        "best": (
+            "units of force in which E = 1; add_Newmark_scheme(1/4, 1/2) and the nodal contact "
+            "brick; mass bricks by regions: the lowest layer of elements has none, the next one "
+            "has twice its own"
+        ),
+        "default": (
+            "add_Newmark_scheme(1/4, 1/2), one mass brick, nodal contact brick; solve without "
+            "options but 10 iterations at most"
+        ),
     },
     "bar": {
-        "best": "units of force in which E = 1; add_Newmark_scheme(1/4, 1/2) and the basic contact brick; mass bricks "
-        "by regions: the lowest element has none, the next one has twice its own",
-        "default": "add_Newmark_scheme(1/4, 1/2), one mass brick, basic contact brick; solve without options but 10 "
-        "iterations at most",
+        "best": (
+            "units of force in which E = 1; add_Newmark_scheme(1/4, 1/2) and the basic contact "
+            "brick; mass bricks by regions: the lowest element has none, the next one has twice "
+            "its own"
+        ),
+        "default": (
+            "add_Newmark_scheme(1/4, 1/2), one mass brick, basic contact brick; solve without "
+            "options but 10 iterations at most"
+        ),
     },
 }
 STOPS = {
@@ -44,6 +56,7 @@ FOOT, TOP, LEFT, BODY = 1, 2, 3, 4
 
 
 def version() -> str:
+    """Return the version of the package python3-getfem, as dpkg has it."""
     import subprocess
 
     gf.util_trace_level(0)
@@ -56,8 +69,10 @@ def version() -> str:
 
 
 def square(n: int) -> Any:
-    """Return mesh with its regions, displacement space, integration and the number of every unknown
-    in our order."""
+    """Return mesh with its regions, displacement space, integration and the unknowns in our order.
+
+    The last is the number of every unknown.
+    """
     gf.util_trace_level(0)
     ours = problems.Square(n)
     mesh = gf.Mesh("ptND", ours.points.T, ours.triangles.T)
@@ -90,6 +105,7 @@ def pushes(space: Any) -> Any:
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square by the nodal contact brick, with forces over E or in newtons."""
     mesh, space, mim, order = square(n)
     unit = SIGNORINI["E"] if way == "default, scaled" else 1.0  # of force [N]
     model = elastic(space, mim, SIGNORINI["E"] / unit, SIGNORINI["nu"])
@@ -107,8 +123,10 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def inertia(model: Any, mim: Any, space: Any, mesh: Any, rho: float, low: Any) -> Any:
-    """Add time scheme and mass bricks, return the mass matrix. `low`: elements of the two layers
-    next to the foot."""
+    """Add time scheme and mass bricks, and return the mass matrix.
+
+    `low`: elements of the two layers next to the foot.
+    """
     body = np.setdiff1d(np.arange(mesh.nbcvs()), np.concatenate(low))
     model.add_Newmark_scheme("u", 0.25, 0.5)
     total = gf.Spmat("empty", space.nbdof(), space.nbdof())
@@ -125,6 +143,7 @@ def inertia(model: Any, mim: Any, space: Any, mesh: Any, rho: float, low: Any) -
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square; the best way takes the mass from its lowest layer of elements."""
     n, gap, unit = THROWN["n"], THROWN["gap"], THROWN["E"] if way == "best" else 1.0  # of force [N]
     mesh, space, mim, _ = square(n)
     model = elastic(space, mim, THROWN["E"] / unit, THROWN["nu"])
@@ -153,6 +172,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar; the best way takes the mass from its lowest element."""
     elements, weight, unit = (
         BAR["elements"],
         BAR["rho"] * BAR["gravity"],

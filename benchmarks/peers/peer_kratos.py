@@ -1,5 +1,7 @@
-"""Solve the three problems with Kratos: mortar contact by augmented Lagrangian (ALM) with a fixed
-strip below."""
+"""Solve the three problems with Kratos.
+
+Its contact is mortar contact by augmented Lagrangian (ALM) with a fixed strip below.
+"""
 
 import json
 from typing import Any
@@ -42,10 +44,14 @@ WAYS = {
         ),
     },
     "bar": {
-        "best": "a strip one cell wide; ALM mortar contact, Bossak's scheme with alpha = -0.3, all tolerances 1e-8, "
-        "sparse_lu",
-        "default": "a strip one cell wide; ALM mortar contact, Bossak's scheme, contact_residual_criterion as in its "
-        "examples, all else by default",
+        "best": (
+            "a strip one cell wide; ALM mortar contact, Bossak's scheme with alpha = -0.3, all "
+            "tolerances 1e-8, sparse_lu"
+        ),
+        "default": (
+            "a strip one cell wide; ALM mortar contact, Bossak's scheme, "
+            "contact_residual_criterion as in its examples, all else by default"
+        ),
     },
 }
 STOPS = {
@@ -61,6 +67,7 @@ BY_HAND = {
 
 
 def version() -> str:
+    """Return the version of the installed package, with Kratos told to print errors alone."""
     from importlib.metadata import version as of
 
     quiet()
@@ -68,8 +75,10 @@ def version() -> str:
 
 
 class Run(StructuralMechanicsAnalysis):
-    """Run an analysis whose model is made by nodes, cells and foot; keep what its nodes tell at
-    every step."""
+    """Run an analysis whose model is made by nodes, cells and foot.
+
+    It keeps what its nodes tell at every step.
+    """
 
     def __init__(
         self, way: str, body: tuple[Any, Any], foot: list[int], data: dict[str, Any], **given: Any
@@ -177,8 +186,10 @@ def settings(way: str, data: dict[str, Any]) -> dict[str, Any]:
 def model_files(
     points: Any, cells: Any, foot: list[int], data: dict[str, Any], given: dict[str, Any]
 ) -> None:
-    """Write model.mdpa and materials.json: the body, and below it a strip of cells as wide as the
-    foot's."""
+    """Write model.mdpa and materials.json: the body, and below it a strip of cells.
+
+    The strip is as wide as the foot's.
+    """
     h = points[foot[1], 0] - points[foot[0], 0]
     edge = np.arange(-1, len(foot) + 1) * h
     ground = [(x, y - data.get("gap", 0.0)) for y in (-h, 0.0) for x in edge]
@@ -260,6 +271,7 @@ def model_files(
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square with nodal loads on its top."""
     quiet()
     mesh = Square(n)
     force = traction_load(mesh)
@@ -277,6 +289,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square; its energies are taken with the common matrices, as Kratos tells none."""
     quiet()
     mesh = Square(THROWN["n"])
     run = Run(way, (mesh.points, mesh.triangles), mesh.bottom.tolist(), THROWN)
@@ -293,6 +306,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop a strip one cell wide, held across, and return its forces per width."""
     quiet()
     n, h = BAR["elements"], BAR["length"] / BAR["elements"]
     points = [(x * h, k * h) for k in range(n + 1) for x in (0, 1)]

@@ -1,5 +1,7 @@
-"""Solve the three problems with NGSolve: forms of penalty at the ground, its Newton iterations and
-its time steps."""
+"""Solve the three problems with NGSolve: forms of penalty at the ground, its Newton iterations.
+
+Its time steps are used as well.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,22 +19,30 @@ TITLE = "NGSolve"
 INSTALL = {"pip": ["ngsolve"]}
 WAYS = {
     "signorini": {
-        "best": "energy of penalty on the boundary, integrated at the nodes, 1e8 E/h, NewtonMinimization to "
-        "1e-8 of the root of the energy",
-        "default": "ContactBoundary of the square and a fixed block below it, energy of penalty 1000 E/h with "
-        "the default rule of order 4, NewtonMinimization with its default tolerance",
+        "best": (
+            "energy of penalty on the boundary, integrated at the nodes, 1e8 E/h, "
+            "NewtonMinimization to 1e-8 of the root of the energy"
+        ),
+        "default": (
+            "ContactBoundary of the square and a fixed block below it, energy of penalty 1000 E/h "
+            "with the default rule of order 4, NewtonMinimization with its default tolerance"
+        ),
     },
     "thrown": {
-        "best": "own midpoint rule with the discrete gradient of the penalty's energy, which conserves their "
-        "sum; 10 E/h, NewtonSolver",
+        "best": (
+            "own midpoint rule with the discrete gradient of the penalty's energy, which conserves "
+            "their sum; 10 E/h, NewtonSolver"
+        ),
         "default": (
             "ngsolve.timestepping.Newmark (average acceleration) with penalty 1000 E/h and a "
             "direct solver"
         ),
     },
     "bar": {
-        "best": "own midpoint rule with the discrete gradient of the penalty's energy, which conserves their "
-        "sum; E/h, NewtonSolver",
+        "best": (
+            "own midpoint rule with the discrete gradient of the penalty's energy, which conserves "
+            "their sum; E/h, NewtonSolver"
+        ),
         "default": (
             "ngsolve.timestepping.Newmark (average acceleration) with penalty 1000 E/h and a "
             "direct solver"
@@ -53,10 +63,12 @@ NODES = ng.IntegrationRule([(0.0, 0.0), (1.0, 0.0)], [0.5, 0.5])
 
 
 def version() -> str:
+    """Return the version that the module tells."""
     return str(ng.__version__)
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square by a penalty at the nodes, or by ContactBoundary on a block."""
     square = Square(n)
     mesh = plane(square, block=way == "default")
     space = ng.VectorH1(
@@ -108,6 +120,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square at a penalty of 10 E/h, or by default of 1000 E/h, at the nodes."""
     square, stiff = (
         Square(THROWN["n"]),
         (10.0 if way == "best" else 1000.0) * THROWN["E"] * THROWN["n"],
@@ -136,6 +149,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar on a penalty of E/h, or by default of 1000 E/h, at its foot."""
     n, stiff = (
         BAR["elements"],
         (1.0 if way == "best" else 1000.0) * BAR["E"] * BAR["elements"] / BAR["length"],
@@ -254,8 +268,10 @@ def march(
 
 
 def root(data: dict[str, Any]) -> float:
-    """Return the root of the first energy: NGSolve's tolerance is absolute, the root of residual
-    times correction."""
+    """Return the root of the first energy.
+
+    NGSolve's tolerance is absolute, and means the root of residual times correction.
+    """
     return float(
         np.sqrt(
             0.5 * data["rho"] * data["speed"] ** 2

@@ -1,5 +1,7 @@
-"""Solve the three problems with OpenSeesPy: elements tri31 and Truss, springs without tension or
-with a gap."""
+"""Solve the three problems with OpenSeesPy: elements tri31 and Truss on springs.
+
+The springs have no tension, or a gap.
+"""
 
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,14 +15,20 @@ TITLE = "OpenSeesPy"
 INSTALL = {"pip": ["openseespy"]}
 WAYS = {
     "signorini": {
-        "best": "zeroLength elements with the material ENT (no tension), 1e16 N/m a node, Newton to 1e-8 "
-        "relative, UmfPack",
-        "default": "zeroLengthContact2D elements of 1000 E a node (OpenSees has no default penalty), Newton, "
-        "BandGeneral",
+        "best": (
+            "zeroLength elements with the material ENT (no tension), 1e16 N/m a node, Newton to "
+            "1e-8 relative, UmfPack"
+        ),
+        "default": (
+            "zeroLengthContact2D elements of 1000 E a node (OpenSees has no default penalty), "
+            "Newton, BandGeneral"
+        ),
     },
     "thrown": {
-        "best": "zeroLength elements with the material ElasticPPGap (the gap is its own), 10 E a node, "
-        "integrator TRBDF2",
+        "best": (
+            "zeroLength elements with the material ElasticPPGap (the gap is its own), 10 E a node, "
+            "integrator TRBDF2"
+        ),
         "default": (
             "the same elements, 1000 E a node, integrator Newmark(0.5, 0.25), which its "
             "examples use"
@@ -31,8 +39,10 @@ WAYS = {
             "Truss elements, zeroLength with ElasticPPGap of an element's stiffness, "
             "integrator TRBDF2"
         ),
-        "default": "the same elements, 1000 times an element's stiffness, integrator Newmark(0.5, 0.25), which its "
-        "examples use",
+        "default": (
+            "the same elements, 1000 times an element's stiffness, integrator Newmark(0.5, 0.25), "
+            "which its examples use"
+        ),
     },
 }
 STOPS = {
@@ -47,12 +57,14 @@ BY_HAND = {
 
 
 def version() -> str:
+    """Return the versions of the Python package and of OpenSees inside it."""
     from importlib.metadata import version as of
 
     return f"{of('openseespy')} (OpenSees {ops.version()})"
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square on springs without tension, or on contact elements by default."""
     mesh = Square(n)
     ground = plane(mesh, SIGNORINI["E"], SIGNORINI["nu"])
     for node in mesh.left.tolist():
@@ -88,6 +100,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square at springs with a gap; its mass is lumped, as tri31 lumps it."""
     mesh = Square(THROWN["n"])
     ground = plane(mesh, THROWN["E"], THROWN["nu"], THROWN["rho"])
     count = len(mesh.points)
@@ -112,6 +125,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar of trusses on one spring with a gap."""
     n, h = BAR["elements"], BAR["length"] / BAR["elements"]
     mass = np.full(n + 1, BAR["rho"] * h)
     mass[[0, -1]] *= 0.5
@@ -144,8 +158,10 @@ def bar(way: str) -> dict[str, Any]:
 
 
 def plane(mesh: Square, E: float, nu: float, rho: float = 0.0) -> int:
-    """Make the square of plane strain and a fixed node below each of its ground's nodes; return the
-    first of these."""
+    """Make the square of plane strain and a fixed node below each of its ground's nodes.
+
+    It returns the first of these.
+    """
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 2)
     ops.nDMaterial("ElasticIsotropic", 1, E, nu)
@@ -192,8 +208,10 @@ def march(
     normal: int,
     data: dict[str, Any],
 ) -> Any:
-    """Run all steps; return displacements and velocities of the nodes and the forces of the ground,
-    one row a step."""
+    """Run all steps; return displacements and velocities of the nodes and forces of the ground.
+
+    Each has one row a step.
+    """
     with TemporaryDirectory() as folder:
         for what in ("disp", "vel"):
             ops.recorder(

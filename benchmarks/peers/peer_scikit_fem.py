@@ -1,5 +1,7 @@
-"""Solve the three problems with scikit-fem: it assembles, contact and time steps are written by
-hand."""
+"""Solve the three problems with scikit-fem.
+
+It assembles; contact and time steps are written by hand.
+"""
 
 from typing import Any
 
@@ -16,7 +18,9 @@ TITLE = "scikit-fem"
 INSTALL = {"pip": ["scikit-fem==12.0.2"]}
 WAYS = {
     "signorini": {
-        "best": "active sets of nodes around skfem.solve(*skfem.condense(…)), until the set repeats",
+        "best": (
+            "active sets of nodes around skfem.solve(*skfem.condense(…)), until the set repeats"
+        ),
         "default": "penalty form on the facets of the ground, 1e3 E, Newton to 1e-8",
     },
     "thrown": {
@@ -41,18 +45,19 @@ BY_HAND = {
 
 
 def version() -> str:
+    """Return the version that the module tells."""
     return str(skfem.__version__)
 
 
 def square(n: int) -> Any:
-    """Return the basis of the displacements, and the mesh as it is given and as scikit-fem keeps
-    it."""
+    """Return our mesh, the mesh as scikit-fem keeps it, and the basis of the displacements."""
     ours = problems.Square(n)
     mesh = skfem.MeshTri(ours.points.T, ours.triangles.T)
     return ours, mesh, skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1()))
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square by active sets, or by a penalty of 1e3 E by default."""
     ours, mesh, basis = square(n)
     K = linear_elasticity(*lame_parameters(SIGNORINI["E"], SIGNORINI["nu"])).assemble(basis)
     top = basis.boundary(mesh.facets_satisfying(lambda x: x[1] == 1.0))
@@ -80,6 +85,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square; the best way moves the mass of its ground to the nodes above."""
     ours, _, basis = square(THROWN["n"])
     K = linear_elasticity(*lame_parameters(THROWN["E"], THROWN["nu"])).assemble(basis)
     M = skfem.BilinearForm(lambda u, v, w: THROWN["rho"] * dot(u, v)).assemble(basis)
@@ -94,6 +100,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar; the best way moves the mass of its foot to the node above."""
     line = np.linspace(0.0, BAR["length"], BAR["elements"] + 1)
     basis = skfem.Basis(skfem.MeshLine(line), skfem.ElementLineP1())
     M, K = BAR["rho"] * mass.assemble(basis), BAR["E"] * laplace.assemble(basis)

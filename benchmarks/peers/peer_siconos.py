@@ -1,5 +1,7 @@
-"""Solve the three problems with Siconos, written from the help texts of its Python interface and
-its manual."""
+"""Solve the three problems with Siconos.
+
+The sources are the help texts of its Python interface and its manual.
+"""
 
 from typing import Any
 
@@ -24,14 +26,18 @@ WAYS = {
             "TimeSteppingDirectProjection, Moreau-Jean with theta = 1/2 and e = 0: positions "
             "are projected too"
         ),
-        "default": "TimeStepping, Moreau-Jean with theta = 1/2 and e = 0, LCP with its default solver",
+        "default": (
+            "TimeStepping, Moreau-Jean with theta = 1/2 and e = 0, LCP with its default solver"
+        ),
     },
     "bar": {
         "best": (
             "TimeSteppingDirectProjection, Moreau-Jean with theta = 1/2 and e = 0: positions "
             "are projected too"
         ),
-        "default": "TimeStepping, Moreau-Jean with theta = 1/2 and e = 0, LCP with its default solver",
+        "default": (
+            "TimeStepping, Moreau-Jean with theta = 1/2 and e = 0, LCP with its default solver"
+        ),
     },
 }
 STOPS = {
@@ -50,6 +56,7 @@ BY_HAND = {
 
 
 def version() -> str:
+    """Return the version of the package python3-siconos, as dpkg has it."""
     import subprocess
 
     command = ["dpkg-query", "-W", "-f", "${Version}", "python3-siconos"]
@@ -57,6 +64,7 @@ def version() -> str:
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square by Lemke's method on the Schur complement S of its ground."""
     mesh = problems.Square(n)
     K, f = problems.stiffness(mesh, **SIGNORINI).tocsc(), problems.traction_load(mesh)
     ground = 2 * mesh.bottom + 1
@@ -75,6 +83,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square with consistent mass as one Lagrangian system."""
     mesh = problems.Square(THROWN["n"])
     K, M = problems.stiffness(mesh, THROWN["E"], THROWN["nu"]), problems.mass(mesh, THROWN["rho"])
     v = np.tile([0.0, -THROWN["speed"]], len(mesh.points))
@@ -92,6 +101,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar of linear elements, with consistent mass."""
     h, nodes = BAR["length"] / BAR["elements"], BAR["elements"] + 1
     line = np.eye(nodes, k=1) + np.eye(nodes, k=-1)
     ends = np.diag(np.where(np.isin(np.arange(nodes), (0, nodes - 1)), 1.0, 2.0))

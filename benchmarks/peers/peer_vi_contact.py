@@ -46,10 +46,12 @@ STOPS = {
 
 
 def version() -> str:
+    """Return the versions of this package and of DOLFINx below it."""
     return f"{vc.__version__}, DOLFINx {dolfinx.__version__}"
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
+    """Solve the static square; the best way condenses it to the contact points."""
     mesh = dolfinx.mesh.create_unit_square(MPI.COMM_WORLD, n, n)
     foot = fem.Facets.where("foot", mesh, lambda x: np.isclose(x[1], 0.0))
     top = fem.Facets.where("top", mesh, lambda x: np.isclose(x[1], 1.0))
@@ -75,6 +77,7 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 
 
 def thrown(way: str) -> dict[str, Any]:
+    """Throw the square at a half-space, and return its four histories."""
     mesh = dolfinx.mesh.create_unit_square(MPI.COMM_WORLD, THROWN["n"], THROWN["n"])
     foot = fem.Facets.where("foot", mesh, lambda x: np.isclose(x[1], 0.0))
     system = fem.assemble(
@@ -90,6 +93,7 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
+    """Drop the bar in one dimension; its energy counts from the bar on the ground."""
     mesh = dolfinx.mesh.create_interval(MPI.COMM_WORLD, BAR["elements"], [0.0, BAR["length"]])
     foot = fem.Facets.where("foot", mesh, lambda x: np.isclose(x[0], 0.0))
     pull = -BAR["rho"] * BAR["gravity"]

@@ -34,8 +34,11 @@ def speed() -> float:
 
 
 def run(n: int) -> dict[str, float]:
-    """Return impulse [N s/m], largest mean force [N/m], times of contact [s], energy at the end
-    over the first."""
+    """Return the numbers of the thrown square on a mesh of n x n squares.
+
+    They are impulse [N s/m], largest mean force [N/m], times of contact [s], and the energy at the
+    end over the first.
+    """
     mesh = Square(n)
     K = stiffness(mesh, THROWN["E"], THROWN["nu"])
     M = np.asarray(mass(mesh, THROWN["rho"]).sum(axis=1)).ravel()

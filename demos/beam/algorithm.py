@@ -4,8 +4,9 @@ It is Algorithm 10 of Ahn (2012), by block elimination.
 
 Midpoint rule (5.4), (5.5) for y = (theta, u), w = y', with the stiffness S and C = a2 S:
 
-    P y1 = Q y0 + (2/dt) M w0 + f(t0) - e_m R,     P = 2/dt² M + (a2/dt + ½) S,   Q = 2/dt² M + (a2/dt - ½) S      (7.7)
-    w1 = (2/dt) (y1 - y0) - w0                                                                                (7.11)
+    P y1 = Q y0 + (2/dt) M w0 + f(t0) - e_m R                                   (7.7)
+    P = 2/dt² M + (a2/dt + ½) S,    Q = 2/dt² M + (a2/dt - ½) S
+    w1 = (2/dt) (y1 - y0) - w0                                                  (7.11)
 
 R is the friction force of the step at the tip, with the limit mu(t0, |w0_m|) |r_N(t0)|: force and
 coefficient are those of the *old* time, as in the source. Solved for the increment d = y1 - y0, as
@@ -13,8 +14,9 @@ Q = P - S: the same equations with less round-off. With P split at the tip into 
 factorised once, and
 
     P d = r - e_m R,    r = (2/dt) M w0 - S y0 + f
-    c = P_mm - pᵀT⁻¹p,    g = r_m - pᵀT⁻¹r     leave the scalar equation  c s - g + R(s) = 0  of tip.py        (7.8)
-    d = (T⁻¹r - s T⁻¹p, s)                                                                                    (7.10)
+    c = P_mm - pᵀT⁻¹p,    g = r_m - pᵀT⁻¹r      leave the scalar equation of tip.py
+    c s - g + R(s) = 0                                                          (7.8)
+    d = (T⁻¹r - s T⁻¹p, s)                                                      (7.10)
 
 One back-substitution per step. Energy: E = ½ wᵀMw + ½ yᵀSy, and (6.5) holds step by step:
 
@@ -135,7 +137,8 @@ class BeamStepper:
 
     def given(self, t: float, rate: float) -> tuple[float, float, float]:
         """Return (|r_N|, mu, load) at a time and slip rate, checked."""
-        owner, at = "BeamStepper", f"({t:.6g} s)"
+        owner = "BeamStepper"
+        at = f"({t:.6g} s)"
         N = number(owner, f"normal_force{at}", self.normal_force(t), not_negative=True, unit="N")
         mu = number(owner, f"mu({t:.6g} s, {rate:.6g} m/s)", self.mu(t, rate), not_negative=True)
         return (
@@ -155,7 +158,8 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     """
     instance("run_beam", "stepper", stepper, BeamStepper, "give BeamStepper(...)")
     instance("run_beam", "start", start, Start, "give Start(...)")
-    steps, every = whole("run_beam", "steps", steps, least=1), whole("run_beam", "every", every)
+    steps = whole("run_beam", "steps", steps, least=1)
+    every = whole("run_beam", "every", every)
     kept = (len(COLUMNS) + 1) * steps + (
         4 * stepper.elements.count * (steps // every) if every else 0
     )
@@ -163,7 +167,8 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     x = stepper.elements.nodes(stepper.beam.length)
     y0 = np.concatenate([start.at("theta", x), start.at("u", x)])
     w0 = np.concatenate([start.at("omega", x), start.at("v", x)])
-    rows, snapshots = list[tuple[float, ...]](), list[Snapshot]()
+    rows = list[tuple[float, ...]]()
+    snapshots = list[Snapshot]()
     for k, (row, y, w) in enumerate(islice(_states(stepper, y0, w0), steps + 1)):
         rows.append(row)
         if every and k % every == 0:
@@ -186,7 +191,8 @@ def _states(
 
     Works and losses are those of the step alone.
     """
-    dt, viscosity = stepper.dt, stepper.beam.viscosity
+    dt = stepper.dt
+    viscosity = stepper.beam.viscosity
     M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
 
     def energies() -> tuple[float, float]:
@@ -199,7 +205,8 @@ def _states(
     column = T.solve(p)
     c = float(P[-1, -1] - p @ column)
     for k in count():
-        t, at = k * dt, f"step {k + 1}, t = {k * dt + dt:.6g} s"
+        t = k * dt
+        at = f"step {k + 1}, t = {k * dt + dt:.6g} s"
         N, mu, f = stepper.given(t, abs(float(w[-1])))
         r = (2.0 / dt) * (M @ w) - S @ y + f * uniform
         free = T.solve(r[:-1])
@@ -208,9 +215,11 @@ def _states(
         except StepFailure as failure:
             raise StepFailure(f"{at}: {failure}") from None
         moved = np.append(free - slip.s * column, slip.s)
-        y, w = y + moved, (2.0 / dt) * moved - w
+        y = y + moved
+        w = (2.0 / dt) * moved - w
         kinetic, strain = energies()
-        work, viscous = f * float(uniform @ moved), viscosity / dt * float(moved @ (S @ moved))
+        work = f * float(uniform @ moved)
+        viscous = viscosity / dt * float(moved @ (S @ moved))
         if not np.isfinite(kinetic + strain + work):
             raise StepFailure(
                 f"{at}: the beam's motion or its energy is no finite number; check the loads and "

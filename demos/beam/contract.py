@@ -82,7 +82,8 @@ def beam_problem(
     )
     x = elements.nodes(beam.length)
     mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
-    push, rest = ((np.ones(1), _given("normal_force", normal_force, "N")),), np.zeros(1)
+    push = ((np.ones(1), _given("normal_force", normal_force, "N")),)
+    rest = np.zeros(1)
     point = _Part(mass, sp.csr_matrix((1, 1)), 0.0, push, rest, rest, inertia=mass @ np.ones(1))
     return _problem(x, point, _Part.of_beam(beam, elements, start or Start(), load), 0.0, friction)
 
@@ -212,7 +213,8 @@ class _Part:
     def of_beam(
         cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None
     ) -> "_Part":
-        x, (M, S, uniform) = elements.nodes(beam.length), beam_matrices(beam, elements)
+        x = elements.nodes(beam.length)
+        M, S, uniform = beam_matrices(beam, elements)
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
         loads = () if load is None else ((uniform, _given("load", load, "N/m")),)
@@ -261,7 +263,8 @@ def _problem(
 ) -> ContactProblem:
     parts = [along] if across is None else [along, across]
     sizes = [len(part.u0) for part in parts]
-    m, d = len(x), 1 if across is None else 2
+    m = len(x)
+    d = 1 if across is None else 2
     loads = []
     for i, part in enumerate(parts):
         for vector, history in part.loads:

@@ -32,7 +32,8 @@ from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree 7: squares of cubics
-S, W = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
+S = 0.5 * (_POINTS + 1.0)
+W = 0.5 * _WEIGHTS
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Elements:
             )
 
     def nodes(self, length: float) -> Array:
-        """Return the positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
+        """Return the positions of the unknowns [m]: all nodes but the clamped, shape (count,)."""
         return np.linspace(
             0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
         )[1:]
@@ -77,8 +78,10 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     They are sparse, of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J], C =
     a2 S; from M1, M2, K1, K2, L1 of section 7 with their coefficients.
     """
-    m, h = elements.count, beam.length / elements.count
-    lines, slopes = _lines(S), _line_slopes(S) / h
+    m = elements.count
+    h = beam.length / elements.count
+    lines = _lines(S)
+    slopes = _line_slopes(S) / h
     turn, bend = lines, slopes
     if elements.published_end:
         turn = np.array([1.0 - S, -(S**3) + S**2 + S])
@@ -97,7 +100,10 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
         inner, last = (h * (a * weights) @ b.T for a, b in zip(left, right, strict=True))
         return _assembled(inner, last, m)
 
-    turns, bends, plain, steep = ends[0], ends[1], (lines, lines), (shear_u, shear_u)
+    turns = ends[0]
+    bends = ends[1]
+    plain = (lines, lines)
+    steep = (shear_u, shear_u)
     EI, KAG = beam.bending_stiffness, beam.shear_stiffness
     M1, K1 = matrix(turns, turns, W), matrix(bends, bends, W)
     M2, K2 = matrix(plain, plain, W), matrix(steep, steep, weight)
@@ -111,7 +117,8 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
 def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
     """Assemble (M, K, unit of distributed force [N/m]) of v_1 … v_n, sparse; C = viscosity K."""
     h = rod.length / count
-    lines, slopes = _lines(S), _line_slopes(S) / h
+    lines = _lines(S)
+    slopes = _line_slopes(S) / h
     M, K = (h * (a * W) @ a.T for a in (lines, slopes))
     return (
         rod.rho * rod.area * _assembled(M, M, count),

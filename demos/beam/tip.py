@@ -2,11 +2,12 @@
 
 There is one scalar equation per step for the slip s = u_m^{k+1} - u_m^k (Ahn 2012, section 7).
 
-Condensed to the tip, the step says  c s - g + R = 0  with the friction R that the wall takes from the beam [N]:
-c > 0 [N/m] is the stiffness of the step, g [N] the force that would hold the tip. With limit = mu |r_N| >= 0:
+Condensed to the tip, the step says  c s - g + R = 0  with the friction R that the wall takes from
+the beam [N]: c > 0 [N/m] is the stiffness of the step, g [N] the force that would hold the tip.
+With limit = mu |r_N| >= 0:
 
-    exact           |R| <= limit,   R = limit sgn(s) where s is not zero                 (2.8), (2.9)
-    regularised     R = limit s / sqrt(s² + eps²)                                        (7.1), J' of (3.5)
+    exact           |R| <= limit,   R = limit sgn(s) where s is not zero        (2.8), (2.9)
+    regularised     R = limit s / sqrt(s² + eps²)                               (7.1), J' of (3.5)
 
 eps [m] is a slip per *step*, not a speed: the rate that is rounded off is eps/dt.
 """

@@ -5,9 +5,9 @@ They are compared with the layer (b-geometry, ENOC 2017, equations 29 to 34).
 Every constraint phi^R(q) = 0 with a^R = d phi^R brings one coordinate lambda^R of a manifold of its
 own:
 
-    M v̇ + Γ(v, v) - f = sum_R [(m̄_R λ̇^R)˙ + c̄_R λ̇^R + k̄_R λ^R - f̄_R] a^R                                        (31)
-    (m̄_R φ̇^R)˙ + c̄_R φ̇^R + k̄_R φ^R = 0                                                                          (34)
-    m̄ = c·M c,  c̄ = -c·(∂f/∂v) c,  k̄ = -c·(∂f/∂q) c,  f̄ = c·f,  with a·c = 1                                (32, 33)
+    M v̇ + Γ(v, v) - f = sum_R [(m̄_R λ̇^R)˙ + c̄_R λ̇^R + k̄_R λ^R - f̄_R] a^R          (31)
+    (m̄_R φ̇^R)˙ + c̄_R φ̇^R + k̄_R φ^R = 0                                             (34)
+    m̄ = c·M c,  c̄ = -c·(∂f/∂v) c,  k̄ = -c·(∂f/∂q) c,  f̄ = c·f,  with a·c = 1       (32, 33)
 
 n + k ordinary differential equations for q and lambda, no algebraic ones. CHOSEN: c_R = M⁻¹a_R/(a_R
 M⁻¹ a_R), the direction that the boundary's B of (20) has, so that m̄ is g_11 of the layer; (33)
@@ -59,10 +59,8 @@ def bilateral_motion(
     Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the
     integrator stops.
     """
-    owner, k = (
-        "bilateral_motion",
-        len(several("bilateral_motion", "systems", systems, "give a list of them")),
-    )
+    owner = "bilateral_motion"
+    k = len(several("bilateral_motion", "systems", systems, "give a list of them"))
     for system in systems:
         instance(owner, "a system", system, ConstrainedSystem, "give ConstrainedSystem(...)")
     if not systems or any(system.rates is not None for system in systems):
@@ -82,7 +80,8 @@ def bilateral_motion(
     check_tolerance(owner, rtol)
     for system in systems:
         system.check(q, v, float(times[0]))
-    n, evaluations = len(q), Evaluations()
+    n = len(q)
+    evaluations = Evaluations()
 
     def rates(t: float, y: Array) -> Array:
         evaluations.spend(t)
@@ -128,7 +127,8 @@ def _solved(
     both = np.linalg.solve(
         first.matrix(q), np.column_stack([first.generalised_force(t, q, v), a.T])
     )
-    free, along = both[:, 0], both[:, 1:]
+    free = both[:, 0]
+    along = both[:, 1:]
     masses = 1.0 / np.einsum("ri,ir->r", a, along)
     c = along * masses
     damping, stiffness, pull = _along(first, t, q, v, c)
@@ -145,7 +145,8 @@ def _solved(
 
 def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) -> Array:
     """(c̄, k̄, f̄) of (32), (3, k)."""
-    values, force = np.zeros((3, c.shape[1])), system.force
+    values = np.zeros((3, c.shape[1]))
+    force = system.force
     if force is None:
         return values
     for R, way in enumerate(c.T):

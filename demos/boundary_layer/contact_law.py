@@ -11,8 +11,10 @@ gamma [kg/m²] is g_11 per area: -gamma b² ÿ/rho is the reaction of the metric
 At rest p = k b²/rho: the law is a logarithmic barrier, and tends to the exact inequality 0 <= p ⊥
 rho >= 0 as b -> 0. The mean over a step from rho_0 to rho_1 is that of the midpoint rule in y:
 
-    p̄ = (Y_1 - Y_0)/(rho_1 - rho_0) · b² [k - (c/V)(y_1 - y_0)/dt - gamma (w_1 - w_0)/dt],   Y' = delta/rho, Y(b) = 0
-    (w_0 + w_1)/2 = (y_1 - y_0)/dt,    w_0 = ẏ = ρ̇/rho where the step begins outside the layer, carried on inside it
+    p̄ = (Y_1 - Y_0)/(rho_1 - rho_0) · b² [k - (c/V)(y_1 - y_0)/dt - gamma (w_1 - w_0)/dt]
+    Y' = delta/rho,    Y(b) = 0
+    (w_0 + w_1)/2 = (y_1 - y_0)/dt
+    w_0 = ẏ = ρ̇/rho where the step begins outside the layer, carried on inside it
 
 Order 2. Energy: the part with k does exactly the work of a potential -k b² Y; the part with gamma,
 where delta = 1, that of a kinetic energy ½ gamma b² w²; the part with c never gives any. Where the
@@ -115,9 +117,12 @@ class ContactLayer:
         The step goes from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays are (m,).
         """
         layer, gamma = self.layer, self.mass
-        squared, damper = layer.width**2, layer.c / layer.v / dt + 2.0 * gamma / dt**2
+        squared = layer.width**2
+        damper = layer.c / layer.v / dt + 2.0 * gamma / dt**2
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
-        step, middle, cut = rho - old, 0.5 * (rho + old), layer.cut_off
+        step = rho - old
+        middle = 0.5 * (rho + old)
+        cut = layer.cut_off
         near = np.abs(step) < SHORT_STEP * middle
         # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
         step = np.where(near, middle, step)
@@ -186,12 +191,14 @@ def contact_layer(
     def excess(s: float) -> float:
         return _rebound(layer(s), mass, speed, metric) - e
 
-    s, low = damping_ratio(e), 0.0
+    s = damping_ratio(e)
+    low = 0.0
     if s > 0.0:
         for _ in range(DOUBLINGS):
             if excess(s) <= 0.0:
                 break
-            low, s = s, 2.0 * s
+            low = s
+            s = 2.0 * s
         else:
             raise InputError(f"contact_layer: no layer returns {e:g} of the speed; give a larger e")
         s = float(brentq(excess, low, s, xtol=1e-14, rtol=1e-8))

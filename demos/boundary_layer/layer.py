@@ -2,8 +2,10 @@
 
 It has its width, cut-off and force (b-geometry, ENOC 2017, equation 25).
 
-    f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V,    x = rho(q) > 0 the distance function
-    delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z)),  f(z) = exp(-1/z) for z > 0, else 0
+    f̂_1 = [k̂/x - ĉ ẋ/x²] delta(x; a, b),    k̂ = k b²,    ĉ = c b²/V
+    x = rho(q) > 0 the distance function
+    delta = 1 - s(z),  z = (x - a)/(b - a),  s = f(z)/(f(z) + f(1 - z))
+    f(z) = exp(-1/z) for z > 0, else 0
 
 x > 0 is admissible, x = 0 is the obstacle; a positive f̂_1 pushes away from it. The layer reaches
 from 0 to b; the force is complete up to a and fades out smoothly between a and b.
@@ -99,7 +101,9 @@ class Layer:
 
     def cut_off(self, x: Array | float) -> Array:
         """Return delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
-        x, a, b = np.asarray(x, dtype=float), self.a, self.width
+        x = np.asarray(x, dtype=float)
+        a = self.a
+        b = self.width
         between = (x > a) & (x < b)
         z = np.where(between, (x - a) / (b - a if b > a else 1.0), 0.5)
         z = np.clip(z, 1e-3, 1.0 - 1e-3)  # beyond that exp(-1000) and 1 - exp(-1000)

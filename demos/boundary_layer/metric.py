@@ -5,7 +5,7 @@ See b-geometry, ENOC 2017, 8 to 21.
 With the covector A = d rho in the coordinates of the velocities and M = [g_IJ]:
 
     g_11 = 1/(A M⁻¹ Aᵀ)  (12, 13),    ĝ_11 = g_11 (b/rho)²  (9, 10),    ĝ_IJ = A_I A_J ĝ_11  (14)
-    B^J = g_11 (M⁻¹Aᵀ)^J  (20),       Λ̂^1_11 = -1/rho,                 Λ̂^K_IJ = B^K A_I A_J Λ̂^1_11  (21)
+    B^J = g_11 (M⁻¹Aᵀ)^J  (20),       Λ̂^1_11 = -1/rho,    Λ̂^K_IJ = B^K A_I A_J Λ̂^1_11  (21)
 
 ĝ and Λ̂ are added to the metric and to the affinities of the manifold without boundary. Λ̂^1_11 is
 the Levi-Civita affinity of ĝ_11 with g_11 constant, so that the covariant derivative of the normal
@@ -48,7 +48,8 @@ class Metric(Enum):
         It is that of g ρ̈ = g ``free`` + lambda; g = g_11 [kg]; ``free`` is the acceleration [m/s²]
         without layer.
         """
-        force, ratio = float(layer.force(rho, rate)), (layer.width / rho) ** 2
+        force = float(layer.force(rho, rate))
+        ratio = (layer.width / rho) ** 2
         if self is Metric.DOMINANT:
             return g * (rate**2 / rho + force / (g * ratio) + free / ratio - free)
         ratio *= {Metric.FULL: 1.0, Metric.FLAT: 0.0}.get(self, float(layer.cut_off(rho)))

@@ -5,14 +5,17 @@ See b-geometry, ENOC 2017, equations 35 to 38.
 With y = ln x the normal equation (35) is linear, m y'' = k - (c/V) y', and b cancels. From x = a, ẋ
 = -V:
 
-    x(t) = a exp(beta),   beta = kappa [(1 + s) T² phi(s T) - T],   ẋ = (V/a) x [(1 + s) T psi(s T) - 1]           (36)
-    s = c/(a k),  kappa = m V²/(k a²),  T = a k t/(m V),  phi(z) = (exp(-z) - 1 + z)/z²,  psi(z) = (1 - exp(-z))/z
+    x(t) = a exp(beta),   beta = kappa [(1 + s) T² phi(s T) - T]                (36)
+    ẋ = (V/a) x [(1 + s) T psi(s T) - 1]
+    s = c/(a k),  kappa = m V²/(k a²),  T = a k t/(m V)
+    phi(z) = (exp(-z) - 1 + z)/z²,  psi(z) = (1 - exp(-z))/z
 
 (this form of (36) has no difference of large numbers as c -> 0). Consequences, with h(z) = (z -
 ln(1 + z))/z²:
 
     compression ends at t_c = m V/(a k) ln(1 + s)/s,    x_min = a exp(-kappa h(s))
-    e = V'/V is the root of e² h(-s e) = h(s), that is e = tau/s - 1, tau = 1 + s + W0(-(1 + s) exp(-(1 + s)))
+    e = V'/V is the root of e² h(-s e) = h(s), that is e = tau/s - 1
+    tau = 1 + s + W0(-(1 + s) exp(-(1 + s)))
     contact ends at t_f = (1 + e) m V/(a k)
 
 e depends on s alone: e = 1 - 2/3 s + ... for small s, and tends to 1/s for large s. A speed V of
@@ -92,19 +95,22 @@ class ParticleImpact:
 
     def position(self, t: Array | float) -> Array:
         """Return x [m] at times 0 <= t <= t_f."""
-        T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
+        T = np.asarray(t, dtype=float) / self._time
+        s = self.damping_ratio
         return np.asarray(self.layer.a * np.exp(self._kappa * ((1.0 + s) * T**2 * _phi(s * T) - T)))
 
     def velocity(self, t: Array | float) -> Array:
         """Return ẋ [m/s] at times 0 <= t <= t_f."""
-        T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
+        T = np.asarray(t, dtype=float) / self._time
+        s = self.damping_ratio
         return np.asarray(
             self.speed / self.layer.a * self.position(t) * ((1.0 + s) * T * exprel(-s * T) - 1.0)
         )
 
     def boundary_force(self, t: Array | float) -> Array:
         """Return f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
-        x, layer = self.position(t), self.layer.at(self.speed)
+        x = self.position(t)
+        layer = self.layer.at(self.speed)
         return np.asarray(layer.width**2 * (layer.k - layer.c / layer.v * self.velocity(t) / x) / x)
 
     @property
@@ -196,7 +202,9 @@ def _phi(z: Array) -> Array:
     """(exp(-z) - 1 + z)/z², ½ at z = 0."""
     small = np.abs(z) < 0.05
     large = np.where(small, 1.0, z)
-    series, term = np.zeros_like(z), np.full_like(z, 0.5)
+    series = np.zeros_like(z)
+    term = np.full_like(z, 0.5)
     for n in range(10):
-        series, term = series + term, -term * z / (n + 3.0)
+        series = series + term
+        term = -term * z / (n + 3.0)
     return np.where(small, series, (np.expm1(-large) + large) / large**2)

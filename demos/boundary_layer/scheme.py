@@ -1,7 +1,8 @@
 """Step by the midpoint rule with the boundary layer in the place of the exact inequality.
 
     u1 - u0 = ½ dt (v0 + v1)
-    M (v1 - v0)/dt + ½ C (v0 + v1) + ½ K (u0 + u1) = f(t0 + ½ dt) - B_nᵀ r̄_n,    r̄_n = weight · p̄(gap1; gap0, rate0)
+    M (v1 - v0)/dt + ½ C (v0 + v1) + ½ K (u0 + u1) = f(t0 + ½ dt) - B_nᵀ r̄_n
+    r̄_n = weight · p̄(gap1; gap0, rate0)
 
 p̄ is ``ContactLayer.mean_pressure``. The contact points' part is solved first, by Newton's method
 in their gaps on the compliance G = B A⁻¹ Bᵀ; its reactions are loads of the step, which then goes

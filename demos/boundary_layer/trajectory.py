@@ -168,7 +168,8 @@ class _Passages:
         self, start: float, t_end: float, q: Array, v: Array, inside: bool
     ) -> tuple[float, Array, Array, bool]:
         """Integrate to the next crossing of the edge; (t, q, v, whether there was one)."""
-        system, n = self._system, len(q)
+        system = self._system
+        n = len(q)
         layer = (
             self._layer.at(abs(system.normal_rate(q, v)))
             if inside and self._layer.speed is None
@@ -178,7 +179,8 @@ class _Passages:
 
         def rates(t: float, y: Array) -> Array:
             self._evaluations.spend(start + t)
-            place, speed = q + y[:n], y[n:]
+            place = q + y[:n]
+            speed = y[n:]
             acceleration, _ = self._acceleration(start + t, place, speed, layer, inside)
             return np.concatenate([system.velocity(place, speed), acceleration])
 
@@ -194,7 +196,8 @@ class _Passages:
         def turn(t: float, y: Array) -> float:
             return system.normal_rate(q + y[:n], y[n:])
 
-        edge.terminal, edge.direction = True, 1.0 if inside else -1.0  # type: ignore[attr-defined]
+        edge.terminal = True  # type: ignore[attr-defined]
+        edge.direction = 1.0 if inside else -1.0  # type: ignore[attr-defined]
         turn.direction = 1.0  # type: ignore[attr-defined]
         way = width if inside else max(width, float(np.max(np.abs(q))))
         if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
@@ -222,7 +225,8 @@ class _Passages:
                 f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho "
                 f"= {system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
             )
-        places, speeds = q + found.y[:n].T, found.y[n:].T
+        places = q + found.y[:n].T
+        speeds = found.y[n:].T
         t = np.interp(
             np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine,
             np.arange(len(found.t)),

@@ -112,7 +112,8 @@ class BouncingBar(UprightBar):
 
     def _waves(self, x: ArrayLike, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Return t, and (F, F', in contact) at t - x/c and at t - 2T + x/c."""
-        delay, t = np.asarray(x, dtype=float) / self.wave_speed, np.asarray(t, dtype=float)
+        delay = np.asarray(x, dtype=float) / self.wave_speed
+        t = np.asarray(t, dtype=float)
         start, wave, closed = self._history(float(np.max(t, initial=0.0)))
 
         def at(s: Array) -> Array:
@@ -143,21 +144,29 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
 
     They are as BouncingBar._history returns them.
     """
-    trip, g = 2.0 * bar.crossing, bar.gravity
+    trip = 2.0 * bar.crossing
+    g = bar.gravity
     near = COINCIDENT * (bar.height + g * trip**2)
     slow = COINCIDENT * g * (bar.fall_time + trip)
-    start, wave, closed = [-trip], [(0.0, 0.0, 0.0)], [False]
-    t, y, delayed = 0.0, bar.height, 0  # delayed: the piece that holds t - 2T
+    start = [-trip]
+    wave = [(0.0, 0.0, 0.0)]
+    closed = [False]
+    t = 0.0
+    y = bar.height
+    delayed = 0  # the piece that holds t - 2T
     while t < round_trips * trip:
         while delayed + 1 < len(start) and start[delayed + 1] + trip <= t + COINCIDENT * trip:
             delayed += 1
         end = (start[delayed + 1] if delayed + 1 < len(start) else t) + trip
         value, slope, curvature = wave[delayed]
         after = t - trip - start[delayed]
-        value, slope = value + (slope + 0.5 * curvature * after) * after, slope + curvature * after
+        value = value + (slope + 0.5 * curvature * after) * after
+        slope = slope + curvature * after
         # the free foot's velocity and acceleration
-        a, a1 = (2.0 * slope - g * t, 2.0 * curvature - g)
-        y, a = (0.0 if y <= near else y), (0.0 if abs(a) <= slow else a)
+        a = 2.0 * slope - g * t
+        a1 = 2.0 * curvature - g
+        y = 0.0 if y <= near else y
+        a = 0.0 if abs(a) <= slow else a
         touching = y == 0.0 and (a < 0.0 or (a == 0.0 and a1 < 0.0))
         fall = bar.height - 0.5 * g * t**2  # where the foot would be without F
         start.append(t)

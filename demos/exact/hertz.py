@@ -106,7 +106,8 @@ class HertzImpact:
 
     It is quasi-static, with m d'' = -(4/3) E* sqrt(R) d^(3/2):
 
-        d_max = (15 m v²/(16 E* sqrt(R)))^(2/5),   duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
+        d_max = (15 m v²/(16 E* sqrt(R)))^(2/5)
+        duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 
     (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass [kg], speed v [m/s],
     modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.

@@ -4,7 +4,8 @@ Uniform block of width 2b and height 2h, no sliding, no bouncing. With R = sqrt(
 atan(b/h), p² = 3g/(4R) and phi = theta/alpha, rocking about the edge on the side to which the block
 leans obeys
 
-    theta'' = -p² sin(alpha - theta)   for theta > 0, mirrored for theta < 0;   slender: phi'' = p² (phi - 1).
+    theta'' = -p² sin(alpha - theta)   for theta > 0, mirrored for theta < 0
+    slender: phi'' = p² (phi - 1).
 
 When theta passes zero, angular momentum about the new edge is conserved: |theta'| is multiplied by
 e = 1 - (3/2) sin²(alpha). Angles [rad], times [s], accelerations [m/s²].

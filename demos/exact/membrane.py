@@ -46,7 +46,8 @@ class Membrane:
 
     def obstacle(self, x: Any) -> Any:
         """Return psi at points (3, n)."""
-        r, edge = np.hypot(x[0], x[1]), np.sqrt(1.0 - CONE**2)
+        r = np.hypot(x[0], x[1])
+        edge = np.sqrt(1.0 - CONE**2)
         ball = np.sqrt(np.maximum(1.0 - r**2, 0.0))
         return self.unit * np.where(r < CONE, ball, edge - (r - CONE) * CONE / edge)
 

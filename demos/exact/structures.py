@@ -31,7 +31,8 @@ def arm_flexibility(height: float, arm: float, *, EA: float, EI: float) -> Array
 
     The column has this height [m]; u = F p, along and up.
     """
-    xx, xy = height**3 / (3.0 * EI) + arm / EA, -(height**2) * arm / (2.0 * EI)
+    xx = height**3 / (3.0 * EI) + arm / EA
+    xy = -(height**2) * arm / (2.0 * EI)
     yy = (arm**3 / 3.0 + arm**2 * height) / EI + height / EA
     return np.array([[xx, xy], [xy, yy]])
 

@@ -1,9 +1,9 @@
 """Give closed forms for the elastic-plastic torsion of bars: the disk and the square.
 
 The stress function u of a bar of shear modulus G, yield stress k and twist theta per length
-minimises
+minimises (H. Brezis, M. Sibony, 1971)
 
-    ½ ∫ |∇u|² - 2 G theta ∫ u    under |∇u| <= k, which is |u| <= k dist(x, boundary)    (H. Brezis, M. Sibony, 1971)
+    ½ ∫ |∇u|² - 2 G theta ∫ u    under |∇u| <= k, which is |u| <= k dist(x, boundary)
 
 and the torque is 2 ∫ u. Lengths are in units of a (radius, half side), stresses in units of k; w =
 G theta a / k. Disk: plastic for r > 1/w, torque (2 pi/3) (1 - 1/(4 w³)) for w >= 1, pi w / 2
@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-DISK_LIMIT, SQUARE_LIMIT = 2.0 * np.pi / 3.0, 8.0 / 3.0
+DISK_LIMIT = 2.0 * np.pi / 3.0
+SQUARE_LIMIT = 8.0 / 3.0
 
 
 def disk_torque(w: Any) -> Any:

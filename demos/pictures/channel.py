@@ -44,7 +44,9 @@ def plot_layout(
     """
     bodies = read_bodies(folder)
     figure, axis = plane((11.0, 4.9))
-    cells, low, high = bodies.frames.points[bodies.frames.cells], bodies.low, bodies.high
+    cells = bodies.frames.points[bodies.frames.cells]
+    low = bodies.low
+    high = bodies.high
     width, depth = bodies.frames.points.max(axis=0)
     filled(axis, cells[~bodies.cells], SOIL)
     filled(axis, cells[bodies.cells], CONCRETE)
@@ -60,10 +62,8 @@ def plot_layout(
         up = np.unique(bodies.frames.points[np.isclose(bodies.frames.points[:, 0], end), 1])
         axis.plot(np.full_like(up, end + outside), up, "o", ms=4, mfc="white", mec="black", mew=0.8)
     _number(axis, bodies, points)
-    middle, box = (
-        0.5 * (low[0] + high[0]),
-        {"fc": "white", "ec": "0.5", "boxstyle": "round,pad=0.6"},
-    )
+    middle = 0.5 * (low[0] + high[0])
+    box = {"fc": "white", "ec": "0.5", "boxstyle": "round,pad=0.6"}
     for across, up, text, more in (
         (0.5 * low[0], 0.5 * depth, soil, {"fontsize": 9, "bbox": box}),
         (0.5 * (high[0] + width), 0.5 * depth, ends, {"fontsize": 9, "bbox": box}),

@@ -46,7 +46,8 @@ class Outline:
     def of(cls, points: Array, normals: Array) -> "Outline":
         """Make the outline from contact ``points`` (m, 2) [m] with outward ``normals`` (m, 2)."""
         low, high = points.min(axis=0), points.max(axis=0)
-        left, right = normals[:, 0] < -0.5, normals[:, 0] > 0.5
+        left = normals[:, 0] < -0.5
+        right = normals[:, 0] > 0.5
         height = high[1] - low[1]
         right_wall = height + high[0] - low[0] + points[:, 1] - low[1]
         arc = np.select(

@@ -147,7 +147,8 @@ def plot_tractions(
     factor, unit = scale(size, "Pa")
     colours = colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
     for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
-        x, order = tractions.points[:, 0], np.argsort(tractions.points[:, 0])
+        x = tractions.points[:, 0]
+        order = np.argsort(tractions.points[:, 0])
         for t, colour in zip(times, colours, strict=True):
             pressure, shear = tractions.at(t)
             along = np.linalg.norm(shear, axis=1) * np.sign(shear[:, 0])

@@ -78,7 +78,8 @@ def plot_states(
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
 
-    t, order = history["t"], np.argsort(position)
+    t = history["t"]
+    order = np.argsort(position)
     _slip(history)
     states = contact_states(history)[:, order]
     figure, (panel,) = panels(1, (9.0, 4.0))

@@ -30,7 +30,8 @@ History = Mapping[str, np.ndarray]
 def wall(axes: Any, h: History) -> None:
     """Thrust on the stem, its height, and how far the base has slid."""
     thrust, mid, slid = axes
-    soil, phi = 0.5 * 1900.0 * G * 5.4**2 / 1e3, 0.593
+    soil = 0.5 * 1900.0 * G * 5.4**2 / 1e3
+    phi = 0.593
     thrust.plot(h["t"], h["N_stem"] / 1e3)
     for factor, name in (
         (math.tan(math.pi / 4 - phi / 2) ** 2, "Rankine, 34°"),

@@ -104,10 +104,8 @@ def plot_moments(
     factor, unit = scale(
         max(float(np.abs(history[f"M_{axis}_raft"]).max()) for axis in "xy"), "N m"
     )
-    turned, limits = (
-        rotations(history, sides),
-        0.65 * factor * weight * max(sides) * np.array([-1.0, 1.0]),
-    )
+    turned = rotations(history, sides)
+    limits = 0.65 * factor * weight * max(sides) * np.array([-1.0, 1.0])
     for axis, panel, side in zip("xy", axes[0], sides[::-1], strict=True):
         moment = -factor * history[f"M_{axis}_raft"]
         for name, theta in (

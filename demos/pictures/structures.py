@@ -73,7 +73,8 @@ def _beam(axis: Any, shown: Shown) -> None:
 def _frame(axis: Any, shown: Shown) -> None:
     assert shown.frame is not None
     nodes, u, normal, gap = shown.frame
-    n, moved = np.array(normal), nodes + LARGER * u
+    n = np.array(normal)
+    moved = nodes + LARGER * u
     along = np.array([-n[1], n[0]])
     stop = nodes[-1] + LARGER * gap * n + np.outer([-0.45, 0.45], along)
     axis.plot(*nodes.T, "o-", color="0.7", ms=4, label="without load")
@@ -88,7 +89,8 @@ def _disk(axis: Any, shown: Shown) -> None:
     assert shown.disk is not None
     r, w, known, scale = shown.disk
     fine = np.linspace(0.0, 1.0, 400)
-    radius, ground = float(r.max()), -1e3 * scale * known.gap
+    radius = float(r.max())
+    ground = -1e3 * scale * known.gap
     axis.axhspan(1.15 * ground, ground, color="0.85", lw=0.0, label="ground")
     axis.plot(
         radius * fine,

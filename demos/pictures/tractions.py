@@ -41,7 +41,8 @@ def read_tractions(folder: str | Path) -> Tractions:
         raise InputError(
             f"'{folder}' is not a finished run in plane or space with Contact(): finish one"
         )
-    pressure, tangents = history["pressure"], stored_tangents(contact)
+    pressure = history["pressure"]
+    tangents = stored_tangents(contact)
     shear = (
         -history["traction_t"]
         if "traction_t" in history

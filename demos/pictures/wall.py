@@ -225,10 +225,8 @@ def plot_frames(folder: str | Path, wall: Wall, times: Sequence[float], path: st
         f"{LEANS * wall.height / max(float(np.abs(u).max()) for _, u, _ in shots):.1g}"
     )
     pressures = [tractions.normal[nearest(tractions.t, [t])[0]] for t, _, _ in shots]
-    push, most = (
-        max(float(p.max()) for p in pressures),
-        max(float(stress.max()) for *_, stress in shots),
-    )
+    push = max(float(p.max()) for p in pressures)
+    most = max(float(stress.max()) for *_, stress in shots)
     (factor, unit), (force, force_unit) = scale(most, "Pa"), scale(push, "Pa")
     figure, axes = canvas(1, len(times), (4.3 * len(times) + 1.2, 6.6), lattice=False, sharey=True)
     for axis, (t, u, stress), pressure in zip(axes[0], shots, pressures, strict=True):
@@ -283,7 +281,8 @@ def plot_frames(folder: str | Path, wall: Wall, times: Sequence[float], path: st
             bbox={"fc": "white", "ec": "none", "pad": 2.0},
         )
     axes[0, 0].set_ylabel("y [m]")
-    first, last = axes[0, 0], axes[0, -1]
+    first = axes[0, 0]
+    last = axes[0, -1]
     first.plot([], [], color="black", ls=":", label="wall at rest")
     first.plot([], [], color="black", lw=3.5, label="base, held")
     last.plot(

@@ -95,7 +95,7 @@ class BallModel:
 
     @property
     def exact(self) -> HertzImpact:
-        """Return the impact of the mesh's mass, so that what differs is the error of the mechanics."""
+        """Return the impact of the mesh's mass, so that only the error of the mechanics differs."""
         return self.ball.impact(self.mass)
 
     def time_step(self, steps: int = 200) -> float:
@@ -138,7 +138,8 @@ def hertz_motion(exact: HertzImpact, t: ArrayLike) -> tuple[Array, Array]:
 
     The times count from the first touch; both are zero before it and after the contact:
 
-        m d'' = -F(d),  energy: d' = v sqrt(1 - x),  x = (d/d_max)^(5/2)   =>   t/duration = ½ I_x(2/5, 1/2) until d_max
+        m d'' = -F(d),  energy: d' = v sqrt(1 - x),  x = (d/d_max)^(5/2)
+        =>  t/duration = ½ I_x(2/5, 1/2) until d_max
 
     with the regularised incomplete beta function I, and the same backwards; F = F_max
     (d/d_max)^(3/2).

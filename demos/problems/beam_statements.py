@@ -1,8 +1,9 @@
 """Hold both statements of Ahn (2012), section 8, against every reading of its normal force.
 
-    1   "oscillating of the beam at the right end depends on the magnitude of contact forces; larger contact forces
-        causes more oscillations"
-    2   "In our numerical results, energy loss for friction seems to be negligible as compared to the viscosity damping"
+    1   "oscillating of the beam at the right end depends on the magnitude of contact forces; larger
+        contact forces causes more oscillations"
+    2   "In our numerical results, energy loss for friction seems to be negligible as compared to
+        the viscosity damping"
 
 Statement 1 is asked of runs whose force is a hundredth, a tenth, the whole and ten times that of
 the reading. A run oscillates as often as its tip turns and then moves by more than eps: below eps,
@@ -104,12 +105,18 @@ def turning_points(u: Array, least: float = 0.0) -> int:
 
     It does so where it moved by more than ``least`` before and does so after.
     """
-    count, way, low, high = 0, 0, float(u[0]), float(u[0])
+    count = 0
+    way = 0
+    low = float(u[0])
+    high = float(u[0])
     for value in map(float, u[1:]):
         low, high = min(low, value), max(high, value)
         turned = value < high - least and way >= 0, value > low + least and way <= 0
         if any(turned):
-            count, way, low, high = count + (way != 0), 1 if turned[1] else -1, value, value
+            count = count + (way != 0)
+            way = 1 if turned[1] else -1
+            low = value
+            high = value
     return count
 
 
@@ -147,7 +154,8 @@ def row(
         factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history
         for factor in factors
     }
-    tips, whole = [run["u_tip"] for run in runs.values()], runs[1.0]
+    tips = [run["u_tip"] for run in runs.values()]
+    whole = runs[1.0]
     return Row(
         reading,
         a2,

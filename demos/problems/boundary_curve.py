@@ -30,7 +30,9 @@ def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]
             "two-dimensional"
         )
     mesh = facets[0].mesh
-    numbers, rows, labels = node_numbers(mesh), [], []
+    numbers = node_numbers(mesh)
+    rows = []
+    labels = []
     for label, group in enumerate(facets):
         owned = group.indices[group.indices < mesh.topology.index_map(1).size_local]
         rows.append(compat.entities_to_geometry(mesh, 1, owned))

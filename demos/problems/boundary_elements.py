@@ -112,10 +112,8 @@ def _halves(owner: str, side: float, elements: int, *, multiple: int = 1) -> tup
 
     It raises InputError unless its elements are such a multiple.
     """
-    length, count = (
-        number(owner, "side", side, positive=True, unit="m"),
-        whole(owner, "elements", elements, least=1),
-    )
+    length = number(owner, "side", side, positive=True, unit="m")
+    count = whole(owner, "elements", elements, least=1)
     if count % multiple:
         raise InputError(
             f"{owner}: elements is {count}; give an even number, half of them are in the notch"
@@ -137,7 +135,8 @@ class EmbeddedBox:
 
         A corner of the box has two conditions and does not rub.
         """
-        condensed, mesh = self.bodies.condensed(), self.bodies.one.operator.mesh
+        condensed = self.bodies.condensed()
+        mesh = self.bodies.one.operator.mesh
         in_notch = np.asarray(self.bodies.one.contact)
         sides = [in_notch & (mesh.labels == side) for side in (BOTTOM, LEFT, RIGHT)]
         rows = conditions_on(mesh, condensed, *sides)

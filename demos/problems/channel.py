@@ -39,8 +39,11 @@ from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
 REFERENCE = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": "l2"})
-"""The volume route to compare with and to fall back on. Without a line search its active set runs in circles in some
-steps of the channel: M/dt² of a consistent mass couples neighbours with the sign that sets need to settle reversed."""
+"""The volume route to compare with and to fall back on.
+
+Without a line search its active set runs in circles in some steps of the channel: M/dt² of a
+consistent mass couples neighbours with the sign that sets need to settle reversed.
+"""
 BODIES = ("channel", "soil")  # in the order of their nodes
 SIDES = ("base", "left", "right")  # of the contact, in the order of its conditions
 POINTS = 19
@@ -75,7 +78,8 @@ class Channel:
                 f"the channel has boundary points 1 to {POINTS}, there is no point {number}"
             )
         left, right = self.shape.x[1], self.shape.x[4]
-        bottom, height = self.shape.y[1], self.shape.height
+        bottom = self.shape.y[1]
+        height = self.shape.height
         if number <= 7:
             return left + (number - 1) / 6.0 * (right - left), bottom
         if number <= 13:
@@ -175,7 +179,8 @@ class SoilProbe(Probe):
 
         They are the nearest where divisions differ.
         """
-        nodes, surface = super()._found(problem, points).tolist(), problem.surface
+        nodes = super()._found(problem, points).tolist()
+        surface = problem.surface
         faced: dict[int, int] = {}
         for part in surface.parts if isinstance(surface, FemSurface) else ():
             if part.facing is not None:

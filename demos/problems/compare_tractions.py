@@ -55,7 +55,8 @@ class Tractions:
             else self.x
         )
         weights = shares(self.x, place) * self.lengths[:, None]
-        lengths, chosen = weights.sum(axis=0), slice(None) if nodes is None else nodes
+        lengths = weights.sum(axis=0)
+        chosen = slice(None) if nodes is None else nodes
         inside = (self.times > between[0] * (1 + 1e-9)) & (self.times <= between[1] * (1 + 1e-9))
         # a hat between the nodes of a coarse mesh has none of them
         covered = np.where(lengths > 0.0, lengths, 1.0)
@@ -75,8 +76,10 @@ def compared(
     The shears are of the support on the body along +x, of a run of boundary elements and of a
     history of finite elements on the contact points of ``surface`` (all of them, on one rank).
     """
-    order, points = np.argsort(run.contact.compliance.points[:, 0]), surface.points
-    x, lengths = run.contact.compliance.points[order, 0], run.contact.surface.weights[order]
+    order = np.argsort(run.contact.compliance.points[:, 0])
+    points = surface.points
+    x = run.contact.compliance.points[order, 0]
+    lengths = run.contact.surface.weights[order]
     collect = shares(points[:, 0], x) * surface.weights[:, None]
     found = []
     for sign, mine, theirs in ((1.0, run.pressure, "pressure"), (-1.0, run.shear, "traction_t")):

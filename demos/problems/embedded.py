@@ -84,7 +84,8 @@ class Embedded:
         They are "foot" and "head" of the box, "left", "right", "under" (the notch), "left_wall" and
         "right_wall" of the block.
         """
-        a, n = 0.5 * self.box.side, self.box.cells // 2
+        a = 0.5 * self.box.side
+        n = self.box.cells // 2
         places = {  # lowest corner, width, height in units of half a side
             "foot": (-1, -1, 2, 1),
             "head": (-1, 0, 2, 1),

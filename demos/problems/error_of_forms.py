@@ -7,7 +7,8 @@ of concrete on steel: "The squared energy error for both couplings decays with s
 Displacements of nested meshes and time steps lie in the finest space, whose symmetric operator S
 knows the energy of any motion v of the boundary:
 
-    |v|²(t_n) = sum_(k<=n) (S v)_k . (v_k - v_(k-1)),       error² = sum_n |u_h - u|²(t_n) / sum_n |u|²(t_n),
+    |v|²(t_n) = sum_(k<=n) (S v)_k . (v_k - v_(k-1))
+    error² = sum_n |u_h - u|²(t_n) / sum_n |u|²(t_n),
 
 u the finest symmetric solution: the energy norm of the difference, over time. Its own error e² is
 what the successive differences of its last three levels, d = |u_4h - u_2h| and b = |u_2h - u_h|,
@@ -119,7 +120,8 @@ class Solutions:
         self, example: Example, operator: PoincareSteklov, forms: Sequence[str] = tuple(FORMS)
     ) -> None:
         """Solve all supports with these forms of an operator."""
-        made, k = example.problem(operator), len(operator.mesh) // 4
+        made = example.problem(operator)
+        k = len(operator.mesh) // 4
         for form in forms:
             problem = replace(made, operator=replace(operator, symmetric=FORMS[form]))
             condensed: CondensedCompliance | None = None
@@ -129,7 +131,8 @@ class Solutions:
                 else:
                     condensed = condensed or problem.condensed()
                     run = march_contact(BoundaryContact(condensed, friction=support))
-                    motion, self.worst = problem.solve(run.forces), max(self.worst, run.worst)
+                    motion = problem.solve(run.forces)
+                    self.worst = max(self.worst, run.worst)
                 self.displacement[name, form, k] = motion.displacement
                 self.energy[name, form, k] = motion.work
 
@@ -148,9 +151,12 @@ def prolonged(u: Array, k: int, fine: int) -> Array:
     They are those of k elements per side, of which ``fine`` is a multiple, with as many times the
     steps. They are linear between nodes and between times, zero at t = 0.
     """
-    m, steps = fine // k, len(u)
-    place, time = np.arange(4 * fine) / m, np.arange(1, m * steps + 1) / m
-    node, share = place.astype(int), place % 1.0
+    m = fine // k
+    steps = len(u)
+    place = np.arange(4 * fine) / m
+    time = np.arange(1, m * steps + 1) / m
+    node = place.astype(int)
+    share = place % 1.0
     along = (1.0 - share) * u[:, :, node] + share * u[:, :, (node + 1) % (4 * k)]
     along = np.concatenate([np.zeros_like(along[:1]), along])
     before = np.minimum(time.astype(int), steps - 1)
@@ -193,11 +199,9 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
     twice and four times two of them. With more than MARCHED elements the last level is solved in
     the symmetric form alone.
     """
-    example, fine, found = (
-        EXAMPLES[name].only(*(supports or EXAMPLES[name].supports)),
-        levels[-1],
-        Solutions(),
-    )
+    example = EXAMPLES[name].only(*(supports or EXAMPLES[name].supports))
+    fine = levels[-1]
+    found = Solutions()
     large = fine > MARCHED
     for k in levels[:-1]:
         found.add(example, example.operator(k))
@@ -282,7 +286,8 @@ class Differences:
 
 def _slopes(levels: Sequence[int], errors: Sequence[float]) -> Row:
     """Return the slope of error² over h on logarithmic axes, and whether it has settled."""
-    x, y = -np.log(levels), np.log(errors)
+    x = -np.log(levels)
+    y = np.log(errors)
     local = [float((b[1] - a[1]) / (b[0] - a[0])) for a, b in pairwise(zip(x, y, strict=True))]
     slope = float(np.polyfit(x, y, 1)[0])
     return {"slope": slope, "local_slopes": local, "settled": max(local) - min(local) < SETTLED}

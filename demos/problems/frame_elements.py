@@ -18,7 +18,8 @@ def member(a: Any, b: Any, *, EA: float, EI: float, rho_A: float) -> tuple[Any, 
     h = float(np.hypot(*way))
     c, s = way / h
     K, M = np.zeros((6, 6)), np.zeros((6, 6))
-    along, across = np.ix_([0, 3], [0, 3]), np.ix_([1, 2, 4, 5], [1, 2, 4, 5])
+    along = np.ix_([0, 3], [0, 3])
+    across = np.ix_([1, 2, 4, 5], [1, 2, 4, 5])
     K[along] = EA / h * np.array([[1.0, -1.0], [-1.0, 1.0]])
     M[along] = rho_A * h / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
     bending = [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h**2, -6 * h, 2 * h**2]]
@@ -32,7 +33,7 @@ def member(a: Any, b: Any, *, EA: float, EI: float, rho_A: float) -> tuple[Any, 
 
 
 def frame(nodes: Any, members: Sequence[tuple[int, int]], **section: float) -> dict[str, Any]:
-    """M, K, coordinates and unknowns of a frame, as ``system_from_arrays`` takes them; C is None."""
+    """Give M, K, coordinates and unknowns of a frame for ``system_from_arrays``; C is None."""
     nodes = np.asarray(nodes, dtype=float)
     n = 3 * len(nodes)
     M, K = sp.lil_matrix((n, n)), sp.lil_matrix((n, n))

@@ -49,7 +49,8 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
         InputError: a system that fem.assemble did not make.
     """
     check_problem_given("geometric_stiffness", problem)
-    system, space = problem.system, space_of("geometric_stiffness", problem.system)
+    system = problem.system
+    space = space_of("geometric_stiffness", problem.system)
     check_sizes("geometric_stiffness", problem, state)
     known_matrices("geometric_stiffness", system, "K")
     u0 = problem.cartesian(state.u)

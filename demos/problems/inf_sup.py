@@ -2,12 +2,12 @@
 
 They tell how well displacements see it, in space and in time.
 
-    beta = min over lambda of  max over v of  <lambda, v> / (|lambda| |v|),   lambda on (H, DT), v on (h, dt)
+    beta = min over lambda of  max over v of  <lambda, v> / (|lambda| |v|)
 
-Norms in space are those of H^(-1/2) and H^(1/2) of the boundary: |v|² = v.(M^½ (1 + M^-½ K M^-½)^½
-M^½) v with the mass M and the stiffness K of the tangential derivative, and |lambda| as the maximum
-over a much finer mesh. In time they are those of L2. The spaces are products, and so is the
-constant.
+lambda on (H, DT), v on (h, dt). Norms in space are those of H^(-1/2) and H^(1/2) of the boundary:
+|v|² = v.(M^½ (1 + M^-½ K M^-½)^½ M^½) v with the mass M and the stiffness K of the tangential
+derivative, and |lambda| as the maximum over a much finer mesh. In time they are those of L2. The
+spaces are products, and so is the constant.
 """
 
 import numpy as np
@@ -61,7 +61,8 @@ def refined(mesh: BoundaryMesh) -> BoundaryMesh:
 
 def half_norm(mesh: BoundaryMesh) -> Array:
     """Return the matrix (n, n) of the norm of H^(1/2) by interpolation, for one component."""
-    n, h = len(mesh), mesh.lengths
+    n = len(mesh)
+    h = mesh.lengths
     M, K = np.zeros((n, n)), np.zeros((n, n))
     for a in range(2):
         for b in range(2):

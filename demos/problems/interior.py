@@ -26,7 +26,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, instance, integers, shape_of
 from vi_contact.core.errors import InputError
 
-ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
+ORDER = 8  # points a piece
+CLOSEST = 1e-3  # least distance from the boundary in element lengths
 
 
 def interior_displacement(
@@ -95,16 +96,20 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
 
     They are those of the stacked kernels against its shape functions.
     """
-    n, along = len(mesh), mesh.points[mesh.after] - mesh.points
+    n = len(mesh)
+    along = mesh.points[mesh.after] - mesh.points
     group = max(1, 4000 // n)
     kernels = TimeKernels(t, c_p, c_s)
     for first in range(0, len(x), group):
         count = len(x[first : first + group])
         offset = (x[first : first + group, None] - mesh.points).reshape(-1, 2)
         b = np.tile(along, (count, 1))
-        b2, projection, d2 = (b**2).sum(1), (b * offset).sum(1), (offset**2).sum(1)
+        b2 = (b**2).sum(1)
+        projection = (b * offset).sum(1)
+        d2 = (offset**2).sum(1)
         fronts = [roots(b2, -2.0 * projection, d2 - (c * t) ** 2) for c in (c_p, c_s)]
-        foot, height = projection / b2, np.abs(b[:, 0] * offset[:, 1] - b[:, 1] * offset[:, 0]) / b2
+        foot = projection / b2
+        height = np.abs(b[:, 0] * offset[:, 1] - b[:, 1] * offset[:, 0]) / b2
         row, low, length = pieces(np.concatenate([*fronts, foot[:, None]], axis=1))
         eta, weight = (
             part.ravel()
@@ -115,7 +120,11 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         d = (offset[owner] - eta[:, None] * b[owner]).T
         r = np.hypot(*d)
         heard = r < c_p * t
-        d, r, eta, owner, weight = d[:, heard], r[heard], eta[heard], owner[heard], weight[heard]
+        d = d[:, heard]
+        r = r[heard]
+        eta = eta[heard]
+        owner = owner[heard]
+        weight = weight[heard]
         values = integrands(kernels(r), d, r)[: N_SINGLE + N_DOUBLE]
         matrix = at_points(np.stack([1.0 - eta, eta], axis=1) * weight[:, None], owner, count * n)
         yield np.asarray(matrix @ values.T).T.reshape(len(values), count * n, 2)
@@ -126,7 +135,8 @@ def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
 
     They have winding number 1 (0 for an exterior body), and are off the boundary.
     """
-    start, end = mesh.points - x[:, None], mesh.points[mesh.after] - x[:, None]
+    start = mesh.points - x[:, None]
+    end = mesh.points[mesh.after] - x[:, None]
     distance = distances(x[:, None], mesh.points, mesh.points[mesh.after]) / mesh.lengths
     turn = np.arctan2(
         start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0], (start * end).sum(2)

@@ -64,7 +64,8 @@ def ordered_loops(
     loops: list[list[tuple[int, int]]] = []
     while left:
         number = min(left)
-        point, loop = int(segments[number, 0]), []
+        point = int(segments[number, 0])
+        loop = []
         while number in left:
             left.discard(number)
             loop.append((point, number))

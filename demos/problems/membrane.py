@@ -34,7 +34,8 @@ class Posed:
 def build(comm: Any, cells: int, unit: float = 1.0) -> Posed:
     """Return the problem on a mesh of so many squares along a side, cut into triangles."""
     on = dolfinx.mesh.create_rectangle(comm, [[-HALF, -HALF], [HALF, HALF]], [cells, cells])
-    V, known = compat.lagrange(on, 1), Membrane(unit)
+    V = compat.lagrange(on, 1)
+    known = Membrane(unit)
     exact, lower, u = (dolfinx.fem.Function(V) for _ in range(3))
     exact.interpolate(known.height)
     lower.interpolate(known.obstacle)

@@ -48,7 +48,8 @@ def square_mesh(comm: Any, side: float, cells: int) -> Any:
 
     Each is cut into four triangles.
     """
-    half, crossed = 0.5 * side, dolfinx.mesh.DiagonalType.crossed
+    half = 0.5 * side
+    crossed = dolfinx.mesh.DiagonalType.crossed
     ghosts = dolfinx.mesh.GhostMode.shared_facet  # edges between ranks are integrated too
     return dolfinx.mesh.create_rectangle(
         comm, [[-half, -half], [half, half]], [cells, cells], ghost_mode=ghosts, diagonal=crossed
@@ -112,7 +113,9 @@ def plate_system(
 
 def _stiffness(on: Any, plate: Plate, w: Any, v: Any, clamped: bool) -> Any:
     """Return the form of K."""
-    n, D, nu = ufl.FacetNormal(on), plate.D, plate.nu
+    n = ufl.FacetNormal(on)
+    D = plate.D
+    nu = plate.nu
     slender = ufl.FacetArea(on) / ufl.CellVolume(on)
 
     def curvature(u: Any) -> Any:

@@ -3,7 +3,9 @@
 The normal force is printed as r_N(0) = 100,000 and r_N(t) = 100,000/100t. Three readings, as |r_N|
 >= 0:
 
-    A    10⁵/(100 t) for t > 0              B    10⁵/100^t            C    10⁵/100^k at step k, t = k dt
+    A    10⁵/(100 t) for t > 0
+    B    10⁵/100^t
+    C    10⁵/100^k at step k, t = k dt
 
 Only C dies within a few steps, as the text's negligible loss by friction and its two Newton
 iterations per step ask for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the
@@ -19,7 +21,8 @@ from vi_contact.core.checks import number
 
 Force = Callable[[float], float]
 FORCE = 1.0e5  # |r_N(0)| [N]
-DT, STEPS = 0.002, 1000
+DT = 0.002
+STEPS = 1000
 
 
 def published_mu(t: float, rate: float) -> float:

@@ -48,8 +48,11 @@ def stored_blocks(
         file.attrs.update(
             format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=dt, exterior=mesh.exterior
         )
-        file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
-        file["single"], file["double"], file["hyper"] = blocks.single, blocks.double, blocks.hyper
+        file["points"] = mesh.points
+        file["loop_sizes"] = np.array(mesh.loop_sizes)
+        file["single"] = blocks.single
+        file["double"] = blocks.double
+        file["hyper"] = blocks.hyper
 
     try:
         hdf5_atomically(target, fill)

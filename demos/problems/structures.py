@@ -27,10 +27,14 @@ from .frame_elements import frame, line
 from .plates import Plate, disk_mesh, plate_system, square_mesh
 
 SECTION = {"EA": 4.0e8, "EI": 2.0e6, "rho_A": 80.0}  # of all beams: N, N m², kg/m
-HEIGHT, ARM, END_LOAD = 3.0, 1.5, (2.0e4, -8.0e4)  # of the frame [m], [N]
+HEIGHT = 3.0  # of the frame [m]
+ARM = 1.5  # of the frame [m]
+END_LOAD = (2.0e4, -8.0e4)  # of the frame [N]
 HEAVY = LiftedBeam(EI=SECTION["EI"], q=800.0, P=2600.0)
 HEAVY_LENGTH, TIP_LENGTH = 10.0, 4.0  # [m]
-PLATE, SIDE, PRESSURE = Plate(), 2.0, 1000.0  # side of the square, diameter of the disk [m]; [Pa]
+PLATE = Plate()
+SIDE = 2.0  # of the square, and diameter of the disk [m]
+PRESSURE = 1000.0  # [Pa]
 CANTILEVER = 1.8751040687119611  # root of cos z cosh z = -1
 
 
@@ -73,7 +77,8 @@ def thrown_beam(count: int, gap: float, speed: float) -> tuple[ContactProblem, f
     Its tip goes at this speed [m/s] towards a stop. With it comes the time [s] at which it touches;
     tip = speed/omega sin omega t until then.
     """
-    x, z = np.linspace(0.0, TIP_LENGTH, count + 1), CANTILEVER / TIP_LENGTH
+    x = np.linspace(0.0, TIP_LENGTH, count + 1)
+    z = CANTILEVER / TIP_LENGTH
     ratio = (np.cosh(CANTILEVER) + np.cos(CANTILEVER)) / (np.sinh(CANTILEVER) + np.sin(CANTILEVER))
     mode = np.cosh(z * x) - np.cos(z * x) - ratio * (np.sinh(z * x) - np.sin(z * x))
     slope = z * (np.sinh(z * x) + np.sin(z * x) - ratio * (np.cosh(z * x) - np.cos(z * x)))
@@ -100,7 +105,8 @@ def plate_on_a_stop(
     load, force = clamped_disk() if disk else square_plate()
     on = disk_mesh(comm, size, cells) if disk else square_mesh(comm, size, cells)
     system = plate_system(on, PLATE, clamped=disk, pressure=PRESSURE)
-    w0, middle = load * PRESSURE * size**4 / PLATE.D, system.space.find_nodes(np.zeros((1, 3)))
+    w0 = load * PRESSURE * size**4 / PLATE.D
+    middle = system.space.find_nodes(np.zeros((1, 3)))
     surface = vc.contact_points(system, middle, [0.0, 0.0, -1.0], gap0=share * w0)
     return vc.ContactProblem(system, surface), (1.0 - share) * w0 / (force * size**2 / PLATE.D)
 
@@ -111,7 +117,8 @@ def disk_above_ground(comm: Any, cells: int, share: float) -> tuple[ContactProbl
     There are conditions at the vertices of its triangles. With it comes its closed form in units of
     the radius; ``share`` is that of the free deflection, at which the ground is.
     """
-    radius, known = 0.5 * SIDE, disk_on_ground(share / 64.0)
+    radius = 0.5 * SIDE
+    known = disk_on_ground(share / 64.0)
     on = disk_mesh(comm, radius, cells)
     system = plate_system(on, PLATE, clamped=True, pressure=PRESSURE)
     own = on.geometry.x[np.hypot(*on.geometry.x[:, :2].T) < 0.99 * radius]
@@ -149,7 +156,9 @@ def residual(problem: ContactProblem, state: State) -> float:
     largest force, and of penetration, over the largest displacement; the largest of reaction times
     gap over both. Collective.
     """
-    system, surface, comm = problem.static_load, problem.surface, problem.system.algebra.comm
+    system = problem.static_load
+    surface = problem.surface
+    comm = problem.system.algebra.comm
     load = system.load.at_rest(state.t)
     off = system.K @ state.u - load + surface.reaction_load(state.r_n, system.K.rows)
     left = surface.gap(state.t) - surface.normal_values(state.u)

@@ -41,8 +41,10 @@ BASE_INERTIA = {  # which mass the ground accelerates, and what log and summary 
         "inertia load of the ground motion: the whole mass, that which elements share with the "
         "base included"
     ),
-    "catalogue": "inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave "
-    "out the mass that elements share with the base",
+    "catalogue": (
+        "inertia load of the ground motion: the convention of the catalogue's reference numbers, "
+        "which leave out the mass that elements share with the base"
+    ),
 }
 
 

@@ -79,7 +79,9 @@ class RunComparison:
 
     def add(self, report: Report) -> None:
         """Add one more step. Collective."""
-        surface, system, mean = report.problem.surface, report.problem.system, report.balance
+        surface = report.problem.surface
+        system = report.problem.system
+        mean = report.balance
         load = surface.reaction_load(mean.r_n, system.rows, mean.r_t)
         # on the body [N]
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
@@ -100,7 +102,8 @@ class RunComparison:
 
         InputError for a reference in other dimensions, without common times, or with NaN.
         """
-        mine, theirs = np.array(self.impulse), np.asarray(reference.impulse, float)
+        mine = np.array(self.impulse)
+        theirs = np.asarray(reference.impulse, float)
         t = np.asarray(reference.times, float)
         common = (t >= self.times[0]) & (t <= self.times[-1] * (1.0 + 1e-12))
         if (

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Make the figures of the theory pages, and compare the numbers of the pages with those of the
-figures.
+"""Make the figures of the theory pages, and compare their numbers with those of the pages.
 
     python3 docs/theory/figures.py                       # all of them, into docs/figures
     python3 docs/theory/figures.py step friction         # two of them
@@ -40,22 +39,22 @@ BLUE, RED, GREEN, GREY = "tab:blue", "tab:red", "tab:green", "0.7"
 
 
 # Small bodies
-# --------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 def spring_mass(force: float) -> vc.ContactProblem:
-    """A mass of 1 kg on a spring of 100 N/m, pushed towards a wall that is 5 cm away."""
+    """Hang a mass of 1 kg on a spring of 100 N/m and push it towards a wall that is 5 cm away."""
     system = vc.system_from_arrays([1.0], None, [[100.0]], coordinates=[[0.0]], load=[force])
     return vc.ContactProblem(system, vc.contact_points(system, [0], [1.0], gap0=0.05))
 
 
 def two_masses() -> vc.ContactProblem:
-    """Two masses of 1 kg, each on a spring and joined by a third; each has a wall."""
+    """Join two masses of 1 kg, each on its own spring, by a third spring; each has a wall."""
     K = [[200.0, -100.0], [-100.0, 200.0]]
     system = vc.system_from_arrays([1.0, 1.0], None, K, coordinates=[[0.0], [1.0]], v0=[1.0, 0.2])
     return vc.ContactProblem(system, vc.contact_points(system, [0, 1], [1.0], gap0=[0.02, 0.04]))
 
 
 def bar(case: Any, n: int, *, damping: float = 0.0, **more: Any) -> vc.ContactProblem:
-    """A bar of n linear elements above its wall, section 1 m²; ``damping`` [s] times K is C."""
+    """Put a bar of n linear elements above its wall, section 1 m²; ``damping`` [s] times K is C."""
     h, side, ends = case.length / n, np.ones(n), np.full(n + 1, 2.0)
     ends[[0, -1]] = 1.0
     K = case.E / h * sp.diags([-side, ends, -side], [-1, 0, 1])
@@ -74,7 +73,7 @@ def bar(case: Any, n: int, *, damping: float = 0.0, **more: Any) -> vc.ContactPr
 
 
 def simulated(problem: vc.ContactProblem, scheme: Any, dt: float, t_end: float) -> Any:
-    """The history and the facts of a run."""
+    """Return the history and the facts of a run that writes nothing else."""
     found = vc.simulate(
         problem,
         scheme=scheme,
@@ -87,9 +86,9 @@ def simulated(problem: vc.ContactProblem, scheme: Any, dt: float, t_end: float) 
 
 
 # Figures
-# -------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 def inequality(path: Path) -> list[str]:
-    """Energy of the spring-mass beside its wall, and reactions against gaps for growing loads."""
+    """Draw the energy of a mass beside its wall, and reactions against gaps for growing loads."""
     k, g0, loads = 100.0, 0.05, (2.0, 8.0)
     figure, (left, right) = pair()
     u = np.linspace(-0.03, 0.11, 200)
@@ -147,8 +146,10 @@ def inequality(path: Path) -> list[str]:
 
 
 def step(path: Path) -> list[str]:
-    """The quadratic program of a midpoint step of two masses, and the energies that schemes leave
-    to an oscillator."""
+    """Draw the quadratic program of a midpoint step of two masses.
+
+    Beside it is the energy that schemes leave to an oscillator.
+    """
     dt, figure, axes = 0.05, *pair()
     ((_, report),) = vc.march(
         two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=dt, steps=1
@@ -219,13 +220,13 @@ def step(path: Path) -> list[str]:
 
 
 def released() -> vc.ContactProblem:
-    """A mass of 1 kg on a spring of 100 N/m that is let go at 1 cm and meets no wall."""
+    """Let a mass of 1 kg on a spring of 100 N/m go at 1 cm; it meets no wall."""
     system = vc.system_from_arrays([1.0], None, [[100.0]], coordinates=[[0.0]], u0=[0.01])
     return vc.ContactProblem(system, vc.contact_points(system, [0], [1.0], gap0=1.0))
 
 
 def blow_up(path: Path) -> list[str]:
-    """Contact force and energy of four schemes on the bar that bounces under its weight."""
+    """Draw contact force and energy of four schemes on the bar that bounces under its weight."""
     case, n, exact = BouncingBar(), 50, BouncingBar().force
     schemes = {
         "Newmark, mass at the contact node": (vc.Newmark(), vc.ConsistentMass()),
@@ -276,8 +277,7 @@ def blow_up(path: Path) -> list[str]:
 
 
 def certificate(path: Path) -> list[str]:
-    """Certificates of a run, of an answer that was spoiled, and beside the error of the
-    discretisation."""
+    """Draw certificates of a run, of answers that were spoiled, and beside the velocity's error."""
     case, reports, figure, axes = ThrownBar(), [], *pair(3, 3.2)
     n = 100
     dt = 0.5 * case.length / n / case.wave_speed
@@ -354,8 +354,7 @@ def certificate(path: Path) -> list[str]:
 
 
 def spoil(result: Any, problem: Any, what: str, size: float) -> Any:
-    """An answer with a reaction that is too large by ``size``, or with a foot that is that far in
-    the wall."""
+    """Return an answer with a reaction too large by ``size``, or a foot that far in the wall."""
     if what == "reaction":
         return replace(result, r_n=result.r_n * (1.0 + size))
     x = result.x.copy()
@@ -364,8 +363,10 @@ def spoil(result: Any, problem: Any, what: str, size: float) -> Any:
 
 
 def velocity_error(case: ThrownBar, n: int) -> tuple[float, float]:
-    """The relative error in the mean square of the velocities amid the contact, and the worst
-    certificate."""
+    """Return the relative error of the velocities amid the contact, and the worst certificate.
+
+    The error is that of the mean square.
+    """
     problem, h = bar(case, n), case.length / n
     at = case.contact_start + 0.5 * case.crossing
     steps = round(at / (0.5 * h / case.wave_speed))
@@ -379,8 +380,10 @@ def velocity_error(case: ThrownBar, n: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Careless(vc.ZienkiewiczWoodTaylor):
-    """The midpoint rule with a fault: the mean velocity of the step is taken for the one at its
-    end."""
+    """Step by the midpoint rule with a fault.
+
+    It takes the mean velocity of the step for the one at its end.
+    """
 
     phi: float = 0.5
 
@@ -392,8 +395,10 @@ class Careless(vc.ZienkiewiczWoodTaylor):
 
 
 def ledger(path: Path) -> list[str]:
-    """Where the energy of the clamped bar goes, and the defects of a sound and of a faulty
-    scheme."""
+    """Draw where the energy of the clamped bar goes, and the defects of two schemes.
+
+    One of them is sound, the other has a fault.
+    """
     case, n, end = PeriodicBar(), 20, 8.6
     dt, (figure, (left, right)) = 0.5 / n, pair()
     inelastic = vc.Inelastic(vc.ImpulseUpdate())
@@ -461,8 +466,7 @@ def ledger(path: Path) -> list[str]:
 
 
 def condensation(path: Path) -> list[str]:
-    """The Delassus operator of a block's face: the matrix, and how it decays, step by step
-    longer."""
+    """Draw the Delassus operator of a block's face, and how it decays for three time steps."""
     problem = hanging_block(
         (1.0, 0.5), (60, 30), (0.0, -300.0), gap=0.001, mass=vc.ConsistentMass()
     )
@@ -512,7 +516,7 @@ def condensation(path: Path) -> list[str]:
 
 
 def friction(path: Path) -> list[str]:
-    """How the fixed point on Tresca's law converges, and what the points of a rubbing block do."""
+    """Draw how the fixed point on Tresca's law converges, and what points of a rubbing block do."""
     figure, (left, right) = pair()
     G, none, rates = np.array([[1.0, 0.5], [0.5, 1.0]]), np.zeros(1), []
     method = solvers.FixedPoint()
@@ -590,14 +594,14 @@ def friction(path: Path) -> list[str]:
 
 
 def rubbing_block(mu: float) -> tuple[vc.ContactProblem, float]:
-    """A block that is pressed down and aside; a long time step."""
+    """Press a block down and aside, and return it with a long time step [s]."""
     return hanging_block((1.0, 1.0), (24, 24), (110.0, -200.0), friction=vc.Coulomb(mu)), 1.0
 
 
 def hanging_block(
     lengths: Any, divisions: Any, force: Any, gap: float = 0.0, **more: Any
 ) -> vc.ContactProblem:
-    """A block that hangs from its clamped top over the ground and is moved by body forces."""
+    """Hang a block by its clamped top over the ground, to be moved by body forces."""
     from mpi4py import MPI
 
     from vi_contact import fem
@@ -618,7 +622,7 @@ def hanging_block(
 
 
 def pair(rows: int = 2, height: float = 3.7, **more: Any) -> tuple[Any, Any]:
-    """A figure of panels above each other, as narrow as a telephone can show."""
+    """Make a figure of panels above each other, as narrow as a telephone can show."""
     figure, axes = canvas(rows, 1, (5.8, rows * height), **more)
     return figure, axes[:, 0]
 
@@ -630,7 +634,7 @@ PAGES: dict[str, Callable[[Path], list[str]]] = {
 
 
 def lacking(name: str, phrases: list[str]) -> list[str]:
-    """The phrases that the page of this name does not have, wherever its lines break."""
+    """Return the phrases that the page of this name does not have, wherever its lines break."""
     text = " ".join((ROOT / "docs" / "theory" / f"{name}.md").read_text(encoding="utf-8").split())
     return [phrase for phrase in phrases if " ".join(phrase.split()) not in text]
 

@@ -321,8 +321,14 @@ def claims(rows: list[dict[str, Any]]) -> list[str]:
         found = [row["lines"] for row in rows if row["name"] == name]
         return f"{min(found)} to {max(found)}"
 
-    blown = {one: [row["energy_end"] for row in rows if row["problem"] == one and row.get("energy_end", 0.0) > 2.0]
-             for one in ("thrown", "bar")}  # fmt: skip
+    blown = {
+        one: [
+            row["energy_end"]
+            for row in rows
+            if row["problem"] == one and row.get("energy_end", 0.0) > 2.0
+        ]
+        for one in ("thrown", "bar")
+    }
     peaks = [
         row["largest_force_error"]
         for row in rows

@@ -313,7 +313,7 @@ def test_a_gap_lost_to_rounding_is_named():
 
 
 # Finite elements
-# -----------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 @pytest.mark.slow
 def test_a_stiff_block_of_finite_elements(comm):
     """A 2D block of nine cells falls flat on a plane: rebound e, 1 %, on any number of ranks."""

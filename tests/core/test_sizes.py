@@ -26,11 +26,19 @@ pytestmark = pytest.mark.serial
 def touching(m: int) -> ContactProblem:
     """A chain of which every mass may touch."""
     problem = chain_problem(m)
-    return replace(problem, surface=replace(
-        problem.surface, points=np.zeros((m, 1)), normals=np.ones((m, 1)), weights=np.ones(m), gap0=np.ones(m),
-        bilateral=np.zeros(m, dtype=bool), compliance=np.zeros(m), owned=np.arange(m), slots=np.arange(m),
+    surface = replace(
+        problem.surface,
+        points=np.zeros((m, 1)),
+        normals=np.ones((m, 1)),
+        weights=np.ones(m),
+        gap0=np.ones(m),
+        bilateral=np.zeros(m, dtype=bool),
+        compliance=np.zeros(m),
+        owned=np.arange(m),
+        slots=np.arange(m),
         tangents=np.zeros((m, 0), dtype=np.int64),
-    ))  # fmt: skip
+    )
+    return replace(problem, surface=surface)
 
 
 def rubbing(m: int) -> Any:

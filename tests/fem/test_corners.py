@@ -222,7 +222,7 @@ def test_mirror_symmetry_of_an_oblique_wall():
 
 
 # Oblique frames
-# -------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -430,7 +430,7 @@ def test_an_inelastic_impact_on_one_face_of_a_corner():
 
 
 # Obstacles
-# ------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -544,7 +544,7 @@ def test_supports_released_beside_an_oblique_notch(tmp_path):
 
 
 # The feature angle
-# ----------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.two_ranks
@@ -650,7 +650,7 @@ def test_refusals():
 
 
 # Pairs
-# ----------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def notch(gap: float = 0.0, upper: int = 2) -> tuple[Any, Any]:
@@ -667,14 +667,19 @@ def notch(gap: float = 0.0, upper: int = 2) -> tuple[Any, Any]:
     }
     n = {"box": (2 * upper, upper), "under": (4, 2), "west": (2, 2), "east": (2, 2)}
     mesh, tags = fem.build_mesh(
-        Blocks({
-            name: BlockMesh(
-                lengths=(w, h), divisions=n[name], corner=(x, y), deform=smaller if name == "box" else None
-            )
-            for name, (x, y, w, h) in places.items()
-        }),
+        Blocks(
+            {
+                name: BlockMesh(
+                    lengths=(w, h),
+                    divisions=n[name],
+                    corner=(x, y),
+                    deform=smaller if name == "box" else None,
+                )
+                for name, (x, y, w, h) in places.items()
+            }
+        ),
         COMM,
-    )  # fmt: skip
+    )
     clamped = [tags["under_bottom"], tags["west_left"], tags["east_right"]]
     return fem.assemble(mesh, SOFT, clamped=clamped, loads=fem.BodyForce((200.0, -1e3))), tags
 

@@ -306,10 +306,17 @@ def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
         "upper0": (0.0, 1.0, 0.0),
         "upper": (1.0, 1.0, 0.0),
     }
-    mesh: Any = Blocks({
-        name: BlockMesh(lengths=(1.0,) * d, divisions=(n if name == "lower" else 2, 2, 2)[:d], corner=corner[:d],
-                        simplices=kind != "hexahedra") for name, corner in places.items()
-    })  # fmt: skip
+    mesh: Any = Blocks(
+        {
+            name: BlockMesh(
+                lengths=(1.0,) * d,
+                divisions=(n if name == "lower" else 2, 2, 2)[:d],
+                corner=corner[:d],
+                simplices=kind != "hexahedra",
+            )
+            for name, corner in places.items()
+        }
+    )
     for pair in (
         ("lower0_right", "lower_left"),
         ("upper0_right", "upper_left"),
@@ -388,11 +395,18 @@ def half(way: float, two: bool) -> tuple[ContactProblem, Array]:
         "under": ((0.0, -1.0), (3, 1, 3)),
         "west": ((-1.0, 0.0), (1, 3, 1)),
     }
-    mesh = Blocks({
-        name: BlockMesh(lengths=(1.0, 1.0, 1.0 * n), divisions=(*k[:2], k[2] * n), corner=(*xy, -way),
-                        deform=lambda x: bent(x, 0.0 if two else 1.0))
-        for name, (xy, k) in places.items() if two or name == "box"
-    })  # fmt: skip
+    mesh = Blocks(
+        {
+            name: BlockMesh(
+                lengths=(1.0, 1.0, 1.0 * n),
+                divisions=(*k[:2], k[2] * n),
+                corner=(*xy, -way),
+                deform=lambda x: bent(x, 0.0 if two else 1.0),
+            )
+            for name, (xy, k) in places.items()
+            if two or name == "box"
+        }
+    )
     built, tags = build_mesh(mesh, COMM)
     held = (
         () if way else [Prescribed(tags[f"{name}_back"], components=(2,)) for name in mesh.blocks]
@@ -459,10 +473,18 @@ def test_an_edge_between_tied_ends(two):
         x = np.column_stack([x[:, :2], x[:, 2] + share * x[:, 2] * (1.0 - x[:, 2])])
         return x @ SHAPES["prism"] @ PLACED["turned"].T
 
-    mesh = Blocks({
-        name: BlockMesh(lengths=(1.0,) * 3, divisions=k, corner=(*xy, 0.0), deform=partial(placed, share=uneven[name]))
-        for name, (xy, k) in places.items() if two or name == "box"
-    })  # fmt: skip
+    mesh = Blocks(
+        {
+            name: BlockMesh(
+                lengths=(1.0,) * 3,
+                divisions=k,
+                corner=(*xy, 0.0),
+                deform=partial(placed, share=uneven[name]),
+            )
+            for name, (xy, k) in places.items()
+            if two or name == "box"
+        }
+    )
     built, tags = build_mesh(mesh, COMM)
     ends = [Tied(tags[f"{name}_back"], tags[f"{name}_front"]) for name in mesh.blocks]
     push = [

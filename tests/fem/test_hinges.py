@@ -203,7 +203,8 @@ Point(1) = {0,0,0,h}; Point(2) = {2,0,0,h}; Point(3) = {2,1,0,h}; Point(4) = {0,
 Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
 Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
 Point(12) = {-3,0,0,h}; Point(13) = {-3,-3,0,1}; Point(14) = {5,-3,0,1}; Point(15) = {5,0,0,h};
-Line(11) = {1,12}; Line(12) = {12,13}; Line(13) = {13,14}; Line(14) = {14,15}; Line(15) = {15,2}; Line(16) = {2,1};
+Line(11) = {1,12}; Line(12) = {12,13}; Line(13) = {13,14};
+Line(14) = {14,15}; Line(15) = {15,2}; Line(16) = {2,1};
 Curve Loop(2) = {11:16}; Plane Surface(2) = {2};
 Transfinite Curve {1,16} = 9;
 Physical Surface("block") = {1}; Physical Surface("soil") = {2};

@@ -60,7 +60,7 @@ $EndElements
 
 
 # Survived
-# -------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def test_node_tags_may_start_anywhere_have_holes_and_come_unsorted(comm, shared_tmp):
@@ -193,8 +193,11 @@ def test_two_bodies_in_touch_keep_their_own_nodes_and_sides(comm, shared_tmp):
     each body."""
     nodes = {**SQUARE, **{tag + 4: (x, y + 1, 0) for tag, (x, y, _) in SQUARE.items()}}
     elements = [
-        (QUADRANGLE, 1, 1, (1, 2, 3, 4)), (QUADRANGLE, 2, 2, (5, 6, 7, 8)), (LINE, 3, 1, (3, 4)), (LINE, 4, 2, (5, 6))
-    ]  # fmt: skip
+        (QUADRANGLE, 1, 1, (1, 2, 3, 4)),
+        (QUADRANGLE, 2, 2, (5, 6, 7, 8)),
+        (LINE, 3, 1, (3, 4)),
+        (LINE, 4, 2, (5, 6)),
+    ]
     names = [(2, 1, "lower"), (2, 2, "upper"), (1, 3, "lower side"), (1, 4, "upper side")]
     mesh, tags = read_text(msh(nodes, elements, names), comm, shared_tmp)
     assert mesh.geometry.index_map().size_global == 8
@@ -211,7 +214,7 @@ def test_two_bodies_in_touch_keep_their_own_nodes_and_sides(comm, shared_tmp):
 
 
 # Refused
-# --------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def turned_quadrangle(order):

@@ -55,7 +55,7 @@ def marched(problem, steps=60, **options):
 
 
 # Displacements
-# --------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scheme", [vc.MoreauJean(), vc.ContactStabilisedNewmark()])
@@ -134,7 +134,7 @@ def test_corner_of_two_oblique_walls():
 
 
 # Rotations
-# ------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 
 def test_cantilever_on_a_stop():
@@ -272,8 +272,10 @@ def test_a_soft_spring_holds_a_stiff_body(stiff):
 @pytest.mark.parametrize("stiffness", [1.0e3, 0.0])
 def test_a_mass_without_stiffness_floats(stiffness):
     """It comes to rest on its stop, beside a mass on a spring or another of its kind."""
-    system = vc.system_from_arrays([1.0, 2.0], None, np.diag([stiffness, 0.0]), coordinates=[[0.0], [1.0]],
-                                   load=[-1.0, -2.0])  # fmt: skip
+    K = np.diag([stiffness, 0.0])
+    system = vc.system_from_arrays(
+        [1.0, 2.0], None, K, coordinates=[[0.0], [1.0]], load=[-1.0, -2.0]
+    )
     surface = vc.contact_points(system, [0, 1], [-1.0], gap0=0.01)
     problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
     state = vc.static_equilibrium(problem)
@@ -437,7 +439,7 @@ def test_frames_for_paraview(tmp_path):
 
 
 # Bad input
-# ------------------------------------------------------------------------------------------------------------
+# --------------------------------------------------------------------------------------------------
 
 ONE, POINTS = np.eye(2), [[0.0, 0.0]]
 

@@ -28,7 +28,8 @@ from vi_contact.ground_motion import (
 
 pytestmark = pytest.mark.serial
 
-"""Development records; they are not part of the project, so the tests on them are skipped where they are absent."""
+# Development records; they are not part of the project, so the tests on them are skipped where they
+# are absent.
 
 # file, samples, dt, PGA [m/s²] and its time, PGV, PGD, Arias, D5-95, final displacement; with half
 # a last digit each

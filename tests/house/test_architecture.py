@@ -26,7 +26,8 @@ from shaken import shaken
 for scheme in (vc.ZienkiewiczWoodTaylor(), vc.SS22(), vc.LinearMultistep.newmark()):
     for method in (ActiveSet(), Hildreth()):
         problem = shaken(vc.Inelastic())
-        for state, report in vc.march(problem, scheme=scheme, solver=vc.Condensed(method), dt=5e-3, steps=9):
+        solver = vc.Condensed(method)
+        for state, report in vc.march(problem, scheme=scheme, solver=solver, dt=5e-3, steps=9):
             pass
         assert report.new.active.all() and report.certificate.worst < 1e-12
 K, points = [[2.0, -1.0], [-1.0, 1.0]], [[0.0], [1.0]]
@@ -34,7 +35,8 @@ system = vc.system_from_arrays([1.0, 2.0], None, K, coordinates=points, load=[0.
 problem = vc.ContactProblem(system, vc.contact_points(system, [1], [1.0]), mass=vc.ConsistentMass())
 *_, (state, _) = vc.march(problem, scheme=vc.MoreauJean(), dt=1e-2, steps=9)
 assert state.r_n[0] > 0.0 and vi_contact.fem.XDMF(every=2).every == 2
-print(sorted({"petsc4py", "dolfinx", "ufl", "basix", "mpi4py", "gmsh", "matplotlib", "h5py"} & set(sys.modules)))
+heavy = {"petsc4py", "dolfinx", "ufl", "basix", "mpi4py", "gmsh", "matplotlib", "h5py"}
+print(sorted(heavy & set(sys.modules)))
 """
 METHODS = """from vi_contact.solvers.normal.active_set import ActiveSet
 from vi_contact.solvers.normal.hildreth import Hildreth

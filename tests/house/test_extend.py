@@ -126,7 +126,8 @@ def test_a_scheme_is_one_file_and_one_registry_line(tmp_path: Path) -> None:
 import vi_contact as vc
 from vi_contact.core.step import Scheme
 from vi_contact.studies.cases.vocabulary import names_of
-print(vc.BackwardEuler(), "BackwardEuler" in vc.__all__, "BackwardEuler" in names_of(Scheme), vc.__file__)
+name = "BackwardEuler"
+print(vc.BackwardEuler(), name in vc.__all__, name in names_of(Scheme), vc.__file__)
 """
     assert python(["-c", asked], tmp_path, str(tmp_path)).startswith(
         f"BackwardEuler() True True {tmp_path}"

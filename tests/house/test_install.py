@@ -165,7 +165,8 @@ import vi_contact as vc
 vc.simulate, vc.Condensed, vc.read_run
 from vi_contact import fem
 fem.assemble
-used = [one for one in (*sys.path, *(getattr(m, "__file__", None) or "" for m in list(sys.modules.values())))]
+files = [getattr(m, "__file__", None) or "" for m in list(sys.modules.values())]
+used = [*sys.path, *files]
 print(os.environ["CONDA_PREFIX"], sum(os.environ["CONDA_PREFIX"] in one for one in used))
 """
     assert ran(script, CONDA_PREFIX=str(tmp_path), CONDA_DEFAULT_ENV="marker") == f"{tmp_path} 0"

@@ -46,7 +46,9 @@ WRONG: list[Any] = [
     b"x",
 ]
 EXEMPT = {  # name -> why
-    "StepProblem": "made by schemes in every step; solvers check what they are given by its protocol",
+    "StepProblem": (
+        "made by schemes in every step; solvers check what they are given by its protocol"
+    ),
     "energy_balance": "called in every step with what a scheme has made",
     "kkt_residual": "called in every step with what scheme and solver have made",
     "Check": "an abstract class, which Python refuses to make",

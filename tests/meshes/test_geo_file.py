@@ -397,7 +397,8 @@ def curved_area(arrays: Any) -> float:
 def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
     """A disk of radius 1 m: the area is wrong by O(h⁴), a 16th after a division; 8 leaves room for
     the first mesh."""
-    disk = """SetFactory("OpenCASCADE"); Disk(1) = {0, 0, 0, 1}; Mesh.MeshSizeMax = 0.8; Mesh.MeshSizeMin = 0.8;
+    disk = """SetFactory("OpenCASCADE"); Disk(1) = {0, 0, 0, 1};
+    Mesh.MeshSizeMax = 0.8; Mesh.MeshSizeMin = 0.8;
     Mesh.ElementOrder = 2; Physical Surface("disk") = {1};"""
     path = written(tmp_path, disk)
     coarse, fine = (arrays_of(GeoFile(path=path, refine=n)) for n in (0, 1))
@@ -509,9 +510,11 @@ def test_groups_that_gmsh_would_cut_are_refused(tmp_path: Path, groups: str, sai
 
 def test_groups_are_what_their_lists_say(tmp_path: Path) -> None:
     """All kinds of lists; groups of branches that are not taken are none; in loops they grow."""
-    groups = """Physical Curve("all") = Curve{:}; Physical Curve("around") = Boundary{ Surface{1}; };
+    groups = """Physical Curve("all") = Curve{:};
+    Physical Curve("around") = Boundary{ Surface{1}; };
     Physical Curve("turned") = {-1, 2}; If (0) Physical Curve("no") = {99}; EndIf
-    Physical Curve("two") = {1}; For i In {2:2} Physical Curve("two") += {i}; EndFor Physical Curve("low", 70) =
+    Physical Curve("two") = {1};
+    For i In {2:2} Physical Curve("two") += {i}; EndFor Physical Curve("low", 70) =
     1; Physical Curve(9) = {3};"""
     path = written(
         tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups)

@@ -345,10 +345,12 @@ def test_welds_to_several_nodes_at_one_place_are_refused():
 
 
 DAM = """
-Point(1) = {0,0,0,1}; Point(2) = {2,0,0,1}; Point(3) = {2,1,0,1}; Point(4) = {0,1,0,1}; Point(5) = {0,2,0,1};
-Point(6) = {2,2,0,1};
-Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1}; Line(5) = {3,6}; Line(6) = {6,5}; Line(7) = {5,4};
-Curve Loop(1) = {1,2,3,4}; Plane Surface(1) = {1}; Curve Loop(2) = {-3,5,6,7}; Plane Surface(2) = {2};
+Point(1) = {0,0,0,1}; Point(2) = {2,0,0,1}; Point(3) = {2,1,0,1}; Point(4) = {0,1,0,1};
+Point(5) = {0,2,0,1}; Point(6) = {2,2,0,1};
+Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
+Line(5) = {3,6}; Line(6) = {6,5}; Line(7) = {5,4};
+Curve Loop(1) = {1,2,3,4}; Plane Surface(1) = {1};
+Curve Loop(2) = {-3,5,6,7}; Plane Surface(2) = {2};
 Physical Surface("rock") = {1}; Physical Surface("dam") = {2}; Physical Curve("bottom") = {1};
 """
 CASE = """

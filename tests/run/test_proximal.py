@@ -47,9 +47,18 @@ def certificate(problem: ContactProblem, state: State) -> Certificate:
     A = EffectiveMatrix(system.algebra.combine([(1.0, system.K)]), system.algebra)
     load = system.load.at_rest(state.t)
     step = StepProblem(
-        A=A, b=load, bound=surface.gap(state.t), surface=surface, scale=1.0, guess=old.u, active=old.active,
-        t=state.t, k=0, friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, state.t),
-    )  # fmt: skip
+        A=A,
+        b=load,
+        bound=surface.gap(state.t),
+        surface=surface,
+        scale=1.0,
+        guess=old.u,
+        active=old.active,
+        t=state.t,
+        k=0,
+        friction=problem.friction,
+        slip0=problem.slip_origin(old.u, old.t, state.t),
+    )
     result = StepResult(state.u, state.r_n, state.active, 0, "", r_t=state.r_t)
     reaction = surface.reaction_load(state.r_n, len(load), state.r_t)
     return replace(

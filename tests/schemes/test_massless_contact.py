@@ -100,10 +100,18 @@ def with_the_whole_matrix(problem: ContactProblem, state: State) -> tuple[Array,
     inner = ~system.massless
     A = EffectiveMatrix(system.algebra.with_identity_rows(system.K, inner), system.algebra)
     step = StepProblem(
-        A=A, b=np.where(inner, state.u, system.load(0.0) - system.K @ (inner * state.u)), bound=surface.gap(0.0),
-        surface=surface, scale=1.0, guess=state.u, active=state.active, t=0.0, k=0, friction=problem.friction,
+        A=A,
+        b=np.where(inner, state.u, system.load(0.0) - system.K @ (inner * state.u)),
+        bound=surface.gap(0.0),
+        surface=surface,
+        scale=1.0,
+        guess=state.u,
+        active=state.active,
+        t=0.0,
+        k=0,
+        friction=problem.friction,
         slip0=problem.slip_origin(state.u, 0.0, 0.0),
-    )  # fmt: skip
+    )
     result = Condensed().prepare(A, surface, 1.0).solve(step)
     return result.x, result.r_n
 

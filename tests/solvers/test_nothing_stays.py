@@ -23,8 +23,9 @@ from vi_contact.fem.communicators import give_back, kept
 
 compact.COMPACT = 0
 for mu in (0.0, 0.3):
+    friction = vc.Coulomb(mu) if mu else vc.Frictionless()
     for solver in (vc.Condensed(), vc.Iterative(), vc.Volume()):
-        problem = replace(thrown_box(MPI.COMM_WORLD), friction=vc.Coulomb(mu) if mu else vc.Frictionless())
+        problem = replace(thrown_box(MPI.COMM_WORLD), friction=friction)
         for _ in vc.march(problem, solver=solver, dt=1e-3, steps=2):
             pass
 del problem, solver, _

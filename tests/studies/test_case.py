@@ -658,9 +658,8 @@ def test_the_command_runs_checks_and_restarts(
     assert main(["run", str(WALL), "--set", "run.stepps=1", "--check"]) == 1
     said = capsys.readouterr().err
     assert (
-        said
-        == f"vi-contact: {WALL}: [run] has the unknown key 'stepps' for simulate: did you mean steps? Known: "
-        "dt, t_end, steps, out, tolerance, checkpoint_every\n"
+        said == f"vi-contact: {WALL}: [run] has the unknown key 'stepps' for simulate: "
+        "did you mean steps? Known: dt, t_end, steps, out, tolerance, checkpoint_every\n"
     )
 
 

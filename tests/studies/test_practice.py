@@ -207,13 +207,19 @@ PUSHED = """
 name = "released"
 type = "static"
 release = true
-system = {prescribed = [{facets = "left_side", components = [1]}, {facets = "right_side", components = [1]}]}
+system = {prescribed = [
+    {facets = "left_side", components = [1]},
+    {facets = "right_side", components = [1]},
+]}
 
 [[stage]]
 name = "pushed"
 type = "static"
 gravity = {acceleration = %r, direction = [%r, %r]}
-system = {prescribed = [{facets = "left_side", components = [1]}, {facets = "right_side", components = [1]}]}
+system = {prescribed = [
+    {facets = "left_side", components = [1]},
+    {facets = "right_side", components = [1]},
+]}
 """
 
 

@@ -5,11 +5,12 @@ A Runge-Kutta method replaces the derivative by a matrix delta(z)/dt of the shif
 that couples its stages (Lubich 1988; Banjai, Messner and Schanz 2012). Here: Radau IIA of two
 stages and order 3, A-stable, so that what is passive in continuous time stays passive:
 
-    delta(z) = (A + z/(1 - z) 1 bᵀ)⁻¹,    A = [5, -1; 9, 3]/12,  b its last row,    stages at shares 1/3, 1 of a step
+    delta(z) = (A + z/(1 - z) 1 bᵀ)⁻¹,    A = [5, -1; 9, 3]/12,  b its last row
 
-For u = C(d/dt) g, g enters here by its impulses J = ∫ g dt at the stages, so that means over steps
-are what counts, as in the energetic method, and a jump at the end of a step needs no rule of its
-own. With delta = X diag(delta_i) X⁻¹ and s_i = delta_i/dt at each point z of a circle,
+with stages at shares 1/3 and 1 of a step. For u = C(d/dt) g, g enters here by its impulses J = ∫ g
+dt at the stages, so that means over steps are what counts, as in the energetic method, and a jump
+at the end of a step needs no rule of its own. With delta = X diag(delta_i) X⁻¹ and s_i =
+delta_i/dt at each point z of a circle,
 
     û = X diag(s_i C(s_i)) X⁻¹ Ĵ,      Ĵ = dt (c + z/(1 - z) 1) ĝ   for g held in each step.
 

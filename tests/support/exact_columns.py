@@ -26,7 +26,8 @@ def reflected(history: History, delay: Array, t: Array, *, crossing: float) -> A
     """Return the waves that a load at the foot of a uniform bar or layer sends to its free top and
     back:
 
-        sum over k >= 0 of P(t - 2kT - x/c) + P(t - 2(k+1)T + x/c),   P(t) = integral of p from 0 to t.
+        sum over k >= 0 of P(t - 2kT - x/c) + P(t - 2(k+1)T + x/c)
+        P(t) = integral of p from 0 to t.
 
     With z the impedance rho c, T = length / c and p(t) the traction on the foot x = 0 (zero for t <
     0), the motion is that of the rigid free body plus q(x, t) / z, where q is this sum (d'Alembert;

@@ -4,11 +4,13 @@ A fuzz test makes its inputs from a seed. The suite takes seed 0, so that it fin
 run; ``bash tests/fuzz.sh --seed N`` takes others. An input that fails there is written into the
 folder ``fixed`` beside the test, and every later run of the suite begins with it:
 
-    FUZZ = Fuzz("records", __file__)                  # its fixed inputs are in <folder of the test>/fixed/records
+    # its fixed inputs are in <folder of the test>/fixed/records
+    FUZZ = Fuzz("records", __file__)
 
     @pytest.mark.fuzz
     def test_records() -> None:
-        FUZZ.each(100, lambda dice: mutated(TEXT, dice), check)      # the fixed ones first, then 100 new ones
+        # the fixed ones first, then 100 new ones
+        FUZZ.each(100, lambda dice: mutated(TEXT, dice), check)
 
 A property test of hypothesis takes the same seed, and finds the smallest input that fails:
 

@@ -70,7 +70,7 @@ def under_hertz(points: Array, a: float, force: Array, *, G: float, nu: float) -
 class Mindlin:
     """Two equal bodies under P, then under Q = share μ P (Cattaneo, Mindlin).
 
-        q = μ p0 [√(1 - r²/a²) - (c/a) √(1 - r²/c²)],   c = a (1 - Q/(μ P))^(1/3),   no slip on r < c
+        q = μ p0 [√(1 - r²/a²) - (c/a) √(1 - r²/c²)],  c = a (1 - Q/(μ P))^(1/3),  no slip on r < c
         shift of a body: 3 μ P (2 - ν)/(16 G a) [1 - (1 - Q/(μ P))^(2/3)]
 
     All slip is along Q: exact for ν = 0, where a shear traction along x moves the surface along x

@@ -25,7 +25,8 @@ from mpi4py import MPI
 from pathlib import Path
 from marched_chain import run_wall
 folder = Path({folder!r})
-run_wall(MPI.COMM_WORLD, folder, {steps}, checkpoint_every=5, restart=(folder / "checkpoint.npz").is_file())
+restart = (folder / "checkpoint.npz").is_file()
+run_wall(MPI.COMM_WORLD, folder, {steps}, checkpoint_every=5, restart=restart)
 """
 ROUND_OFF = ("certificate", "energy_defect", "loss_algorithmic")  # columns that are nothing else
 PATIENCE = 500.0  # s: Python, DOLFINx and the forms are loaded, or compiled, beside other programs

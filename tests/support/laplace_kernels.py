@@ -3,7 +3,8 @@ density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S,
 
-    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ,        r̂ = (x - y)/r.
+    G(x - y) = 1/s² [(s/c_S)² Phi_S I - grad grad (Phi_S - Phi_P)] = g1 I - g2 r̂ r̂ᵀ
+    r̂ = (x - y)/r.
 
 Convolution quadrature is built on them; the kernels of the time domain (bem.TimeKernels) are tested
 against them.

@@ -26,7 +26,8 @@ def csmip(
 ):
     """One channel: 25 text lines (shortened), 100 integers, 100 reals, then acceleration, velocity,
     displacement."""
-    text = f"""Corrected accelerogram   58000-L1000-14000.10       Chan  {channel}:  {name}         from
+    text = f"""Corrected accelerogram   58000-L1000-14000.10       Chan  {channel}:  {name}\
+         from
 Uncorrected Accelerogram Data             Processed: 08/24/14, CGS
 Rcrd of Sun Aug 24, 2014 03:20:33.0 PDT
 Station No. 58000   37.973N, 122.038W    Etna    s/n 2866  (3 Chns of  3 at Sta)
@@ -87,7 +88,8 @@ Values used when parameter of data value is unknown/unspecified:  -999, -999.000
         "\n".join("".join(f"{real:>15}" for real in reals[k : k + 5]) for k in range(0, 100, 5))
         + "\n"
     )
-    text += "   2 Comment line(s) follow, each starting with a |\n| Sensor: RT-131A-02\n|<PROCESS> AUTO\n"
+    text += "   2 Comment line(s) follow, each starting with a |\n"
+    text += "| Sensor: RT-131A-02\n|<PROCESS> AUTO\n"
     text += f"   {len(values)} {quantity} pts, approx  0 secs, units={units},Format=({form})\n"
     cells = cells or [f"{value:10.5f}" for value in values]
     return (

@@ -6,7 +6,8 @@ stresses are neglected and the horizontal displacements of all modes sin((2n-1) 
 the wall into the layer:
 
     p(y) = kappa rho a H sum_n 8/((2n-1)² pi²) sin((2n-1) pi y/2H),   kappa = psi_s²/psi_e
-    Q = ∫ p dy = kappa rho a H² 14 zeta(3)/pi³,      M = ∫ p y dy = kappa rho a H³ 32/pi⁴ sum_n (-1)ⁿ⁻¹/(2n-1)⁴
+    Q = ∫ p dy = kappa rho a H² 14 zeta(3)/pi³
+    M = ∫ p y dy = kappa rho a H³ 32/pi⁴ sum_n (-1)ⁿ⁻¹/(2n-1)⁴
 
 with psi_s² = 2/(1-nu) and psi_e² = (2-nu)/(1-nu), or psi_e = psi_s in the simpler form. y [m] is
 the height above the rock, p [Pa] the pressure of the layer on the wall for a body force rho a

@@ -24,7 +24,8 @@ class WavePacket:
     """Describe waves "P" or "S" around ``angle`` [rad] from the vertical, of one wavelength along
     x: ``period`` [m].
 
-        u = sum over k_y of weight(k_y) d cos(k_x x + k_y (y - centre) - w t),   k_x = 2 pi/period,   w = c |k|
+        u = sum over k_y of weight(k_y) d cos(k_x x + k_y (y - centre) - w t)
+        k_x = 2 pi/period,   w = c |k|
 
     with d the direction of motion and Gaussian weights of standard deviation 1/length: a packet of
     about 4 ``length`` [m] in height, around the height ``centre`` [m] at t = 0.

@@ -70,8 +70,10 @@ def per_body(problem: ContactProblem, load: Array) -> Array:
     block."""
     system, bodies = problem.system, problem.system.space.bodies
     columns = [
-        relative(problem, column * (bodies == body)) for body in (0, 1) for column in system.influence.T
-    ]  # fmt: skip
+        relative(problem, column * (bodies == body))
+        for body in (0, 1)
+        for column in system.influence.T
+    ]
     return np.asarray(system.algebra.comm.sum(np.column_stack(columns).T @ load)).reshape(2, -1)
 
 
@@ -183,9 +185,12 @@ def test_much_friction_is_a_weld():
         mesh = Welded(mesh, *sides)
     built, tags = build_mesh(mesh, COMM)
     cast = assemble(
-        built, box.material, loads=Traction(tags["head_top"], (0.0, -box.pressure), history=box.history),
-        clamped=[tags[name] for name in ("left_bottom", "right_bottom", "under_bottom")], section=vc.PlaneStrain(),
-    )  # fmt: skip
+        built,
+        box.material,
+        loads=Traction(tags["head_top"], (0.0, -box.pressure), history=box.history),
+        clamped=[tags[name] for name in ("left_bottom", "right_bottom", "under_bottom")],
+        section=vc.PlaneStrain(),
+    )
     whole = run(linear(cast), scheme=vc.Midpoint(), dt=2.5e-4, steps=60).u
     points = [np.round(field(system, system.u0)[0], 9) for system in (model.system, cast)]
     partner = np.array([np.argmin(np.abs(points[1] - point).max(axis=1)) for point in points[0]])

@@ -118,9 +118,12 @@ def test_v3_3_hertz_impact(mesh: str, bar: float, request: pytest.FixtureRequest
 
     Measured in percent, with 4, 5, 6, 8, 10, 12 cells in the contact radius (1685 to 29 365
     unknowns, 1 to 35 s):
-        approach  -3.3, -2.4, -1.9, -1.4, -1.1, -0.9        duration  -3.3, -2.0, -2.0, -1.5, -1.0, -1.0
-        force      4.2,  2.7,  2.4,  1.6,  1.3,  1.1        radius    -0.2, -0.8, -0.1, -0.3, -0.2, -0.1
-        history    4.6,  3.1,  2.5,  1.8,  1.4,  1.2        radius of Hertz for that force: -1.6 to -0.5
+        approach  -3.3, -2.4, -1.9, -1.4, -1.1, -0.9
+        duration  -3.3, -2.0, -2.0, -1.5, -1.0, -1.0
+        force      4.2,  2.7,  2.4,  1.6,  1.3,  1.1
+        radius    -0.2, -0.8, -0.1, -0.3, -0.2, -0.1
+        history    4.6,  3.1,  2.5,  1.8,  1.4,  1.2
+        radius of Hertz for that force: -1.6 to -0.5
     """
     found: Impact = request.getfixturevalue(mesh)
     for name, error in found.errors.items():
