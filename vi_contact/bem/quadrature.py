@@ -1,6 +1,6 @@
 """Place points and weights for double integrals over pairs of elements.
 
-They are split where a wave front cuts through.
+Both integrals are split where a wave front cuts through an element.
 
 A kernel at time t has square-root kinks at r = c_S t and r = c_P t and a logarithm at r = 0. Pairs
 of elements that do not touch are integrated with products of Gauss rules, or, where a front
