@@ -21,7 +21,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import real, shape_of, shown
+from .checks import called, real, shape_of, shown
 from .errors import InputError
 from .quantities import Between, Quantity, quantities
 
@@ -66,7 +66,7 @@ def check_fields(one: Any) -> None:
     It is not of its type, or beyond the limits that its annotation marks (``core.quantities``).
     Call it in ``__post_init__``.
     """
-    kind = type(one)
+    kind: Any = type(one)
     for name, asked in _fields(kind):
         _check(kind.__name__, name, getattr(one, name), asked)
 
@@ -91,7 +91,8 @@ def _check(owner: str, name: str, value: Any, asked: Quantity) -> None:
         return  # as most are: objects are built in loops
     one = None if limit is None else _one_number(kind)
     if one is None and not fits(value, kind):
-        told = f"give {words(kind)}" if limit is None or not limit.remedy else limit.remedy
+        told = limit.remedy if limit is not None and limit.remedy else f"give {words(kind)}"
+        told = told if asked.other is None else f"{called(value)}{asked.other.text}"
         raise InputError(f"{owner}: {asked.named(name)} is {shown(value)}; {told}")
     if limit is None or (value is None and type(None) in _members(kind)):
         return

@@ -143,7 +143,7 @@ def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
     """Return what can be called; InputError for anything else, and for a class."""
     if callable(value) and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def column_name(kind: str, name: Any) -> str:
@@ -167,7 +167,7 @@ def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...
     """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def instance(
@@ -180,7 +180,7 @@ def instance(
     """
     if isinstance(value, kinds):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def provides(
@@ -202,7 +202,7 @@ def provides(
     )
     if fits and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def array(
@@ -307,7 +307,8 @@ def shown(value: Any) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
 
 
-def _called(value: Any) -> str:
+def called(value: Any) -> str:
+    """Return the remedy for a class in place of an object, as the start of another one."""
     return f"make an object of it, {value.__name__}(…), or " if isinstance(value, type) else ""
 
 

@@ -6,8 +6,8 @@
     delay: Annotated[float | None, NotNegative, Unit("s")] = None
 
 From it come the check and its sentence (``core.arguments``), the unit in which case files take a
-number without one, and the schema of case files. Marks hold for every number of a value: for those
-of a list too, and not for None, functions and other objects.
+number without one, and the schema of case files. Marks hold for every number of a value, those of a
+list too, and not for None, functions and other objects.
 """
 
 import math
@@ -31,6 +31,13 @@ class Unit:
     def typed(self) -> str:
         """Return it as one types it in a case file, "kg/m3"."""
         return self.symbol.translate(_ASCII)
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """Say what to give in place of a value of another type, as "give a mesh of DOLFINx"."""
+
+    text: str
 
 
 @dataclass(frozen=True)
@@ -119,13 +126,15 @@ _WORDS = {
 class Quantity:
     """Hold what the annotation of an argument says of it.
 
-    kind: its type without marks; meaning: words for it, with its name in them.
+    kind: its type without marks; meaning: words for it, with its name in them; other: what to do
+    about another type.
     """
 
     kind: Any
     limit: Between | None = None
     unit: Unit | None = None
     meaning: str = ""
+    other: Remedy | None = None
 
     @property
     def symbol(self) -> str:
@@ -169,12 +178,16 @@ def _quantity(hint: Any, kind: Any) -> Quantity:
     for mark in _marks(hint):
         if found.setdefault(type(mark), mark) != mark:
             raise TypeError(f"{hint} says two things at once: {found[type(mark)]!r} and {mark!r}")
-    return Quantity(kind, found.get(Between), found.get(Unit), found.get(str, ""))
+    return Quantity(
+        kind, found.get(Between), found.get(Unit), found.get(str, ""), found.get(Remedy)
+    )
 
 
 def _marks(hint: Any) -> Iterator[Any]:
     """Yield the marks of a hint, those inside unions and lists too."""
     if get_origin(hint) is Annotated:
-        yield from (one for one in hint.__metadata__ if isinstance(one, Between | Unit | str))
+        yield from (
+            one for one in hint.__metadata__ if isinstance(one, Between | Unit | Remedy | str)
+        )
     for one in get_args(hint):
         yield from _marks(one)
