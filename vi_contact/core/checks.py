@@ -103,35 +103,6 @@ def counted(
     return int(value)
 
 
-def attributes(
-    owner: object,
-    *,
-    finite: tuple[str, ...] = (),
-    positive: tuple[str, ...] = (),
-    not_negative: tuple[str, ...] = (),
-    counts: tuple[str, ...] = (),
-    flags: tuple[str, ...] = (),
-) -> None:
-    """Raise InputError that names the first attribute of ``owner`` which is wrong.
-
-    Wrong is what is not a finite number, or not > 0, or not >= 0, or no whole number of at least 1
-    (``counts``), or neither True nor False (``flags``).
-    """
-    what = type(owner).__name__
-    for name in finite + positive + not_negative:
-        number(
-            what,
-            name,
-            getattr(owner, name),
-            positive=name in positive,
-            not_negative=name in not_negative,
-        )
-    for name in counts:
-        whole(what, name, getattr(owner, name), least=1)
-    for name in flags:
-        flag(what, name, getattr(owner, name))
-
-
 def flag(owner: str, meaning: str, value: Any) -> bool:
     """Return True or False; InputError for anything else, 0 and 1 too."""
     if isinstance(value, bool | np.bool_):

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 ENDS = ("[]", "[)", "(]", "()")
-_ASCII = str.maketrans({"²": "2", "³": "3", "·": "*"})
+_ASCII = str.maketrans({"²": "2", "³": "3", "·": "*", " ": "*"})
 
 
 @dataclass(frozen=True)

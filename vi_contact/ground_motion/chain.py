@@ -5,9 +5,11 @@ The last step scales them to a measure.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from ..core.checks import number
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Unit
 from .intensity import arias, pga, psa
 from .processing import (
     baseline_corrected,
@@ -36,19 +38,19 @@ class Processing:
     when more than one scaling is asked for; calling raises that of the steps.
     """
 
-    trim: tuple[float, float | None] | None = None
-    pad: tuple[float, float] | None = None
+    trim: Annotated[tuple[float, float | None] | None, Unit("s")] = None
+    pad: Annotated[tuple[float, float] | None, Unit("s")] = None
     mean: bool = False
-    taper: float | None = None
-    low: float | None = None
-    high: float | None = None
+    taper: Annotated[float | None, RATIO] = None
+    low: Annotated[float | None, Unit("Hz")] = None
+    high: Annotated[float | None, Unit("Hz")] = None
     order: int = 4
     causal: bool = False
-    resample: float | None = None
+    resample: Annotated[float | None, Unit("s")] = None
     baseline: int | None = None
-    scale: float | None = None
-    pga: float | None = None
-    arias: float | None = None
+    scale: Annotated[float | None, RATIO] = None
+    pga: Annotated[float | None, Unit("m/s²")] = None
+    arias: Annotated[float | None, Unit("m/s")] = None
     psa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:

@@ -5,13 +5,14 @@ It is run again with the stiffness and damping that its strains ask for.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 
 from ..core.algebra import Array, largest
 from ..core.checks import at, function, instance, number, refuse, several
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Positive
 from ..fem import compat
 from ..fem.communicators import MpiComm
 from ..fem.forms import KINDS, Materials, cell_constants
@@ -47,7 +48,7 @@ def strain_compatible(
     curves: Sequence[tuple[Cells, SoilCurves]],
     run: Callable[[Heterogeneous, LargestStrain], T],
     *,
-    ratio: float = 0.65,
+    ratio: Annotated[float, Positive, RATIO] = 0.65,
     tolerance: float = 0.01,
     most: int = 20,
 ) -> StrainCompatible[T]:
