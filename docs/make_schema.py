@@ -107,6 +107,9 @@ def _limited(schema: dict[str, Any], limit: Between | None) -> dict[str, Any]:
         return schema | {"items": _limited(schema["items"], limit)} if "items" in schema else schema
     if not {"number", "integer"} & {*schema.get("type", ())}:
         return schema
+    if "integer" in schema["type"]:
+        whole = {"minimum": limit.least(), "maximum": limit.most()}
+        return schema | {word: end for word, end in whole.items() if math.isfinite(end)}
     low, high = ("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")
     ends = ((low, limit.low, limit.ends[0] == "("), (high, limit.high, limit.ends[1] == ")"))
     return schema | {words[out]: end for words, end, out in ends if math.isfinite(end)}

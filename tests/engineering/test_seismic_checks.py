@@ -428,7 +428,7 @@ def test_racking_of_a_run() -> None:
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda: Wood(**(LAYER | {"nu": 0.6})), "nu is 0.6: give one from 0 to 0.5$"),
+        (lambda: Wood(**(LAYER | {"nu": 0.6})), "nu is 0.6; give one from 0 to 0.5$"),
         (lambda: VeletsosYounan(**LAYER, damping=0.0), "damping is 0.0"),
         (lambda: Wood(**LAYER, length=-1.0), "length is -1.0"),
         (lambda: MononobeOkabe(**WALL, phi=0.5, kh=-0.1), "kh is -0.1"),

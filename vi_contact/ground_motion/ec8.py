@@ -28,8 +28,8 @@ class EC8Spectrum:
     `on_ground` and `vertical` have its tables.
 
     ag: design ground acceleration on ground A, gamma_I a_gR; s: soil factor; tb, tc, td: corner
-    periods; damping: ratio; plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers. Raises
-    InputError unless tb <= tc <= td.
+    periods; damping: ratio; plateau: 2.5, or 3.0 vertically. A National Annex may give other
+    numbers. Raises InputError unless tb <= tc <= td.
     """
 
     ag: Annotated[float, Positive, Unit("m/s²")]
