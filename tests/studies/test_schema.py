@@ -54,6 +54,17 @@ def test_keys_have_the_limits_units_and_meanings_of_annotations() -> None:
     assert rules["properties"]["run"]["properties"]["t_end"]["description"].startswith("in s,")
 
 
+def within(value: float, rule: Any) -> bool:
+    """Whether a number is within the limits of a rule."""
+    low, high = rule.get("minimum", value), rule.get("maximum", value)
+    above, below = rule.get("exclusiveMinimum"), rule.get("exclusiveMaximum")
+    return (
+        low <= value <= high
+        and (above is None or above < value)
+        and (below is None or value < below)
+    )
+
+
 def valid(value: Any, rule: Any, whole: Any) -> bool:
     """Whether a value keeps to a rule of JSON schema, of the words that ours has."""
     if "$ref" in rule:
@@ -82,13 +93,8 @@ def valid(value: Any, rule: Any, whole: Any) -> bool:
         return False
     if "anyOf" in rule and not any(valid(value, one, whole) for one in rule["anyOf"]):
         return False
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        low, high = rule.get("minimum", value), rule.get("maximum", value)
-        above, below = rule.get("exclusiveMinimum"), rule.get("exclusiveMaximum")
-        if not low <= value <= high or not (above is None or above < value):
-            return False
-        if not (below is None or value < below):
-            return False
+    if isinstance(value, int | float) and not within(value, rule):
+        return False
     if isinstance(value, list):
         return all(valid(one, rule.get("items", {}), whole) for one in value)
     if not isinstance(value, dict):

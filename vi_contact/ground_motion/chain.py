@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from ..core.checks import number
+from ..core.arguments import checked
 from ..core.errors import InputError
-from ..core.quantities import RATIO, Unit
+from ..core.quantities import RATIO, Positive, Unit
 from .intensity import arias, pga, psa
 from .processing import (
     baseline_corrected,
@@ -103,39 +103,43 @@ class Processing:
         return record
 
 
-def scaled_to_pga(record: Record, target: float) -> Record:
-    """Scale a record so that its largest |acceleration| is `target` [m/s²], and keep its sign.
+@checked
+def scaled_to_pga(record: Record, target: Annotated[float, Positive, Unit("m/s²")]) -> Record:
+    """Scale a record so that its largest |acceleration| is `target`, and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
+    Raises InputError for a record that is all zero.
     """
-    return scaled(record, factor=_ratio(record, "scaled_to_pga", target, pga(record)))
+    return scaled(record, factor=_ratio(record, target, pga(record)))
 
 
-def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:
-    """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²].
+@checked
+def scaled_to_psa(
+    record: Record,
+    target: Annotated[float, Positive, Unit("m/s²")],
+    period: float,
+    *,
+    damping: float = 0.05,
+) -> Record:
+    """Scale a record so that its pseudo-acceleration at `period` [s] is `target`.
 
     Its sign is kept.
 
-    Raises InputError unless target > 0 and the record is not all zero.
+    Raises InputError for a record that is all zero.
     """
-    return scaled(
-        record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping))
-    )
+    return scaled(record, factor=_ratio(record, target, psa(record, period, damping=damping)))
 
 
-def scaled_to_arias(record: Record, target: float) -> Record:
-    """Scale a record so that its Arias intensity is `target` [m/s], and keep its sign.
+@checked
+def scaled_to_arias(record: Record, target: Annotated[float, Positive, Unit("m/s")]) -> Record:
+    """Scale a record so that its Arias intensity is `target`, and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
+    Raises InputError for a record that is all zero.
     """
-    return scaled(
-        record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record)))
-    )
+    return scaled(record, factor=math.sqrt(_ratio(record, target, arias(record))))
 
 
-def _ratio(record: Record, name: str, target: float, value: float) -> float:
+def _ratio(record: Record, target: float, value: float) -> float:
     """Return target / value."""
-    number(name, "target", target, positive=True)
     if value == 0.0:
         raise InputError(f"{record.source or 'Record'}: every sample is zero; scale another record")
     return target / value
