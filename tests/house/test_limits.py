@@ -17,6 +17,7 @@ from test_wrong_types import callables, right
 from vi_contact.core.arguments import _check, fits
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Between, Quantity, quantities
+from vi_contact.engineering import checks
 from vi_contact.studies.cases.vocabulary import _FUNCTIONS
 
 pytestmark = pytest.mark.serial
@@ -39,7 +40,8 @@ def marked() -> Iterator[tuple[str, Callable[..., Any], str, Quantity]]:
         for one in (found() for found in words.values())
         if inspect.isfunction(one) and one.__module__.endswith("vocabulary")
     ]
-    for name, found in [*callables(), *cases]:
+    of_checks = [(f"checks.{one}", getattr(checks, one)) for one in checks.__all__]
+    for name, found in [*callables(), *of_checks, *cases]:
         plain = inspect.isclass(found) and not hasattr(found, "__dataclass_fields__")
         said = quantities(found.__init__ if plain else found)  # type: ignore[misc]
         for argument in inspect.signature(found).parameters if said else ():
@@ -90,7 +92,7 @@ def test_every_limit_of_an_annotation_is_told() -> None:
             except Exception as error:  # what is made without a body may raise anything
                 defects.append(f"{name}({argument}={wrong}): {type(error).__name__} {error}")
     assert not defects, "\n".join(defects)
-    assert count > 150
+    assert count > 180
 
 
 def call(found: Callable[..., Any], argument: str, wrong: Any, values: dict[str, Any]) -> None:
