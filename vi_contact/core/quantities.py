@@ -167,8 +167,9 @@ def quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
     try:
         marked, bare = get_type_hints(owner, include_extras=True), get_type_hints(owner)
     except NameError:
-        bases = owner.__mro__[1:-1] if isinstance(owner, type) else ()
-        return quantities(bases[0]) if bases else MappingProxyType({})
+        if not isinstance(owner, type) or owner.__base__ is object:
+            raise
+        return quantities(owner.__mro__[1])
     return MappingProxyType({name: _quantity(marked[name], bare[name]) for name in bare})
 
 
