@@ -11,6 +11,7 @@ case files may say:
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from inspect import getdoc
@@ -19,11 +20,12 @@ from typing import Any, get_args, get_origin
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # of this clone, installed or not
 
+from vi_contact.core.quantities import Between
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.studies.cases.case import _TABLES
 from vi_contact.studies.cases.own_classes import is_protocol
 from vi_contact.studies.cases.parsing import Words, choices_of, is_list, is_path, members_of
-from vi_contact.studies.cases.quantities import AT_START, FIELD, HISTORY, Expression, unit_of
+from vi_contact.studies.cases.quantities import AT_START, FIELD, HISTORY, Expression
 from vi_contact.studies.cases.stage_tables import BY_KEY, WHOLE
 from vi_contact.studies.cases.table_calls import Callee
 from vi_contact.studies.cases.vocabulary import words
@@ -96,6 +98,24 @@ def _lines(table: dict[str, Any]) -> str:
     )
 
 
+def _limited(schema: dict[str, Any], limit: Between | None) -> dict[str, Any]:
+    """Return the schema with limits, which hold for its numbers; texts with units stay allowed."""
+    if limit is None:
+        return schema
+    if "anyOf" in schema:
+        return schema | {"anyOf": [_limited(one, limit) for one in schema["anyOf"]]}
+    if schema.get("type") == "array":
+        return schema | {"items": _limited(schema["items"], limit)} if "items" in schema else schema
+    if not {"number", "integer"} & {*schema.get("type", ())}:
+        return schema
+    if "integer" in schema["type"]:
+        whole = {"minimum": limit.least(), "maximum": limit.most()}
+        return schema | {word: end for word, end in whole.items() if math.isfinite(end)}
+    low, high = ("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")
+    ends = ((low, limit.low, limit.ends[0] == "("), (high, limit.high, limit.ends[1] == ")"))
+    return schema | {words[out]: end for words, end, out in ends if math.isfinite(end)}
+
+
 class _Schema:
     def __init__(self, words: Words) -> None:
         self._words = words
@@ -122,12 +142,12 @@ class _Schema:
         }
 
     def _key(self, target: Callee, key: str) -> dict[str, Any]:
-        found, unit = self.of(target.hints[key]), unit_of(target.name, key)
-        return (
-            found
-            if unit in (None, "1") or not found
-            else found | {"description": f"in {unit}, or with its unit"}
-        )
+        """Return the schema of a key: its type, with limits, meaning and unit of its annotation."""
+        said, unit = target.said[key], target.unit(key)
+        found = _limited(self.of(said.kind), said.limit)
+        words = [said.meaning] if said.meaning else []
+        words += [f"in {unit}, or with its unit"] if unit not in (None, "1") else []
+        return found | {"description": ", ".join(words)} if words and found else found
 
     def _one(self, member: Any) -> list[dict[str, Any]]:
         if member in (Any, object):

@@ -12,15 +12,17 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from vi_contact.core.checks import MOST_CELLS, attributes, counted
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 from vi_contact.meshes.gmsh_session import options
 
 _TRIANGLE = 2  # Gmsh's number
@@ -43,15 +45,15 @@ class BallMesh:
     small by about 0.35 (coarsest/radius)². Raises InputError for sizes that make no ball.
     """
 
-    radius: float
-    size: float
-    foot: float
-    growth: float = 0.3
+    radius: Annotated[float, Positive, Unit("m")]
+    size: Annotated[float, Positive, Unit("m")]
+    foot: Annotated[float, Positive, Unit("m")]
+    growth: Annotated[float, Positive] = 0.3
     coarsest: float | None = None
     eighth: bool = False
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("radius", "size", "foot", "growth"))
+        check_fields(self)
         if not (self.size <= self.foot < self.radius and self.size <= self._largest <= self.radius):
             raise InputError(
                 f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m, "

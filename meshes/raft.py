@@ -13,15 +13,17 @@ import sys
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from vi_contact.core.checks import MOST_CELLS, array, attributes, counted
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import MOST_CELLS, array, counted
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,18 +41,18 @@ class RaftMesh:
 
     raft: tuple[float, ...] = (12.0, 9.0, 1.5)
     core: tuple[float, ...] = (0.75, 0.0, 8.0, 6.0)
-    wall: float = 0.8
+    wall: Annotated[float, Positive, Unit("m")] = 0.8
     storeys: tuple[float, ...] = (4.0, 4.0, 4.0)
-    slab: float = 0.6
+    slab: Annotated[float, Positive, Unit("m")] = 0.6
     soil: tuple[float, ...] = (42.0, 36.0, 12.0)
-    size: float = 1.2
-    soil_size: float = 0.8
-    far: float = 4.0
+    size: Annotated[float, Positive, Unit("m")] = 1.2
+    soil_size: Annotated[float, Positive, Unit("m")] = 0.8
+    far: Annotated[float, Positive, Unit("m")] = 4.0
 
     def __post_init__(self) -> None:
         for name, count in (("raft", 3), ("core", 4), ("storeys", None), ("soil", 3)):
             array("RaftMesh", name, getattr(self, name), (count,), unit="metres")
-        attributes(self, positive=("wall", "slab", "size", "soil_size", "far"))
+        check_fields(self)
         (lx, ly, thick), (x, y, cx, cy), (wide, deep, depth) = self.raft, self.core, self.soil
         inside = (
             2.0 * self.wall < min(cx, cy)

@@ -18,15 +18,18 @@ of its left node, so that h -> 0 clamps the rotation: theta(l) = 0 instead of th
 here to reproduce the source; theta_x(l) = 0 is natural and needs no special function.
 """
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes, counted, number, whole
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import counted, number
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Between
 
 from .values import Rod, TimoshenkoBeam
 
@@ -46,19 +49,13 @@ class Elements:
     than two elements, and for a published end with reduced shear, which the source does not have.
     """
 
-    count: int = 100
+    count: Annotated[int, Between(2, math.inf)] = 100
     reduced_shear: bool = True
     published_end: bool = False
 
     def __post_init__(self) -> None:
-        counted(
-            "Elements",
-            "count",
-            whole("Elements", "count", self.count, least=2),
-            "elements",
-            most=MOST,
-        )
-        attributes(self, flags=("reduced_shear", "published_end"))
+        check_fields(self)
+        counted("Elements", "count", self.count, "elements", most=MOST)
         if self.published_end and self.reduced_shear:
             raise InputError(
                 "Elements: the published end function goes with reduced_shear=False, as in the "

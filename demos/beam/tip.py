@@ -14,10 +14,11 @@ eps [m] is a slip per *step*, not a speed: the rate that is rounded off is eps/d
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import StepFailure
+from vi_contact.core.quantities import Positive, Unit
 
 
 @dataclass(frozen=True)
@@ -57,27 +58,20 @@ class RegularisedFriction:
 
         F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
 
-    eps [m] > 0. ``tolerance``: |F| over c eps² (plus the round-off of F); ``absolute`` [N m]
-    replaces it: 1e-10 in the source. F has one zero, between 0 and the frictionless slip g/c, but
+    ``tolerance``: |F| over c eps² (plus the round-off of F); ``absolute`` replaces it: 1e-10 in the source. F has one zero, between 0 and the frictionless slip g/c, but
     is not monotonic where the slip is large beside eps; Newton's method may then run away.
     ``safeguard`` bisects when an iterate leaves the bracket of the zero; off, the method is the
-    source's. InputError for numbers out of range.
+    source's.
     """
 
-    eps: float
-    tolerance: float = 1e-12
-    absolute: float | None = None
-    max_iterations: int = 60
+    eps: Annotated[float, Positive, Unit("m")]
+    tolerance: Annotated[float, Positive] = 1e-12
+    absolute: Annotated[float | None, Positive, Unit("N m")] = None
+    max_iterations: Annotated[int, Positive] = 60
     safeguard: bool = True
 
     def __post_init__(self) -> None:
-        given = () if self.absolute is None else ("absolute",)
-        attributes(
-            self,
-            positive=("eps", "tolerance", *given),
-            counts=("max_iterations",),
-            flags=("safeguard",),
-        )
+        check_fields(self)
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
         """Return the zero of F.

@@ -5,11 +5,14 @@ They have coefficients and the state they start from (Ahn 2012, section 2).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, attributes, function, optional, shape_of
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import array, function, optional, shape_of
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 
 Profile = Callable[[Array], Array]
 
@@ -23,23 +26,21 @@ class TimoshenkoBeam:
         rho I theta'' = E I theta_xx + K A G (u_x - theta) + viscosity (same terms of the rates)
         rho A u''     = K A G (u_xx - theta_x) + viscosity (same terms of the rates) + f(t)
 
-    length [m]; rho [kg/m³]; area A [m²]; inertia I [m⁴]; E, G [Pa]; shear_factor K [-]; viscosity
-    a2 [s] >= 0. The defaults are Ahn's, with EI = KAG = 100; his viscosities are 0.001 and 2 s.
-    InputError for numbers out of range.
+    area: A; inertia: I; shear_factor: K; viscosity: a2. The defaults are Ahn's, with EI = KAG =
+    100; his viscosities are 0.001 and 2 s.
     """
 
-    length: float = 5.0
-    rho: float = 1.0
-    area: float = 1.0
-    inertia: float = 1.0
-    E: float = 100.0
-    G: float = 100.0
-    shear_factor: float = 1.0
-    viscosity: float = 0.0
+    length: Annotated[float, Positive, Unit("m")] = 5.0
+    rho: Annotated[float, Positive, Unit("kg/m³")] = 1.0
+    area: Annotated[float, Positive, Unit("m²")] = 1.0
+    inertia: Annotated[float, Positive, Unit("m⁴")] = 1.0
+    E: Annotated[float, Positive, Unit("Pa")] = 100.0
+    G: Annotated[float, Positive, Unit("Pa")] = 100.0
+    shear_factor: Annotated[float, Positive] = 1.0
+    viscosity: Annotated[float, NotNegative, Unit("s")] = 0.0
 
     def __post_init__(self) -> None:
-        positive = ("length", "rho", "area", "inertia", "E", "G", "shear_factor")
-        attributes(self, positive=positive, not_negative=("viscosity",))
+        check_fields(self)
 
     @property
     def bending_stiffness(self) -> float:
@@ -60,26 +61,25 @@ class Rod:
 
         rho A v'' = E A (v_xx + viscosity v'_xx) + body_force(t),    v(length) <= gap
 
-    length [m]; rho [kg/m³]; area [m²]; E [Pa]; viscosity a1/c1 [s] >= 0; gap [m] >= 0; body_force
-    [N/m] (f_h of the paper, uniform) and end_force [N] pull towards the wall for positive values.
-    InputError for numbers out of range.
+    viscosity: a1/c1; body_force [N/m] (f_h of the paper, uniform) and end_force [N] pull towards
+    the wall for positive values.
     """
 
-    length: float = 5.0
-    rho: float = 1.0
-    area: float = 1.0
-    E: float = 100.0
-    viscosity: float = 0.0
-    gap: float = 0.0
+    length: Annotated[float, Positive, Unit("m")] = 5.0
+    rho: Annotated[float, Positive, Unit("kg/m³")] = 1.0
+    area: Annotated[float, Positive, Unit("m²")] = 1.0
+    E: Annotated[float, Positive, Unit("Pa")] = 100.0
+    viscosity: Annotated[float, NotNegative, Unit("s")] = 0.0
+    gap: Annotated[float, NotNegative, Unit("m")] = 0.0
     body_force: Callable[[float], float] | None = None
     end_force: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
         for name in ("body_force", "end_force"):
             optional(
                 function, "Rod", name, getattr(self, name), "give a function of the time, or None"
             )
+        check_fields(self)
 
 
 @dataclass(frozen=True)

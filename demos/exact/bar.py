@@ -12,13 +12,14 @@ return one of the two values.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 
 # of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
 _PERIOD_THREE = 0.5 * np.array(
@@ -34,13 +35,13 @@ _PERIOD_THREE = 0.5 * np.array(
 class UprightBar:
     """Hold what upright bars have in common.
 
-    That is length, height above the wall [m], E [Pa], rho [kg/m³].
+    That is length, height above the wall, E, rho.
     """
 
-    length: float = 10.0
-    E: float = 900.0
-    rho: float = 1.0
-    height: float = 5.0
+    length: Annotated[float, Positive, Unit("m")] = 10.0
+    E: Annotated[float, Positive, Unit("Pa")] = 900.0
+    rho: Annotated[float, Positive, Unit("kg/m³")] = 1.0
+    height: Annotated[float, NotNegative, Unit("m")] = 5.0
 
     @property
     def wave_speed(self) -> float:
@@ -61,15 +62,13 @@ class ThrownBar(UprightBar):
 
         u = -height - v0 min(x/c, T - |s - T|),   s = t - height/v0,   p = rho c v0 for 0 < s < 2T,
 
-    which contains the rigid motions with -v0 before the contact and +v0 after it. length, height
-    [m]; speed [m/s]; E [Pa]; rho [kg/m³]. Raises InputError unless all are finite and positive
-    (height may be 0).
+    which contains the rigid motions with -v0 before the contact and +v0 after it.
     """
 
-    speed: float = 10.0
+    speed: Annotated[float, Positive, Unit("m/s")] = 10.0
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("length", "E", "rho", "speed"), not_negative=("height",))
+        check_fields(self)
 
     @property
     def contact_start(self) -> float:

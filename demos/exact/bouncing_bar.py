@@ -18,14 +18,16 @@ thousand or so after five.
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from demos.exact.bar import UprightBar
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 
 # events and piece ends closer than this, relative to the problem's own scales, are the same
 COINCIDENT = 1e-12
@@ -39,15 +41,14 @@ class BouncingBar(UprightBar):
 
     The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f,
     and the first contact, of length 2T, has p = rho c g (t_f + r), r the time since touch-down; the
-    second has it in reverse. length, height [m]; E [Pa]; rho [kg/m³]; gravity [m/s²]. Raises
-    InputError unless all are finite and positive (height may be 0). Methods take t >= 0; where
+    second has it in reverse. Methods take t >= 0; where
     velocity and pressure jump they return the later value.
     """
 
-    gravity: float = 10.0
+    gravity: Annotated[float, Positive, Unit("m/s²")] = 10.0
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("length", "E", "rho", "gravity"), not_negative=("height",))
+        check_fields(self)
 
     @property
     def fall_time(self) -> float:

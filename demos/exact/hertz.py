@@ -12,13 +12,15 @@ consistent units.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 
 
 def contact_modulus(*bodies: tuple[float, float]) -> float:
@@ -61,15 +63,15 @@ class HertzPoint:
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
         approach = a²/R,   F = (4/3) E* sqrt(R) approach^(3/2)
 
-    force [N], modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.
+    modulus: E*; radius: R.
     """
 
-    force: float
-    modulus: float
-    radius: float
+    force: Annotated[float, Positive, Unit("N")]
+    modulus: Annotated[float, Positive, Unit("Pa")]
+    radius: Annotated[float, Positive, Unit("m")]
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("force", "modulus", "radius"))
+        check_fields(self)
 
     @classmethod
     def from_approach(cls, approach: float, *, modulus: float, radius: float) -> "HertzPoint":
@@ -109,17 +111,17 @@ class HertzImpact:
         d_max = (15 m v²/(16 E* sqrt(R)))^(2/5)
         duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 
-    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass [kg], speed v [m/s],
-    modulus E* [Pa], radius R [m]. Raises InputError unless all are finite and positive.
+    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass: m;
+    speed: v; modulus: E*; radius: R.
     """
 
-    mass: float
-    speed: float
-    modulus: float
-    radius: float
+    mass: Annotated[float, Positive, Unit("kg")]
+    speed: Annotated[float, Positive, Unit("m/s")]
+    modulus: Annotated[float, Positive, Unit("Pa")]
+    radius: Annotated[float, Positive, Unit("m")]
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("mass", "speed", "modulus", "radius"))
+        check_fields(self)
 
     @property
     def approach(self) -> float:

@@ -13,32 +13,33 @@ e = 1 - (3/2) sin²(alpha). Angles [rad], times [s], accelerations [m/s²].
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 
 REST = 1e-30  # phi below which the rest of the motion lasts less than round-off of what has passed
 
 
 @dataclass(frozen=True)
 class HousnerBlock:
-    """Describe a block of width 2b and height 2h [m] (the full lengths) under gravity [m/s²].
+    """Describe a block of width 2b and height 2h (the full lengths) under gravity.
 
     "Slender" is said of what uses the linearised equation; theta0 is the angle of release at rest,
-    in (0, alpha). Raises InputError unless all are finite and positive, and for blocks that do not
-    rock on after an impact (e <= 0).
+    in (0, alpha). Raises InputError for blocks that do not rock on after an impact (e <= 0).
     """
 
-    width: float
-    height: float
-    gravity: float = 9.81
+    width: Annotated[float, Positive, Unit("m")]
+    height: Annotated[float, Positive, Unit("m")]
+    gravity: Annotated[float, Positive, Unit("m/s²")] = 9.81
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("width", "height", "gravity"))
+        check_fields(self)
         if self.restitution <= 0.0:
             raise InputError(
                 f"HousnerBlock: width {self.width} is too large for height {self.height}, the "

@@ -10,13 +10,15 @@ above the plane, y + u_y - s(t).
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from meshes.disk import DiskMesh
-from vi_contact.core.checks import attributes, function, instance
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import function, instance
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
+from vi_contact.core.quantities import Positive, Unit
 from vi_contact.core.step import Columns, Report, Row, State
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
@@ -32,14 +34,13 @@ class Push:
     It is zero again at t = 2 ``rise``; from then on the push is zero.
 
     With height 0.05 and rise 1 it is 0.05 (1 - cos pi t)/2 for t <= 1; it goes down as it came up.
-    [m, s]
     """
 
-    height: float = 0.05
-    rise: float = 1.0
+    height: Annotated[float, Positive, Unit("m")] = 0.05
+    rise: Annotated[float, Positive, Unit("s")] = 1.0
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("height", "rise"))
+        check_fields(self)
 
     def __call__(self, t: float) -> float:
         """Return the push [m] at time t [s]."""
@@ -52,22 +53,22 @@ class Push:
 
 @dataclass(frozen=True)
 class Disk:
-    """Describe a disk of ``radius`` [m].
+    """Describe a disk of ``radius``.
 
-    It has cells of ``size`` [m], is in plane strain, and is pushed by ``push``.
+    It has cells of ``size``, is in plane strain, and is pushed by ``push``.
     """
 
-    radius: float = 0.5
-    size: float = 0.04
+    radius: Annotated[float, Positive, Unit("m")] = 0.5
+    size: Annotated[float, Positive, Unit("m")] = 0.04
     material: LinearElastic = field(
         default_factory=lambda: LinearElastic.from_wave_speeds(2.0, 1.0, 1.0)
     )
     push: Push = field(default_factory=Push)
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("radius", "size"))
         instance("Disk", "material", self.material, LinearElastic, "give a LinearElastic")
         function("Disk", "push", self.push, "give a Push(...), or a function of the time")
+        check_fields(self)
 
     @property
     def time_step(self) -> float:

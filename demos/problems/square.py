@@ -10,11 +10,13 @@ pressure 0.1 from t = 0 on.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
-from vi_contact.core.checks import attributes, function, instance, optional
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import function, instance, optional
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
+from vi_contact.core.quantities import Finite, Positive, Unit
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
@@ -26,31 +28,28 @@ from vi_contact.meshes.block import BlockMesh
 
 @dataclass(frozen=True)
 class Square:
-    """Describe a square of ``cells`` bilinear cells a ``side`` [m].
+    """Describe a square of ``cells`` bilinear cells a ``side``.
 
-    ``pressure`` [Pa] acts on the top times ``history``(t).
+    ``pressure`` acts on the top times ``history``(t).
 
-    ``confined``: the sides move vertically only, so that plane waves run up and down. InputError
-    for no cells.
+    ``confined``: the sides move vertically only, so that plane waves run up and down.
     """
 
-    cells: int = 20
-    side: float = 1.0
+    cells: Annotated[int, Positive] = 20
+    side: Annotated[float, Positive, Unit("m")] = 1.0
     material: LinearElastic = field(
         default_factory=lambda: LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
     )
-    pressure: float = 0.1
+    pressure: Annotated[float, Finite, Unit("Pa")] = 0.1
     history: Callable[[float], float] | None = None
     confined: bool = False
 
     def __post_init__(self) -> None:
-        attributes(
-            self, positive=("side",), finite=("pressure",), counts=("cells",), flags=("confined",)
-        )
         instance("Square", "material", self.material, LinearElastic, "give a LinearElastic")
         optional(
             function, "Square", "history", self.history, "give a function of the time, or None"
         )
+        check_fields(self)
 
     @property
     def time_step(self) -> float:

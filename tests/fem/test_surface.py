@@ -366,7 +366,8 @@ def test_support_stiffness():
     surface = contact_surface(system, tags["bottom"], obstacle=Touching())
     for stiffness in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(
-            InputError, match=f"foundation modulus is {stiffness}; give a finite number above zero"
+            InputError,
+            match=rf"foundation modulus \[Pa/m\] is {stiffness}; give a finite number above zero",
         ):
             surface.on_springs(stiffness)
 

@@ -245,7 +245,7 @@ def test_scaling_by_factor_and_to_a_peak():
         (lambda r: scaled_to_pga(r, 0.0), "pga"),
         (lambda r: scaled_to_pga(r, math.nan), "pga"),
         (lambda r: scaled_to_pga(scaled(r, factor=0.0), 1.0), "every sample is zero"),
-        (lambda r: resampled(r, 0.0), "above zero in seconds"),
+        (lambda r: resampled(r, 0.0), "above zero in s"),
         (lambda r: resampled(r, math.pi / 300), "whole numbers"),
         (lambda r: resampled(r, 1e-7), "choose a step such as 2e-05 s"),
         (lambda r: resampled(r, 1.0), "shorter step"),

@@ -169,7 +169,7 @@ def test_translation_of_the_whole_body_feels_the_whole_mass() -> None:
 def test_refusals() -> None:
     """One sentence each: lumping out of range, a mass with nowhere to go, a mesh too coarse, an
     impact law."""
-    with pytest.raises(InputError, match="lumping is 1.5: give a share"):
+    with pytest.raises(InputError, match="lumping is 1.5; give a share"):
         Redistributed(1.5)
     with pytest.raises(InputError, match="cannot be moved.*ConsistentMass"):
         # lumped masses know no neighbours

@@ -99,9 +99,7 @@ def test_a_matrix_of_axes_is_the_angle() -> None:
 @pytest.mark.parametrize(
     "wrong, words",
     [
-        ({"E2": 0.0}, "Orthotropic: E2 is 0.0; give a finite number above zero"),
         ({"nu12": 4.0}, "some strain has no positive energy"),
-        ({"nu23": float("nan")}, "nu23 is nan"),
         ({"axes": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))}, "axes is not a rotation"),
         ({"axes": ((1.0, 0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}, "axes is not a rotation"),
         ({"axes": "grain"}, "the angle"),
@@ -140,9 +138,3 @@ def test_one_retardation_time_is_stiffness_proportional() -> None:
     assert damping.coefficients(STEEL) == (0.0, 0.0) and Rayleigh(0.0, tau).ratio(
         1.0 / pi
     ) == pytest.approx(tau)
-
-
-@pytest.mark.parametrize("wrong", [{"shear": -1.0}, {"shear": 1.0, "bulk": float("inf")}])
-def test_negative_viscosities_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="KelvinVoigt: (shear|bulk) is"):
-        KelvinVoigt(**wrong)

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from vi_contact import core, fem, meshes
 from vi_contact.core.errors import InputError
 from vi_contact.studies import read_case
-from vi_contact.studies.cases.quantities import KEYS, text_node
+from vi_contact.studies.cases.quantities import text_node
 from vi_contact.studies.cases.short_settings import ShortOptions
 from vi_contact.studies.cases.table_calls import Call, Spot
 
@@ -302,13 +302,3 @@ def test_amplitudes_with_units_are_scaled() -> None:
         match=r"--scale: \[excitation\[1\]\] amplitude is '0.5 m': 'm' is not a unit of it",
     ):
         ShortOptions(scale=2.0).settings(tables)
-
-
-@pytest.mark.serial
-def test_the_guide_has_the_table_of_units() -> None:
-    text = (ROOT / "docs" / "guide" / "studies.md").read_text(encoding="utf-8")
-    for unit, keys in KEYS.items():
-        row = (
-            f"| {'none, or %' if unit == '1' else unit} | {', '.join(f'`{key}`' for key in keys)} |"
-        )
-        assert row in text or not unit

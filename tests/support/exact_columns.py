@@ -11,12 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 from vi_contact.laws.materials import LinearElastic
 
 History = Callable[[Array], Array]
@@ -56,14 +58,14 @@ class ObliqueImpact:
     height [m]; speeds [m/s]; mu >= 0. InputError for other values.
     """
 
-    height: float
+    height: Annotated[float, Positive, Unit("m")]
     material: LinearElastic
-    speed_n: float
-    speed_t: float
-    mu: float
+    speed_n: Annotated[float, Positive, Unit("m/s")]
+    speed_t: Annotated[float, NotNegative, Unit("m/s")]
+    mu: Annotated[float, NotNegative]
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("height", "speed_n"), not_negative=("speed_t", "mu"))
+        check_fields(self)
 
     @property
     def duration(self) -> float:
@@ -136,13 +138,13 @@ class ShearColumn:
     unless all are finite and positive.
     """
 
-    height: float
+    height: Annotated[float, Positive, Unit("m")]
     material: LinearElastic
-    speed: float
-    tau_y: float
+    speed: Annotated[float, Positive, Unit("m/s")]
+    tau_y: Annotated[float, Positive, Unit("Pa")]
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("height", "speed", "tau_y"))
+        check_fields(self)
 
     @property
     def crossing(self) -> float:

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.quantities import Positive, Unit
 
 
 @dataclass(frozen=True)
@@ -28,12 +30,12 @@ class HertzLine:
     [m]. Raises InputError unless all are finite and positive.
     """
 
-    force: float
-    modulus: float
-    radius: float
+    force: Annotated[float, Positive]
+    modulus: Annotated[float, Positive, Unit("Pa")]
+    radius: Annotated[float, Positive, Unit("m")]
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("force", "modulus", "radius"))
+        check_fields(self)
 
     @property
     def half_width(self) -> float:
@@ -60,11 +62,11 @@ class StripPunch:
     half_width a [m], force [N/m]. Raises InputError unless both are finite and positive.
     """
 
-    half_width: float
-    force: float
+    half_width: Annotated[float, Positive, Unit("m")]
+    force: Annotated[float, Positive]
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("half_width", "force"))
+        check_fields(self)
 
     def pressure(self, x: ArrayLike) -> Array:
         """Return p(x) [Pa] at the distance x from the centre line, 0 beside the punch, infinite at

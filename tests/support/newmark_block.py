@@ -8,14 +8,17 @@ the base.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from demos.exact.bouncing_bar import first_root
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, attributes
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import array
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 
 
 @dataclass(frozen=True)
@@ -23,11 +26,11 @@ class SlidingBlock:
     """Hold mu >= 0 of a level base, and gravity g [m/s²]. Raises InputError for values out of
     range."""
 
-    mu: float
-    gravity: float = 9.81
+    mu: Annotated[float, NotNegative]
+    gravity: Annotated[float, Positive, Unit("m/s²")] = 9.81
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("gravity",), not_negative=("mu",))
+        check_fields(self)
 
     @property
     def onset_acceleration(self) -> float:

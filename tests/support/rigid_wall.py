@@ -19,14 +19,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import zeta
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 
 CATALAN = 0.915965594177219
 TERMS = 4000  # of the series of p: its tail is below 3e-5 of p
@@ -44,14 +46,14 @@ class RigidWall:
     InputError out of range.
     """
 
-    height: float
-    rho: float
-    nu: float
+    height: Annotated[float, Positive, Unit("m")]
+    rho: Annotated[float, Positive, Unit("kg/m³")]
+    nu: Annotated[float, NotNegative]
     simple: bool = False
-    flexibility: float = 0.0
+    flexibility: Annotated[float, NotNegative] = 0.0
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("height", "rho"), not_negative=("nu", "flexibility"))
+        check_fields(self)
         if self.nu >= 0.5:
             raise InputError(
                 f"RigidWall: nu is {self.nu!r}; give a Poisson's ratio from 0 to below 0.5"

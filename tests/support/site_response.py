@@ -8,12 +8,14 @@ ratio xi. In the layer u = 2 A cos(k* z) exp(i w t), where A is the amplitude of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 from vi_contact.laws.materials import LinearElastic
 
 
@@ -25,12 +27,12 @@ class SoilLayer:
     InputError unless height > 0 and xi >= 0.
     """
 
-    height: float
+    height: Annotated[float, Positive, Unit("m")]
     material: LinearElastic
-    xi: float = 0.0
+    xi: Annotated[float, NotNegative] = 0.0
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("height",), not_negative=("xi",))
+        check_fields(self)
 
     def frequency(self, n: int = 1) -> float:
         """Return f_n = (2n - 1) c_S / 4H [Hz] on a rigid base."""

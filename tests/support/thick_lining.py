@@ -20,12 +20,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 from vi_contact.laws.materials import LinearElastic
 
 
@@ -34,14 +36,14 @@ class ThickLining:
     """Hold inner and outer radius [m]; ``slip``: no friction at the outside, else nothing slides
     there."""
 
-    inner: float
-    outer: float
+    inner: Annotated[float, Positive, Unit("m")]
+    outer: Annotated[float, Positive, Unit("m")]
     lining: LinearElastic
     soil: LinearElastic
     slip: bool = True
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("inner", "outer"))
+        check_fields(self)
         if not self.inner < self.outer:
             raise InputError(
                 f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < "

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.quantities import Positive, Unit
 from vi_contact.laws.materials import LinearElastic
 
 
@@ -13,13 +15,13 @@ from vi_contact.laws.materials import LinearElastic
 class ThinLining:
     """Hold radius R [m], thickness t [m]; lining and soil of two materials, plane strain."""
 
-    radius: float
-    thickness: float
+    radius: Annotated[float, Positive, Unit("m")]
+    thickness: Annotated[float, Positive, Unit("m")]
     lining: LinearElastic
     soil: LinearElastic
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("radius", "thickness"))
+        check_fields(self)
 
     @property
     def compressibility(self) -> float:

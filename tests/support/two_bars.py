@@ -4,13 +4,15 @@ of section."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import attributes
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,16 @@ class TwoBars:
     positive, and for bars that part later than after the first reflection.
     """
 
-    length1: float = 1.0
-    length2: float = 2.0
-    z1: float = 1.0
-    z2: float = 1.0
-    c1: float = 1.0
-    c2: float = 1.0
-    speed: float = 1.0
+    length1: Annotated[float, Positive, Unit("m")] = 1.0
+    length2: Annotated[float, Positive, Unit("m")] = 2.0
+    z1: Annotated[float, Positive] = 1.0
+    z2: Annotated[float, Positive] = 1.0
+    c1: Annotated[float, Positive, Unit("m/s")] = 1.0
+    c2: Annotated[float, Positive, Unit("m/s")] = 1.0
+    speed: Annotated[float, Positive, Unit("m/s")] = 1.0
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("length1", "length2", "z1", "z2", "c1", "c2", "speed"))
+        check_fields(self)
         first, second = (self.length1 / self.c1, self.z1), (self.length2 / self.c2, self.z2)
         if min(first, second)[1] > max(first, second)[1]:
             raise InputError(

@@ -11,16 +11,20 @@ Displacements: continuous P1, values (2, n) (component, node). Tractions: discon
 they are the unknowns of the matrices.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
+from ..core.arguments import checked
 from ..core.checks import array, counted, flag, function, integers, mask, number, shape_of, whole
 from ..core.errors import InputError
+from ..core.quantities import Between, Positive, Unit
 from .loops import check_orientation, check_simple, check_size
 
 MOST_ELEMENTS = 3000  # elements: the matrices of one time step take 2 GB
@@ -214,18 +218,20 @@ def polygon(
     return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
 
 
+@checked
 def circle(
-    radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False
+    radius: Annotated[float, Positive, Unit("m")],
+    count: Annotated[int, Between(3, math.inf)],
+    *,
+    centre: ArrayLike = (0.0, 0.0),
+    exterior: bool = False,
 ) -> BoundaryMesh:
     """Return a disk of `count` chords, starting at its lowest point.
 
     ``exterior`` makes the space around a round hole of it.
     """
     middle = array("circle", "centre", centre, (2,), unit="m")
-    number("circle", "radius", radius, positive=True, unit="m")
-    counted(
-        "circle", "count", whole("circle", "count", count, least=3), "elements", most=MOST_ELEMENTS
-    )
+    counted("circle", "count", count, "elements", most=MOST_ELEMENTS)
     angle = (-2.0 * np.pi if exterior else 2.0 * np.pi) * (np.arange(count) / count) - 0.5 * np.pi
     return BoundaryMesh(
         middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), exterior=exterior

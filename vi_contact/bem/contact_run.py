@@ -3,13 +3,15 @@
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array, Mask
+from ..core.arguments import checked
 from ..core.certificate import Certificate
-from ..core.checks import instance, number, optional
 from ..core.errors import StepFailure
+from ..core.quantities import Positive, Remedy
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.certified import TOLERANCE
@@ -22,8 +24,14 @@ from .poincare_steklov import work
 log = logging.getLogger(__name__)
 
 
+@checked
 def march_contact(
-    contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
+    contact: Annotated[BoundaryContact, Remedy("give a BoundaryContact")],
+    *,
+    solver: Annotated[
+        Condensed | None, Remedy("give Condensed() with any of its methods, or None")
+    ] = None,
+    tolerance: Annotated[float, Positive] = TOLERANCE,
 ) -> "ContactRun":
     """March through all steps of the compliance.
 
@@ -33,10 +41,6 @@ def march_contact(
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and
     residuals.
     """
-    instance("march_contact", "contact", contact, BoundaryContact, "give a BoundaryContact")
-    hint = "give Condensed() with any of its methods, or None"
-    optional(instance, "march_contact", "solver", solver, Condensed, hint)
-    number("march_contact", "tolerance", tolerance, positive=True)
     default = Condensed() if contact.symmetric else Condensed(Lemke())
     if not contact.symmetric and not contact.p_matrix.holds:
         log.warning(

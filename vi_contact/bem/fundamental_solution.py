@@ -19,14 +19,15 @@ Elastic Solids, 3.10.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.algebra import Array
-from ..core.checks import attributes
+from ..core.arguments import check_fields
 from ..core.errors import InputError
+from ..core.quantities import Positive, Unit
 
 TWO_PI = 2.0 * np.pi
 
@@ -44,9 +45,12 @@ class KernelSet(NamedTuple):
     hyper: tuple[NDArray, ...]
 
 
+Speed = Annotated[float, Positive, Unit("m/s")]
+
+
 def check_speeds(kernels: Any) -> None:
     """Raise InputError unless c_p and c_s of kernels are positive and c_p is the larger."""
-    attributes(kernels, positive=("c_p", "c_s"))
+    check_fields(kernels)
     if kernels.c_p <= kernels.c_s:
         raise InputError(
             f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; "
@@ -63,13 +67,12 @@ class TimeKernels:
     That is what functions constant in time (traction) and linear in time (displacement) need.
     """
 
-    t: float
-    c_p: float
-    c_s: float
+    t: Annotated[float, Positive, Unit("s")]
+    c_p: Speed
+    c_s: Speed
 
     def __post_init__(self) -> None:
         check_speeds(self)
-        attributes(self, positive=("t",))
 
     def __call__(self, r: Array) -> KernelSet:
         """Return the kernels at distances r [m] > 0; zero where r >= c_p t."""

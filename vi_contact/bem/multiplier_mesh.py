@@ -18,14 +18,17 @@ out. All this is a CondensedCompliance again.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from scipy.special import hyp1f1
 
 from ..core.algebra import Array, Indices, Mask, max_abs
-from ..core.checks import array, attributes, check_word, function, instance, mask, whole
+from ..core.arguments import check_fields
+from ..core.checks import array, check_word, function, instance, mask
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
+from ..core.quantities import Between, NotNegative, Positive, Unit
 from ..solvers.normal.lcp import EPS
 from .boundary_mesh import P1_MASS, BoundaryMesh
 from .poincare_steklov import CondensedCompliance
@@ -40,7 +43,7 @@ class MultiplierMesh:
     mesh, elements: the boundary and the mask (n,) of its contact elements; compliance: condensed on
     their nodes; patch, interval: least number of elements in a patch, H/h, and number of steps in
     an interval, DT/dt; degree: 0 or 1, of lambda on a patch; testing: "end" takes displacements at
-    the ends of intervals, "mean" the source's means; sigma: of the weight of these [1/s]. The
+    the ends of intervals, "mean" the source's means; sigma: of the weight of these. The
     normal of a patch is its mean normal; patches end at corners.
 
     Raises InputError for elements not condensed, sides shorter than a patch, patches that turn by
@@ -50,11 +53,11 @@ class MultiplierMesh:
     mesh: BoundaryMesh
     elements: Mask
     compliance: CondensedCompliance
-    patch: int = 2
-    interval: int = 2
-    degree: int = 0
+    patch: Annotated[int, Positive] = 2
+    interval: Annotated[int, Positive] = 2
+    degree: Annotated[int, Between(0, 1)] = 0
     testing: str = "end"
-    sigma: float = 0.0
+    sigma: Annotated[float, NotNegative, Unit("1/s")] = 0.0
 
     def __post_init__(self) -> None:
         owner = "MultiplierMesh"
@@ -69,9 +72,8 @@ class MultiplierMesh:
         object.__setattr__(
             self, "elements", mask(owner, "elements", self.elements, (len(self.mesh),))
         )
-        attributes(self, counts=("patch", "interval"), not_negative=("sigma",))
         check_word("testing", self.testing, ("end", "mean"))
-        whole(owner, "degree", self.degree, most=1)
+        check_fields(self)
         if self.sigma and self.testing == "end":
             raise InputError(
                 f"{owner}: sigma is for means and testing is 'end'; give testing='mean' or sigma=0"

@@ -9,24 +9,24 @@ S maps the history of boundary displacements to nodal forces. Symmetric form S =
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array, Indices, Mask, max_abs
+from ..core.arguments import check_fields
 from ..core.checks import (
     array,
-    flag,
     instance,
     integers,
     mask,
-    number,
     optional,
     provides,
     shape_of,
 )
 from ..core.errors import InputError, StepFailure
+from ..core.quantities import Positive, Unit
 from ..solvers.normal.lcp import EPS
 from .boundary_mesh import BoundaryMesh
 from .compressed import CompressedBlocks
@@ -73,10 +73,10 @@ class BodyOperator(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PoincareSteklov:
-    """Hold S of a body of density rho [kg/m³], from blocks of density 1."""
+    """Hold S of a body of density rho, from blocks of density 1."""
 
     blocks: EnergeticBlocks | CompressedBlocks
-    rho: float
+    rho: Annotated[float, Positive, Unit("kg/m³"), "the mass density rho"]
     symmetric: bool = True
 
     def __post_init__(self) -> None:
@@ -87,8 +87,7 @@ class PoincareSteklov:
             (EnergeticBlocks, CompressedBlocks),
             "use energetic_blocks",
         )
-        number("PoincareSteklov", "the mass density rho", self.rho, positive=True, unit="kg/m³")
-        flag("PoincareSteklov", "symmetric", self.symmetric)
+        check_fields(self)
 
     @property
     def mesh(self) -> BoundaryMesh:
@@ -243,7 +242,7 @@ class CondensedCompliance:
     points: Array
     normals: Array
     lengths: Array
-    dt: float
+    dt: Annotated[float, Positive, Unit("s")]
     turns: Array | None = None
 
     def __post_init__(self) -> None:
@@ -259,7 +258,7 @@ class CondensedCompliance:
             ("lengths", (m,)),
         ):
             array(owner, name, getattr(self, name), shape)
-        number(owner, "dt", self.dt, positive=True, unit="s")
+        check_fields(self)
 
     def displacement(self, forces: Array) -> Array:
         """Return (steps, 2m) displacements under nodal contact forces (steps, 2m)."""

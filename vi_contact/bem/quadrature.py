@@ -19,13 +19,15 @@ harmless.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
 from ..core.algebra import Array, Indices
-from ..core.checks import whole
+from ..core.arguments import check_fields
+from ..core.quantities import Between
 from .element_pairs import ElementPairs
 from .rules import gauss, graded, pieces, placed, roots, smoothed
 
@@ -42,16 +44,15 @@ class Orders:
     close pairs.
     """
 
-    far: int = 4
-    near: int = 8
-    outer: int = 6
-    inner: int = 8
-    touching: int = 12
-    close: int = 10
+    far: Annotated[int, Between(1, MOST_POINTS)] = 4
+    near: Annotated[int, Between(1, MOST_POINTS)] = 8
+    outer: Annotated[int, Between(1, MOST_POINTS)] = 6
+    inner: Annotated[int, Between(1, MOST_POINTS)] = 8
+    touching: Annotated[int, Between(1, MOST_POINTS)] = 12
+    close: Annotated[int, Between(1, MOST_POINTS)] = 10
 
     def __post_init__(self) -> None:
-        for name in ("far", "near", "outer", "inner", "touching", "close"):
-            whole("Orders", name, getattr(self, name), least=1, most=MOST_POINTS)
+        check_fields(self)
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,17 @@ windows, one after the other, the past of which is known.
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import norm  # of tiny numbers too, whose squares are zero
 
 from ..core.algebra import Array, max_abs
-from ..core.checks import attributes, instance
+from ..core.arguments import check_fields
+from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
+from ..core.quantities import Positive, Unit
 from ..core.step import StepProblem, StepResult, refuse_limits
 from ..laws.friction import project
 from .contact import BoundaryContact
@@ -39,22 +42,21 @@ class SpaceTimeUzawa:
     """Solve the whole history at once, or window by window.
 
     tolerance: relative change of the multiplier to stop at (the source's 1e-n), that of a step of
-    the default rho; rho > 0 [N/m²] or None: 1/lambda_max(W[0]); window: steps that are solved at
+    the default rho; rho, or None: 1/lambda_max(W[0]); window: steps that are solved at
     once, all of them if None. The run's ``iterations`` has one entry per window, ``history`` the
     relative changes. Its certificates measure each step by the largest forces and motions of the
     run, which is what this method solves for.
 
-    Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate.
+    Raises InputError for a law that depends on the slip rate.
     """
 
-    tolerance: float = 1e-8
-    rho: float | None = None
-    max_iterations: int = 5000
-    window: int | None = None
+    tolerance: Annotated[float, Positive] = 1e-8
+    rho: Annotated[float | None, Positive, Unit("N/m²")] = None
+    max_iterations: Annotated[int, Positive] = 5000
+    window: Annotated[int | None, Positive] = None
 
     def __post_init__(self) -> None:
-        rho, window = (() if getattr(self, name) is None else (name,) for name in ("rho", "window"))
-        attributes(self, positive=("tolerance", *rho), counts=("max_iterations", *window))
+        check_fields(self)
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
         """Solve the problem.

@@ -3,25 +3,27 @@
 A wrong argument is then a sentence and no traceback.
 
 ``@checked`` is for functions that users call with their own values, and that look at these before
-any other function does. Limits of numbers (positive, finite) are checked by the functions
-themselves.
+any other function does; ``check_fields`` is for dataclasses. Both check the limits of numbers that
+annotations mark: ``core.quantities``.
 """
 
+import math
 import os
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache, wraps
-from inspect import Parameter, isclass, signature
+from inspect import Parameter, Signature, isclass, signature
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import real, shape_of, shown
+from .checks import called, real, shape_of, shown
 from .errors import InputError
+from .quantities import Between, Quantity, quantities
 
 _MANY: dict[Any, str] = {float: "real numbers", int: "whole numbers", str: "texts"}
 P = ParamSpec("P")
@@ -31,33 +33,49 @@ R = TypeVar("R")
 def checked(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function with a check of its arguments.
 
-    The check raises InputError for an argument that is not of its type.
+    The check raises InputError for an argument that is not of its type, or beyond the limits that
+    its annotation marks (``core.quantities``).
     """
-    name, of = function.__qualname__, signature(function)
+    name, found = function.__qualname__, cache(lambda: _parameters(function))
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        hints, bound = _hints(function), of.bind(*args, **kwargs)
-        for argument, value in bound.arguments.items():
-            if of.parameters[argument].kind not in (
-                Parameter.VAR_POSITIONAL,
-                Parameter.VAR_KEYWORD,
-            ):
-                check(name, argument, value, hints.get(argument, Any))
+        of, known = found()
+        for argument, value in of.bind(*args, **kwargs).arguments.items():
+            if argument in known:
+                _check(name, argument, value, known[argument])
         return function(*args, **kwargs)
 
     return call
 
 
-def check_fields(one: Any) -> None:
-    """Raise InputError for the first field of a dataclass that is not of its type.
+def _parameters(function: Callable[..., Any]) -> tuple[Signature, dict[str, Quantity]]:
+    """Return the signature, and what is asked of each argument of its own."""
+    of, said = signature(function), quantities(function)
+    several = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    return of, {
+        name: said[name]
+        for name, one in of.parameters.items()
+        if one.kind not in several and name in said
+    }
 
+
+def check_fields(one: Any) -> None:
+    """Raise InputError for the first field of a dataclass that is wrong.
+
+    It is not of its type, or beyond the limits that its annotation marks (``core.quantities``).
     Call it in ``__post_init__``.
     """
     kind: Any = type(one)
-    hints = _hints(kind)
-    for field in fields(one):
-        check(type(one).__name__, field.name, getattr(one, field.name), hints[field.name])
+    for name, asked in _fields(kind):
+        _check(kind.__name__, name, getattr(one, name), asked)
+
+
+@cache
+def _fields(kind: Any) -> tuple[tuple[str, Quantity], ...]:
+    """Return what is asked of each field of a dataclass."""
+    said = quantities(kind)
+    return tuple((one.name, said[one.name]) for one in fields(kind) if one.name in said)
 
 
 def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
@@ -66,10 +84,63 @@ def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give {words(kind)}")
 
 
+def _check(owner: str, name: str, value: Any, asked: Quantity) -> None:
+    """Raise InputError unless the value is of its type and within its limits."""
+    kind, limit = asked.kind, asked.limit
+    if limit is not None and type(value) is float and limit.holds(value) and kind is float:
+        return  # as most are: objects are built in loops
+    one = None if limit is None else _one_number(kind)
+    if one is None and not fits(value, kind):
+        told = limit.remedy if limit is not None and limit.remedy else f"give {words(kind)}"
+        told = told if asked.other is None else f"{called(value)}{asked.other.text}"
+        raise InputError(f"{owner}: {asked.named(name)} is {shown(value)}; {told}")
+    if limit is None or (value is None and type(None) in _members(kind)):
+        return
+    if one is None:
+        place, wrong = _beyond(value, limit)
+    else:
+        place, wrong = None if _holds(value, limit, one) else "", value
+    if place is not None:
+        said = f"{asked.named(name)}{place} is {shown(wrong)}"
+        raise InputError(f"{owner}: {said}; {asked.remedy(one is int)}")
+
+
+def _holds(value: Any, limit: Between, kind: type) -> bool:
+    """Return whether a value is a number, or whole one, within a limit."""
+    found = real(value)
+    return limit.holds(found) and (kind is float or found == math.floor(found))
+
+
 @cache
-def _hints(owner: Any) -> dict[str, Any]:
-    """Return the types of arguments or fields, each once."""
-    return typing.get_type_hints(owner)
+def _members(kind: Any) -> tuple[Any, ...]:
+    """Return the types of a union, or the one type."""
+    return typing.get_args(kind) if _is_union(kind) else (kind,)
+
+
+@cache
+def _one_number(kind: Any) -> type | None:
+    """Return float or int where a value is one such number or None; else None."""
+    found = [one for one in _members(kind) if one is not type(None)]
+    return found[0] if len(found) == 1 and found[0] in (float, int) else None
+
+
+def _beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
+    """Return the place of the first number of a list or array that is beyond a limit, and it.
+
+    The place of one number is ""; it is None where all are within.
+    """
+    if _is_number(value):
+        return (None if limit.holds(real(value)) else ""), value
+    if not _is_sequence(value):
+        return None, value
+    ends = (np.min(value), np.max(value)) if _are_numbers(value) and np.size(value) else ()
+    if ends and all(limit.holds(real(one)) for one in ends):
+        return None, value
+    for index, one in enumerate(value):
+        place, wrong = _beyond(one, limit)
+        if place is not None:
+            return f"[{index}]{place}", wrong
+    return None, value
 
 
 def fits(value: Any, kind: Any) -> bool:
@@ -77,7 +148,7 @@ def fits(value: Any, kind: Any) -> bool:
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
     if kind is Any:
         return True
-    if origin in (typing.Union, types.UnionType):
+    if _is_union(kind):
         return _fits_one_of(value, inside)
     if kind is None or kind is type(None):
         return value is None
@@ -108,7 +179,7 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
 def words(kind: Any) -> str:
     """Return the words for a type in a sentence."""
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (typing.Union, types.UnionType):
+    if _is_union(kind):
         is_path = any(_is_path(one) for one in inside)
         said = [words(one) for one in inside if not (is_path and one is str)]
         return " or ".join(dict.fromkeys(said))
@@ -132,6 +203,10 @@ def words(kind: Any) -> str:
         return "a function"
     known = {float: "a real number", int: "a whole number", bool: "True or False", str: "a text"}
     return known.get(kind, f"an object of {getattr(kind, '__name__', str(kind))}")
+
+
+def _is_union(kind: Any) -> bool:
+    return typing.get_origin(kind) in (typing.Union, types.UnionType)
 
 
 def _is_path(kind: Any) -> bool:

@@ -103,35 +103,6 @@ def counted(
     return int(value)
 
 
-def attributes(
-    owner: object,
-    *,
-    finite: tuple[str, ...] = (),
-    positive: tuple[str, ...] = (),
-    not_negative: tuple[str, ...] = (),
-    counts: tuple[str, ...] = (),
-    flags: tuple[str, ...] = (),
-) -> None:
-    """Raise InputError that names the first attribute of ``owner`` which is wrong.
-
-    Wrong is what is not a finite number, or not > 0, or not >= 0, or no whole number of at least 1
-    (``counts``), or neither True nor False (``flags``).
-    """
-    what = type(owner).__name__
-    for name in finite + positive + not_negative:
-        number(
-            what,
-            name,
-            getattr(owner, name),
-            positive=name in positive,
-            not_negative=name in not_negative,
-        )
-    for name in counts:
-        whole(what, name, getattr(owner, name), least=1)
-    for name in flags:
-        flag(what, name, getattr(owner, name))
-
-
 def flag(owner: str, meaning: str, value: Any) -> bool:
     """Return True or False; InputError for anything else, 0 and 1 too."""
     if isinstance(value, bool | np.bool_):
@@ -143,7 +114,7 @@ def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
     """Return what can be called; InputError for anything else, and for a class."""
     if callable(value) and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def column_name(kind: str, name: Any) -> str:
@@ -167,7 +138,7 @@ def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...
     """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def instance(
@@ -180,7 +151,7 @@ def instance(
     """
     if isinstance(value, kinds):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def provides(
@@ -202,7 +173,7 @@ def provides(
     )
     if fits and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
 
 
 def array(
@@ -307,7 +278,8 @@ def shown(value: Any) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
 
 
-def _called(value: Any) -> str:
+def called(value: Any) -> str:
+    """Return the remedy for a class in place of an object, as the start of another one."""
     return f"make an object of it, {value.__name__}(…), or " if isinstance(value, type) else ""
 
 

@@ -5,13 +5,14 @@ It does so by contact directions and initial gaps; the module also checks what i
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from .algebra import Array, Indices, Mask
 from .checks import array, at, function
 from .errors import InputError
+from .quantities import Unit
 
 ROUND_OFF = 1e-9  # cosine of a right angle
 BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
@@ -66,7 +67,7 @@ class HalfSpace:
     direction is -normal.
     """
 
-    point: tuple[float, ...]
+    point: Annotated[tuple[float, ...], Unit("m")]
     normal: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -102,7 +103,7 @@ class AnalyticGap:
     themselves: let no gap depend on other points, as on their mean or lowest.
     """
 
-    function: Callable[[Array], Array]
+    function: Annotated[Callable[[Array], Array], Unit("m")]
 
     def __post_init__(self) -> None:
         function(

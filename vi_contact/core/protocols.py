@@ -5,17 +5,20 @@ These are the protocols that users' own classes satisfy.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 
 from .algebra import Array, Mask
-from .checks import attributes, number, several
+from .arguments import check_fields
+from .checks import number, several
 from .errors import InputError
+from .quantities import RATIO, Finite
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
 EXCITATION = ("acceleration", "direction", "duration")  # what is asked of one
+Direction = Annotated[tuple[float, ...], Finite, RATIO]
 
 
 class Excitation(Protocol):
@@ -54,11 +57,8 @@ def vector(self: Excitation, t: float) -> Array:
     return self.acceleration(t) * np.array(self.direction)
 
 
-def check_excitation(
-    excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = ()
-) -> None:
-    """Raise InputError for a bad number or direction; turn the direction into a tuple of floats."""
-    attributes(excitation, finite=finite, positive=positive)
+def check_excitation(excitation: Excitation) -> None:
+    """Raise InputError for a bad field or direction; turn the direction into a tuple of floats."""
     owner = type(excitation).__name__
     direction = finite_tuple(owner, "direction", excitation.direction)
     if not 1 <= len(direction) <= 3 or not any(direction):
@@ -66,6 +66,7 @@ def check_excitation(
             f"{owner}: direction is {direction!r}; give one to three components, not all zero"
         )
     object.__setattr__(excitation, "direction", direction)
+    check_fields(excitation)
 
 
 def finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:

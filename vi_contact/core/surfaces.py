@@ -12,18 +12,20 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
+from .arguments import checked
 from .census import Census
-from .checks import function, number, shown
+from .checks import function, shown
 from .collective import users
 from .contact_last import at
 from .errors import InputError
 from .products import frozen
+from .quantities import Positive, Unit
 from .system import Companion
 
 log = logging.getLogger(__name__)
@@ -348,18 +350,18 @@ class ContactSurface:
             )
         return replace(self, frictionless_corners=True)
 
-    def on_springs(self, stiffness: float) -> "ContactSurface":
+    @checked
+    def on_springs(
+        self, stiffness: Annotated[float, Positive, Unit("Pa/m"), "the foundation modulus"]
+    ) -> "ContactSurface":
         """Return the surface on a linearly deformable support.
 
-        ``stiffness`` [Pa/m] is its foundation modulus.
+        ``stiffness`` is its foundation modulus.
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the
         unilateral law.
         """
-        stiffness = number(
-            "on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m"
-        )
-        return replace(self, compliance=1.0 / (stiffness * self.weights))
+        return replace(self, compliance=1.0 / (float(stiffness) * self.weights))
 
 
 def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:

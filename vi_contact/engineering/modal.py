@@ -1,17 +1,25 @@
 """Find the lowest natural frequencies of a system, for choosing excitations and time steps."""
 
+from typing import Annotated
+
 import numpy as np
 
 from ..core.algebra import Algebra, Array, Matrix, SerialFactor, SerialMatrix
-from ..core.checks import instance, whole
+from ..core.arguments import checked
 from ..core.errors import InputError
+from ..core.quantities import Positive, Remedy
 from ..core.system import SemiDiscreteSystem
 
 # of the largest K_ii / M_ii: added to K; below the other a motion is rigid
 SHIFT, RIGID = (1e-6, 1e-13)
 
 
-def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:
+@checked
+def lowest_frequency(
+    system: Annotated[SemiDiscreteSystem, Remedy("give a system, such as fem.assemble returns")],
+    *,
+    max_iterations: Annotated[int, Positive] = 2000,
+) -> float:
     """Return f1 [Hz] of K phi = (2 pi f)² M phi without contact.
 
     It is found by inverse iteration with one factorisation of K.
@@ -20,14 +28,6 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
     deterministic, and not orthogonal to the first mode of structures that a base motion can excite.
     Raises InputError for a floating body (K singular) and when the iteration does not settle.
     """
-    instance(
-        "lowest_frequency",
-        "system",
-        system,
-        SemiDiscreteSystem,
-        "give a system, such as fem.assemble returns",
-    )
-    whole("lowest_frequency", "max_iterations", max_iterations, least=1)
     if system.floating:
         raise InputError(
             "the body is not held, so its lowest frequency is zero: clamp a part of it"

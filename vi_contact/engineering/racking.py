@@ -5,6 +5,7 @@ It is the shear of four corner points, which no rigid rotation changes.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from ..core.algebra import Array
 from ..core.checks import array, column_name, instance
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.quantities import Unit
 from ..core.step import Columns, Report, Row, State
 
 
@@ -48,7 +50,7 @@ class Racking:
     or outside the body.
     """
 
-    frames: Mapping[str, Sequence[Sequence[float]]]
+    frames: Annotated[Mapping[str, Sequence[Sequence[float]]], Unit("m")]
 
     def __post_init__(self) -> None:
         instance(

@@ -35,7 +35,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -45,6 +45,7 @@ from ..core.checks import array, column_name, function, instance, mask, optional
 from ..core.corners import tangent_vectors
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.quantities import Unit
 from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import ContactSurface
 
@@ -256,7 +257,7 @@ class Resultants:
     """
 
     name: str = ""
-    centre: Sequence[float] | None = None
+    centre: Annotated[Sequence[float] | None, Unit("m")] = None
     where: Where | None = None
     normal: Sequence[float] | None = None
     part: Any = None

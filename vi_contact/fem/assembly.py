@@ -11,13 +11,14 @@ P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import ufl
 
 from ..core.algebra import Array, from_each
 from ..core.collective import Parts, agree
+from ..core.quantities import Unit
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.free_motions import floating
@@ -61,8 +62,8 @@ def assemble(
     dashpots: Dashpots | Sequence[Dashpots] = (),
     loads: Loads = (),
     damping: Damping | None = None,
-    initial_displacement: Initial = None,
-    initial_velocity: Initial = None,
+    initial_displacement: Annotated[Initial, Unit("m")] = None,
+    initial_velocity: Annotated[Initial, Unit("m/s")] = None,
     base_inertia: bool = True,
     degree: int = 1,
     quadrature_degree: int | None = None,

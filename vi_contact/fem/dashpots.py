@@ -20,14 +20,16 @@ but up + down.
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import ufl
 
 from ..core.algebra import Array, largest
-from ..core.checks import attributes, function, instance, optional
+from ..core.arguments import check_fields
+from ..core.checks import function, instance, optional
 from ..core.errors import InputError
+from ..core.quantities import NotNegative
 from ..laws.materials import LinearElastic, Section
 from . import compat
 from .groups import facets_of
@@ -59,13 +61,12 @@ class Dashpots:
     ``material``: of the adjacent cells when None, or of the half-space behind.
 
     ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out.
-    InputError when negative.
     """
 
     facets: Facets
     material: LinearElastic | None = None
-    normal: float = 1.0
-    tangential: float = 1.0
+    normal: Annotated[float, NotNegative] = 1.0
+    tangential: Annotated[float, NotNegative] = 1.0
     lets_waves_in: ClassVar[bool] = (
         False  # the run's motion does not come in here; displacements would be of space
     )
@@ -81,7 +82,7 @@ class Dashpots:
             LinearElastic,
             "give a LinearElastic, or None",
         )
-        attributes(self, not_negative=("normal", "tangential"))
+        check_fields(self)
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return what acts on the body here besides the dashpots: nothing.

@@ -6,7 +6,7 @@ This is by temperature, swelling, given dislocations (boundary method, eq. 25).
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import ufl
@@ -14,6 +14,7 @@ import ufl
 from ..core.algebra import Array, total
 from ..core.checks import array, function, optional, shape_of, shown
 from ..core.errors import InputError
+from ..core.quantities import RATIO
 from ..laws.materials import PlaneStress
 from . import compat
 from .forms import ElasticForms
@@ -50,7 +51,7 @@ class InitialStrain(ActingLoad):
     """
 
     # the value as it is given
-    value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]
+    value: Annotated[float | Sequence[Sequence[float]] | Callable[[Array, float], Array], RATIO]  # type: ignore[assignment]
     history: Callable[[float], float] | None = None
     cells: Cells | None = None
 

@@ -9,7 +9,7 @@ product a step.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import ufl
@@ -17,6 +17,7 @@ from dolfinx.mesh import Mesh
 
 from ..core.algebra import Array, Comm
 from ..core.checks import ended, function, number, optional, refuse, shown
+from ..core.quantities import Unit
 from . import compat
 from .groups import components_given, components_of, facets_of, field_given
 from .mesh import Facets
@@ -80,9 +81,9 @@ class Prescribed:
     """
 
     facets: Facets
-    displacement: Value = _zero
-    velocity: Value = _zero
-    acceleration: Value = _zero
+    displacement: Annotated[Value, Unit("m")] = _zero
+    velocity: Annotated[Value, Unit("m/s")] = _zero
+    acceleration: Annotated[Value, Unit("m/s²")] = _zero
     components: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -200,7 +201,7 @@ class Traction(ActingLoad):
     """
 
     facets: Facets
-    value: Value
+    value: Annotated[Value, Unit("Pa")]
     history: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:
@@ -237,7 +238,7 @@ class Pressure(Traction):
     level. ``history``: as of ``Traction``.
     """
 
-    value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
+    value: Annotated[float | Callable[[Array, float], Array], Unit("Pa")]  # type: ignore[assignment]  # what is given
 
     def __post_init__(self) -> None:
         given: Any = self.value
@@ -269,7 +270,7 @@ class BodyForce(ActingLoad):
     The weight of a material is BodyForce((0, -rho * 9.80665)).
     """
 
-    value: Value
+    value: Annotated[Value, Unit("N/m³")]
     history: Callable[[float], float] | None = None
 
 

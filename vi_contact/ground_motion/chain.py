@@ -5,9 +5,11 @@ The last step scales them to a measure.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from ..core.checks import number
+from ..core.arguments import checked
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Positive, Unit
 from .intensity import arias, pga, psa
 from .processing import (
     baseline_corrected,
@@ -36,19 +38,19 @@ class Processing:
     when more than one scaling is asked for; calling raises that of the steps.
     """
 
-    trim: tuple[float, float | None] | None = None
-    pad: tuple[float, float] | None = None
+    trim: Annotated[tuple[float, float | None] | None, Unit("s")] = None
+    pad: Annotated[tuple[float, float] | None, Unit("s")] = None
     mean: bool = False
-    taper: float | None = None
-    low: float | None = None
-    high: float | None = None
+    taper: Annotated[float | None, RATIO] = None
+    low: Annotated[float | None, Unit("Hz")] = None
+    high: Annotated[float | None, Unit("Hz")] = None
     order: int = 4
     causal: bool = False
-    resample: float | None = None
+    resample: Annotated[float | None, Unit("s")] = None
     baseline: int | None = None
-    scale: float | None = None
-    pga: float | None = None
-    arias: float | None = None
+    scale: Annotated[float | None, RATIO] = None
+    pga: Annotated[float | None, Unit("m/s²")] = None
+    arias: Annotated[float | None, Unit("m/s")] = None
     psa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -101,39 +103,43 @@ class Processing:
         return record
 
 
-def scaled_to_pga(record: Record, target: float) -> Record:
-    """Scale a record so that its largest |acceleration| is `target` [m/s²], and keep its sign.
+@checked
+def scaled_to_pga(record: Record, target: Annotated[float, Positive, Unit("m/s²")]) -> Record:
+    """Scale a record so that its largest |acceleration| is `target`, and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
+    Raises InputError for a record that is all zero.
     """
-    return scaled(record, factor=_ratio(record, "scaled_to_pga", target, pga(record)))
+    return scaled(record, factor=_ratio(record, target, pga(record)))
 
 
-def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:
-    """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²].
+@checked
+def scaled_to_psa(
+    record: Record,
+    target: Annotated[float, Positive, Unit("m/s²")],
+    period: float,
+    *,
+    damping: float = 0.05,
+) -> Record:
+    """Scale a record so that its pseudo-acceleration at `period` [s] is `target`.
 
     Its sign is kept.
 
-    Raises InputError unless target > 0 and the record is not all zero.
+    Raises InputError for a record that is all zero.
     """
-    return scaled(
-        record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping))
-    )
+    return scaled(record, factor=_ratio(record, target, psa(record, period, damping=damping)))
 
 
-def scaled_to_arias(record: Record, target: float) -> Record:
-    """Scale a record so that its Arias intensity is `target` [m/s], and keep its sign.
+@checked
+def scaled_to_arias(record: Record, target: Annotated[float, Positive, Unit("m/s")]) -> Record:
+    """Scale a record so that its Arias intensity is `target`, and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
+    Raises InputError for a record that is all zero.
     """
-    return scaled(
-        record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record)))
-    )
+    return scaled(record, factor=math.sqrt(_ratio(record, target, arias(record))))
 
 
-def _ratio(record: Record, name: str, target: float, value: float) -> float:
+def _ratio(record: Record, target: float, value: float) -> float:
     """Return target / value."""
-    number(name, "target", target, positive=True)
     if value == 0.0:
         raise InputError(f"{record.source or 'Record'}: every sample is zero; scale another record")
     return target / value

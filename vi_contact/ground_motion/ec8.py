@@ -7,13 +7,15 @@ import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields, checked
-from ..core.checks import attributes, real
+from ..core.checks import real
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Between, Positive, Unit
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 TYPES = dict(enumerate(_TABLES["type"], start=1))  # of spectra: 1, or 2 for weak near earthquakes
@@ -25,29 +27,25 @@ class EC8Spectrum:
 
     `on_ground` and `vertical` have its tables.
 
-    ag: design ground acceleration on ground A, gamma_I a_gR [m/s²]; s: soil factor; tb, tc, td [s];
-    damping: ratio; plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers. Raises
-    InputError unless ag, s > 0, 0 < tb <= tc <= td and 0 <= damping < 1.
+    ag: design ground acceleration on ground A, gamma_I a_gR; s: soil factor; tb, tc, td: corner
+    periods; damping: ratio; plateau: 2.5, or 3.0 vertically. A National Annex may give other
+    numbers. Raises InputError unless tb <= tc <= td.
     """
 
-    ag: float
-    s: float
-    tb: float
-    tc: float
-    td: float
-    damping: float = 0.05
+    ag: Annotated[float, Positive, Unit("m/s²")]
+    s: Annotated[float, Positive, RATIO]
+    tb: Annotated[float, Positive, Unit("s")]
+    tc: Annotated[float, Positive, Unit("s")]
+    td: Annotated[float, Unit("s")]
+    damping: Annotated[
+        float, Between(0.0, 1.0, "[)", "give a ratio from 0 to below 1, 0.05 for 5 %"), RATIO
+    ] = 0.05
     plateau: float = 2.5
 
     def __post_init__(self) -> None:
         check_fields(self)
-        attributes(self, positive=("ag", "s", "tb", "tc"))
         if not self.tb <= self.tc <= real(self.td):
             raise InputError(f"{self!r}: give periods with tb <= tc <= td")
-        if not 0.0 <= self.damping < 1.0:
-            raise InputError(
-                f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 "
-                "for 5 %"
-            )
 
     @classmethod
     @checked

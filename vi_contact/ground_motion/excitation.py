@@ -1,9 +1,11 @@
 """Shake a body with a recorded ground motion."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from ..core.checks import instance
-from ..core.protocols import check_excitation, vector
+from ..core.protocols import Direction, check_excitation, vector
+from ..core.quantities import RATIO, Finite
 from .record import Record
 
 
@@ -14,13 +16,13 @@ class GroundMotion:
     It is a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
 
     It is zero before the first and after the last sample. scale: a factor; for a peak use
-    `scaled_to_pga(record, pga)`. InputError unless scale is finite. Use a time step no longer than
-    that of the record, or resample the record first.
+    `scaled_to_pga(record, pga)`. Use a time step no longer than that of the record, or resample the
+    record first.
     """
 
     record: Record
-    direction: tuple[float, ...] = (1.0, 0.0)
-    scale: float = 1.0
+    direction: Direction = (1.0, 0.0)
+    scale: Annotated[float, Finite, RATIO] = 1.0
 
     def __post_init__(self) -> None:
         instance(
@@ -30,7 +32,7 @@ class GroundMotion:
             Record,
             "pass a Record, such as read_record(path)",
         )
-        check_excitation(self, finite=("scale",))
+        check_excitation(self)
 
     @property
     def duration(self) -> float:

@@ -5,13 +5,15 @@ That is Kanai and Tajimi's filter; Clough and Penzien's leaves long periods out.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields, checked
-from ..core.checks import attributes, counted, whole
+from ..core.checks import counted
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Between, NotNegative, Positive, Unit
 from .record import Record
 
 
@@ -23,18 +25,18 @@ class KanaiTajimi:
 
     S = S0 (wg⁴ + 4 zg² wg² w²) / ((wg² - w²)² + 4 zg² wg² w²) · w⁴ / ((wf² - w²)² + 4 zf² wf² w²),
     the last factor only when omega_f > 0 (Clough and Penzien, 1975). s0: density of the rock's
-    white noise [m²/s³]; omega_g, omega_f [rad/s]; zeta_g, zeta_f: damping ratios. The default is
-    firm ground. Raises InputError unless s0, omega_g, zeta_g, zeta_f > 0 and omega_f >= 0.
+    white noise; omega_g, omega_f: frequencies; zeta_g, zeta_f: damping ratios. The default is firm
+    ground.
     """
 
-    s0: float
-    omega_g: float = 15.6
-    zeta_g: float = 0.6
-    omega_f: float = 1.5
-    zeta_f: float = 0.6
+    s0: Annotated[float, Positive, Unit("m²/s³")]
+    omega_g: Annotated[float, Positive, Unit("rad/s")] = 15.6
+    zeta_g: Annotated[float, Positive, RATIO] = 0.6
+    omega_f: Annotated[float, NotNegative, Unit("rad/s")] = 1.5
+    zeta_f: Annotated[float, Positive, RATIO] = 0.6
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("s0", "omega_g", "zeta_g", "zeta_f"), not_negative=("omega_f",))
+        check_fields(self)
 
     def density(self, omega: Array) -> Array:
         """Return S(omega) [m²/s³], shape as omega [rad/s]."""
@@ -59,9 +61,9 @@ class Envelope:
     rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise.
     """
 
-    rise: float
-    end: float
-    decay: float
+    rise: Annotated[float, Unit("s")]
+    end: Annotated[float, Unit("s")]
+    decay: Annotated[float, Unit("1/s")]
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -78,10 +80,10 @@ class Envelope:
 @checked
 def synthetic(
     spectrum: KanaiTajimi,
-    duration: float,
-    dt: float,
+    duration: Annotated[float, Unit("s")],
+    dt: Annotated[float, Unit("s")],
     *,
-    seed: int,
+    seed: Annotated[int, Between(0, 2**63 - 1)],
     envelope: Envelope | None = None,
 ) -> Record:
     """Make a motion of this density.
@@ -96,7 +98,7 @@ def synthetic(
     """
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
-    seed = whole("synthetic", "seed", seed, most=2**63 - 1)
+    seed = int(seed)
     counted("synthetic", f"duration={duration!r} and dt={dt!r} s", 4.0 * duration / dt)
     count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
     size = 2 ** math.ceil(math.log2(2 * count))

@@ -7,13 +7,15 @@ straight line.
 import math
 from dataclasses import replace
 from fractions import Fraction
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.arguments import checked
-from ..core.checks import counted, number
+from ..core.checks import counted
 from ..core.errors import InputError
+from ..core.quantities import Finite, Positive, Unit
 from .record import Record
 
 # numerator and denominator of old dt / new dt may not exceed this; the filter grows with them
@@ -22,18 +24,15 @@ HIGHEST = 6  # highest degree of a baseline: beyond it a polynomial follows the 
 
 
 @checked
-def scaled(record: Record, *, factor: float) -> Record:
-    """Scale every sample by `factor`; a negative one turns the motion round.
-
-    Raises InputError unless it is finite.
-    """
-    factor = number("scaled", "factor", factor)
+def scaled(record: Record, *, factor: Annotated[float, Finite]) -> Record:
+    """Scale every sample by `factor`; a negative one turns the motion round."""
+    factor = float(factor)
     return record.changed(factor * record.acceleration, f"scaled by {factor:.6g}")
 
 
 @checked
-def resampled(record: Record, dt: float) -> Record:
-    """Return the record at time step dt [s].
+def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Record:
+    """Return the record at time step dt.
 
     It is interpolated band-limited to smaller steps, and decimated with anti-aliasing to larger
     ones.
@@ -43,10 +42,10 @@ def resampled(record: Record, dt: float) -> Record:
     outside its samples, so a record that does not start and end near zero is bent towards zero over
     ten steps, of the longer kind, at each end. dt must be the record's step times a ratio of whole
     numbers up to 1000; `GroundMotion` interpolates for any other step. Sample 0 stays at t = 0; the
-    new record ends at the last multiple of dt inside the old one. Raises InputError when dt is not
-    positive, not such a ratio, or longer than the record.
+    new record ends at the last multiple of dt inside the old one. Raises InputError when dt is
+    not such a ratio, or longer than the record.
     """
-    dt = number("resampled", "dt", dt, positive=True, unit="seconds")
+    dt = float(dt)
     counted("resampled", f"dt={dt!r} s", record.duration / dt)
     # late: it takes longer to import than the rest of the package
     from scipy.signal import resample_poly

@@ -13,29 +13,27 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from ..core.checks import number, optional
 from ..core.errors import InputError
-from ..core.protocols import check_excitation, finite_tuple, vector
+from ..core.protocols import Direction, check_excitation, finite_tuple, vector
+from ..core.quantities import Finite, NotNegative, Positive, Unit
+
+Acceleration = Annotated[float, Finite, Unit("m/s²")]
 
 
 @dataclass(frozen=True)
 class Harmonic:
-    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
+    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times."""
 
-    amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or
-    not finite.
-    """
-
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-    direction: tuple[float, ...] = (1.0, 0.0)
+    amplitude: Acceleration
+    frequency: Annotated[float, Positive, Unit("Hz")]
+    phase: Annotated[float, Finite, Unit("rad")] = 0.0
+    direction: Direction = (1.0, 0.0)
     duration: ClassVar[float] = math.inf
 
     def __post_init__(self) -> None:
-        check_excitation(self, finite=("amplitude", "phase"), positive=("frequency",))
+        check_excitation(self)
 
     def acceleration(self, t: float) -> float:
         """Return amplitude · sin(2 pi frequency t + phase) [m/s²]."""
@@ -50,20 +48,18 @@ class Ricker:
 
     a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))².
 
-    amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the
-    time of the peak, by default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller
-    one starts with a jump. Velocity and displacement both return to zero. Raises InputError for
-    values out of range or not finite.
+    amplitude: the peak; frequency: where the spectrum peaks; delay: the time of the peak, by
+    default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a
+    jump. Velocity and displacement both return to zero.
     """
 
-    amplitude: float
-    frequency: float
-    delay: float | None = None
-    direction: tuple[float, ...] = (1.0, 0.0)
+    amplitude: Acceleration
+    frequency: Annotated[float, Positive, Unit("Hz")]
+    delay: Annotated[float | None, NotNegative, Unit("s")] = None
+    direction: Direction = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_excitation(self, finite=("amplitude",), positive=("frequency",))
-        optional(number, "Ricker", "delay", self.delay, not_negative=True, unit="seconds")
+        check_excitation(self)
 
     @property
     def peak_time(self) -> float:
@@ -85,18 +81,14 @@ class Ricker:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Hold what one-sided and two-sided pulses share.
+    """Hold what one-sided and two-sided pulses share."""
 
-    Raises:
-        InputError: the amplitude [m/s²] is not finite, or the duration [s] not > 0.
-    """
-
-    amplitude: float
-    duration: float
-    direction: tuple[float, ...] = (1.0, 0.0)
+    amplitude: Acceleration
+    duration: Annotated[float, Positive, Unit("s")]
+    direction: Direction = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_excitation(self, finite=("amplitude",), positive=("duration",))
+        check_excitation(self)
 
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] inside the pulse, 0 outside.
@@ -140,22 +132,22 @@ class Rectangular(Pulse):
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Shake with accelerations [m/s²] at given times [s].
+    """Shake with accelerations at given times.
 
     There are straight lines between them, and zero before and after them.
 
     times: strictly increasing, at least two; values: as many, kept as tuples. InputError for
-    others, NaN, infinity.
+    others.
     """
 
-    times: Sequence[float]
-    values: Sequence[float]
-    direction: tuple[float, ...] = (1.0, 0.0)
+    times: Annotated[Sequence[float], Finite, Unit("s")]
+    values: Annotated[Sequence[float], Finite, Unit("m/s²")]
+    direction: Direction = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_excitation(self)
         for name in ("times", "values"):
             object.__setattr__(self, name, finite_tuple("Tabulated", name, getattr(self, name)))
+        check_excitation(self)
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise InputError(
                 f"Tabulated: there are {len(self.times)} times and {len(self.values)} values; "

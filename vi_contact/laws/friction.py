@@ -14,32 +14,36 @@ becomes either. The slope may depend on the slip rate: `at`.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import function, real, shown
+from ..core.arguments import check_fields
+from ..core.checks import function, shown
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Between, Unit
+
+ONE_EACH = "give zero or a positive finite number, or one per point"
+PerPoint = Annotated[float | Array | tuple[float, ...], Between(0.0, math.inf, remedy=ONE_EACH)]
 
 
 @dataclass(frozen=True)
 class Tresca:
-    """Bound friction by a threshold [Pa] >= 0, whether or not the node touches.
+    """Bound friction by a threshold, whether or not the node touches.
 
     limit = threshold · weight · scale.
 
-    ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when
-    one is negative or not a finite number, and, when used, for a wrong count.
+    ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError for
+    a wrong count, when used.
     """
 
     never_negative: ClassVar[bool] = True  # it has checked its values
-    threshold: float | Array | tuple[float, ...]
+    threshold: Annotated[PerPoint, Unit("Pa"), "the threshold"]
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "threshold", _checked("Tresca", "the threshold [Pa]", self.threshold)
-        )
+        check_fields(self)
+        object.__setattr__(self, "threshold", _frozen("Tresca", self.threshold))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return threshold · weights · scale, shape (n,)."""
@@ -60,18 +64,18 @@ class Tresca:
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Bound dry friction by a coefficient mu >= 0: limit = mu · r_n, zero for an open node.
+    """Bound dry friction by a coefficient mu: limit = mu · r_n, zero for an open node.
 
-    ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised
-    when one is negative or not a finite number, and, when the law is used, if their count is
-    wrong.
+    ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised,
+    when the law is used, if their count is wrong.
     """
 
     never_negative: ClassVar[bool] = True  # it has checked its values
-    mu: float | Array | tuple[float, ...]
+    mu: Annotated[PerPoint, RATIO, "the friction coefficient mu"]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", _checked("Coulomb", "the friction coefficient mu", self.mu))
+        check_fields(self)
+        object.__setattr__(self, "mu", _frozen("Coulomb", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return mu · max(r_n, 0), shape (n,).
@@ -101,7 +105,7 @@ class SlipRateCoulomb:
     static coefficient.
     """
 
-    mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"
+    mu: Annotated["ExponentialDecay | StaticKinetic | Callable[[Array], Any]", RATIO]
 
     def __post_init__(self) -> None:
         function(
@@ -139,22 +143,15 @@ class SlipRateCoulomb:
 
 @dataclass(frozen=True)
 class TwoCoefficients:
-    """Hold static and kinetic coefficients: numbers >= 0, or one per contact point.
+    """Hold static and kinetic coefficients, or one of both per contact point."""
 
-    InputError for other values.
-    """
-
-    mu_s: float | Array | tuple[float, ...]
-    mu_k: float | Array | tuple[float, ...]
+    mu_s: Annotated[PerPoint, RATIO, "the static coefficient mu_s"]
+    mu_k: Annotated[PerPoint, RATIO, "the kinetic coefficient mu_k"]
 
     def __post_init__(self) -> None:
-        for name, meaning in (
-            ("mu_s", "the static coefficient mu_s"),
-            ("mu_k", "the kinetic coefficient mu_k"),
-        ):
-            object.__setattr__(
-                self, name, _checked(type(self).__name__, meaning, getattr(self, name))
-            )
+        check_fields(self)
+        for name in ("mu_s", "mu_k"):
+            object.__setattr__(self, name, _frozen(type(self).__name__, getattr(self, name)))
         if (
             isinstance(self.mu_s, tuple)
             and isinstance(self.mu_k, tuple)
@@ -176,21 +173,17 @@ class TwoCoefficients:
 class ExponentialDecay(TwoCoefficients):
     """Give a friction coefficient that decays with the slip rate.
 
-    mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c
-    [m/s] > 0.
+    mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c.
 
-    mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
+    mu_s, mu_k: numbers, or one per contact point.
     """
 
-    v_c: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0.0 < real(self.v_c) < math.inf:
-            raise InputError(
-                f"ExponentialDecay: v_c [m/s] is {shown(self.v_c)}; give a positive speed, or "
-                "StaticKinetic()"
-            )
+    v_c: Annotated[
+        float,
+        Between(0.0, math.inf, "(]", "give a positive speed, or StaticKinetic()"),
+        Unit("m/s"),
+        "v_c",
+    ]
 
     def __call__(self, speed: Array) -> Array:
         """Return mu of each speed."""
@@ -204,7 +197,7 @@ class StaticKinetic(TwoCoefficients):
 
     Where both hold, rest is chosen.
 
-    mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values.
+    mu_s >= mu_k: numbers, or one per contact point.
     """
 
     def __post_init__(self) -> None:
@@ -239,15 +232,11 @@ def project(r_t: Array, limit: Array) -> Array:
     return r_t * factor[:, np.newaxis]
 
 
-def _checked(law: str, meaning: str, value: Any) -> Any:
+def _frozen(law: str, value: Any) -> Any:
     """Return the value, or those of a field as a tuple (frozen, comparable)."""
+    if np.ndim(value) > 1:
+        raise InputError(f"{law}: the values have shape {np.shape(value)}; {ONE_EACH}")
     field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
-    for one in value if field else [value]:
-        if not 0.0 <= real(one) < math.inf:
-            raise InputError(
-                f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one "
-                "per point"
-            )
     return tuple(float(one) for one in value) if field else value
 
 

@@ -19,17 +19,19 @@ has no macroscopic effect.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array, EffectiveMatrix, Indices, largest, max_abs, total
-from ..core.checks import between, function
+from ..core.arguments import check_fields
+from ..core.checks import function
 from ..core.condensation import condense
 from ..core.corners import with_open_faces
 from ..core.free_unknowns import solve_free
 from ..core.protocols import Impact
+from ..core.quantities import RATIO, Between
 from ..core.sizes import small
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
@@ -181,18 +183,17 @@ class Newton(ByUpdate):
     at every dt.
     """
 
-    e: float
+    e: Annotated[
+        float,
+        Between(0.0, 1.0, remedy="give a number from 0 (inelastic) to 1 (elastic)"),
+        RATIO,
+        "restitution coefficient e",
+    ]
     update: VelocityUpdate = field(default_factory=ComponentReset)
 
     def __post_init__(self) -> None:
-        between(
-            "restitution coefficient e",
-            self.e,
-            0.0,
-            1.0,
-            "give a number from 0 (inelastic) to 1 (elastic)",
-        )
         function("Newton", "update", self.update, UPDATE)
+        check_fields(self)
 
     def target(self, impact: Impact) -> Array:
         """Return -e v_n⁻ at conditions that have just closed, NaN elsewhere."""

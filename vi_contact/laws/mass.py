@@ -10,13 +10,15 @@ problem has a unique energy-conserving solution, and contact forces are those of
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array, Comm, Indices, Mask, Matrix, largest, max_abs, total
-from ..core.checks import between
+from ..core.arguments import check_fields
 from ..core.corners import lumped_entries
 from ..core.errors import InputError
+from ..core.quantities import Between
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from .mass_transfer import from_neighbours, named, rigid_motions
@@ -63,10 +65,12 @@ class Redistributed:
     to hold the inertia.
     """
 
-    lumping: float = 0.4
+    lumping: Annotated[
+        float, Between(0.0, 1.0, remedy="give a share from 0 (consistent) to 1 (lumped)")
+    ] = 0.4
 
     def __post_init__(self) -> None:
-        between("lumping", self.lumping, 0.0, 1.0, "give a share from 0 (consistent) to 1 (lumped)")
+        check_fields(self)
 
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool

@@ -8,34 +8,41 @@ is needed.
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
-from ..core.checks import attributes, number, shown
+from ..core.arguments import check_fields, checked
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Between, NotNegative, Positive, Unit
 
 EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any more
-RATIO = "give ratios from 0 to less than 1, not per cent"
-
-
-def check_ratio(owner: str, xi: Any) -> None:
-    """Raise InputError unless the damping ratio of a material is a number from 0 to less than 1."""
-    if not 0.0 <= number(owner, "the damping ratio xi", xi) < 1.0:
-        raise InputError(f"{owner}: the damping ratio xi is {shown(xi)}; {RATIO}")
+BELOW_ONE = Between(0.0, 1.0, "[)", "give ratios from 0 to less than 1, not per cent")
+DampedBy = Annotated[float, BELOW_ONE, RATIO, "the damping ratio xi"]
+Density = Annotated[float, Positive, Unit("kg/m³"), "the mass density rho"]
+Thickness = Annotated[float, Positive, Unit("m"), "the thickness"]
 
 
 @dataclass(frozen=True)
 class LinearElastic:
     """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
-    E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0;
-    xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads it.
-    InputError is raised when one of them is outside its range or not finite.
+    xi is that at the frequency of ``DampingRatio``, the one law that reads it.
     """
 
-    E: float
-    nu: float
-    rho: float
-    xi: float = 0.0
+    E: Annotated[float, Positive, Unit("Pa"), "Young's modulus E"]
+    nu: Annotated[
+        float,
+        Between(
+            -1.0,
+            0.5,
+            "()",
+            "give a number between -1 and 0.5, both excluded (nearly incompressible materials need "
+            "a mixed method)",
+        ),
+        RATIO,
+        "Poisson's ratio nu",
+    ]
+    rho: Density
+    xi: DampedBy = 0.0
 
     def __post_init__(self) -> None:
         if any(
@@ -46,34 +53,29 @@ class LinearElastic:
                 "LinearElastic: E, nu, rho and xi are numbers; give fem.Heterogeneous(E, nu, rho, "
                 "xi) where they change from place to place"
             )
-        number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
-        number("LinearElastic", "Poisson's ratio nu", self.nu)
-        number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
+        check_fields(self)
         if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= self.rho <= EXTREME):
             raise InputError(
                 f"LinearElastic: no material has E = {self.E:g} Pa and rho = {self.rho:g} kg/m³; "
                 f"give numbers between {1.0 / EXTREME:g} and {EXTREME:g}"
             )
-        if not -1.0 < self.nu < 0.5:
-            raise InputError(
-                f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and "
-                "0.5, both excluded (nearly incompressible materials need a mixed method)"
-            )
-        check_ratio("LinearElastic", self.xi)
 
     @classmethod
+    @checked
     def from_wave_speeds(
-        cls, c_p: float, c_s: float, rho: float, xi: float = 0.0
+        cls,
+        c_p: Annotated[float, Positive, Unit("m/s"), "c_p"],
+        c_s: Annotated[float, Positive, Unit("m/s"), "c_s"],
+        rho: Annotated[float, Positive, Unit("kg/m³"), "rho"],
+        xi: DampedBy = 0.0,
     ) -> "LinearElastic":
-        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
+        """Return the material whose pressure and shear waves travel at c_p and c_s.
 
         Its damping ratio is xi.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 +
         nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
         """
-        for name, speed in (("c_p [m/s]", c_p), ("c_s [m/s]", c_s), ("rho [kg/m³]", rho)):
-            number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
             raise InputError(
                 f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
@@ -143,15 +145,15 @@ class Section(Protocol):
 
 @dataclass(frozen=True)
 class PlaneStress:
-    """Cut a panel of this thickness [m], free of stress across it.
+    """Cut a panel of this thickness, free of stress across it.
 
     lambda_eff = 2 lambda mu / (lambda + 2 mu).
     """
 
-    thickness: float = 1.0
+    thickness: Thickness = 1.0
 
     def __post_init__(self) -> None:
-        number("PlaneStress", "the thickness [m]", self.thickness, positive=True)
+        check_fields(self)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """Return (lambda_eff, shear_modulus) [Pa].
@@ -164,15 +166,15 @@ class PlaneStress:
 
 @dataclass(frozen=True)
 class PlaneStrain:
-    """Cut a slice of the given thickness [m] of a long body that cannot strain along its axis.
+    """Cut a slice of the given thickness of a long body that cannot strain along its axis.
 
     lambda_eff = lambda.
     """
 
-    thickness: float = 1.0
+    thickness: Thickness = 1.0
 
     def __post_init__(self) -> None:
-        number("PlaneStrain", "the thickness [m]", self.thickness, positive=True)
+        check_fields(self)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
         """Return (lame_lambda, shear_modulus) [Pa]."""
@@ -213,15 +215,13 @@ class NoDamping:
 class MassProportional:
     """Damp by a force c u' per unit volume.
 
-    rho u'' + c u' = div sigma + f; c in [kg/(m³ s)] >= 0.
+    rho u'' + c u' = div sigma + f.
     """
 
-    c: float
+    c: Annotated[float, NotNegative, Unit("kg/m³/s"), "the damping coefficient c"]
 
     def __post_init__(self) -> None:
-        number(
-            "MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c, not_negative=True
-        )
+        check_fields(self)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (c / rho, 0).
@@ -233,24 +233,31 @@ class MassProportional:
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """Damp by C = alpha M + beta K, with alpha [1/s] >= 0 and beta [s] >= 0.
+    """Damp by C = alpha M + beta K.
 
     K is the stiffness without any contact term.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with
-    uplift prefer alpha = 0. Raises InputError for a negative or non-finite coefficient.
+    uplift prefer alpha = 0.
     """
 
-    alpha: float
-    beta: float
+    alpha: Annotated[float, NotNegative, Unit("1/s"), "the mass coefficient alpha"]
+    beta: Annotated[float, NotNegative, Unit("s"), "the stiffness coefficient beta"]
 
     def __post_init__(self) -> None:
-        number("Rayleigh", "the mass coefficient alpha [1/s]", self.alpha, not_negative=True)
-        number("Rayleigh", "the stiffness coefficient beta [s]", self.beta, not_negative=True)
+        check_fields(self)
 
     @classmethod
-    def from_frequencies(cls, f1: float, f2: float, *, xi1: float, xi2: float) -> "Rayleigh":
-        """Make the damping of ratio xi1 at f1, xi2 at f2 [Hz].
+    @checked
+    def from_frequencies(
+        cls,
+        f1: Annotated[float, Positive, Unit("Hz"), "the frequency f1"],
+        f2: Annotated[float, Positive, Unit("Hz"), "the frequency f2"],
+        *,
+        xi1: Annotated[float, NotNegative, RATIO, "the damping ratio xi1"],
+        xi2: Annotated[float, NotNegative, RATIO, "the damping ratio xi2"],
+    ) -> "Rayleigh":
+        """Make the damping of ratio xi1 at f1, xi2 at f2.
 
         alpha / (2 w_i) + beta w_i / 2 = xi_i, w_i = 2 pi f_i.
 
@@ -259,10 +266,6 @@ class Rayleigh:
         10 Hz: 0.5712 1/s and 1.4469e-3 s. Raises InputError when f1 = f2 or when the solution needs
         a negative coefficient.
         """
-        for name, f in (("f1", f1), ("f2", f2)):
-            number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
-        for name, xi in (("xi1", xi1), ("xi2", xi2)):
-            number("Rayleigh.from_frequencies", f"the damping ratio {name}", xi, not_negative=True)
         if f1 == f2:
             raise InputError(
                 f"Rayleigh.from_frequencies: f1 and f2 are both {f1!r} Hz; give two frequencies"
@@ -283,21 +286,21 @@ class Rayleigh:
         """Return (alpha, beta), whatever the material."""
         return self.alpha, self.beta
 
-    def ratio(self, f: float) -> float:
-        """Return the damping ratio of a mode of frequency f = w / 2 pi [Hz] > 0.
+    @checked
+    def ratio(self, f: Annotated[float, Positive, Unit("Hz"), "the frequency f"]) -> float:
+        """Return the damping ratio of a mode of frequency f = w / 2 pi.
 
         It is alpha / (2 w) + beta w / 2.
 
         Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
         """
-        number("Rayleigh.ratio", "the frequency f [Hz]", f, positive=True)
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)
 
 
 @dataclass(frozen=True)
 class DampingRatio:
-    """Damp by the ratio xi of each material at one frequency f1 [Hz], or at two.
+    """Damp by the ratio xi of each material at one frequency f1, or at two.
 
     Every material has a xi, zero by default; that of ``fem.Heterogeneous`` may change from cell to
     cell. ``assemble`` refuses the law where no material has one, and a ratio of a material without
@@ -311,12 +314,11 @@ class DampingRatio:
     (see ``Rayleigh``).
     """
 
-    frequency: float
-    second: float = 0.0
+    frequency: Annotated[float, Positive, Unit("Hz"), "frequency"]
+    second: Annotated[float, NotNegative, Unit("Hz"), "second"] = 0.0
 
     def __post_init__(self) -> None:
-        number("DampingRatio", "frequency [Hz]", self.frequency, positive=True)
-        number("DampingRatio", "second [Hz]", self.second, not_negative=True)
+        check_fields(self)
 
     def coefficients(self, material: LinearElastic) -> tuple[Any, Any]:
         """Return (alpha [1/s], beta [s]), of values at points where xi is."""
@@ -329,7 +331,7 @@ class DampingRatio:
 class KelvinVoigt:
     """Damp by sigma_v = bulk tr(eps') I + 2 shear dev(eps').
 
-    The viscosities are shear, bulk [Pa s] >= 0.
+    The viscosities are shear and bulk.
 
         C = ∫ sigma_v(v):eps(w) = ∫ (bulk - 2/3 shear) tr(eps(v)) tr(eps(w)) + 2 shear eps(v):eps(w)
 
@@ -338,15 +340,14 @@ class KelvinVoigt:
     4/3 shear) / (lambda + 2 mu) in a bar without lateral strain. Not for PlaneStress, where the
     strain across the panel would have a motion of its own (``assemble`` refuses it). With
     viscosities beta times the shear and bulk moduli, mu and lambda + 2/3 mu, it is Rayleigh(0,
-    beta), the solid of one retardation time, which goes with PlaneStress too. Raises InputError for
-    a viscosity that is negative or not finite.
+    beta), the solid of one retardation time, which goes with PlaneStress too.
     """
 
-    shear: float
-    bulk: float = 0.0
+    shear: Annotated[float, NotNegative, Unit("Pa·s")]
+    bulk: Annotated[float, NotNegative, Unit("Pa·s")] = 0.0
 
     def __post_init__(self) -> None:
-        attributes(self, not_negative=("shear", "bulk"))
+        check_fields(self)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (0, 0): nothing is proportional to the mass or the stiffness of a material."""

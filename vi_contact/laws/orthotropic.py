@@ -6,19 +6,25 @@ It has nine engineering constants.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import check_fields
 from ..core.checks import array, number
 from ..core.errors import InputError
-from .materials import PlaneStress, Section, check_ratio
+from ..core.quantities import RATIO, Finite, Positive, Unit
+from .materials import DampedBy, PlaneStress, Section
 
 NORMAL, SHEAR = ("1", "2", "3"), ("12", "13", "23")
 DEFINITE = 1e-12  # the least eigenvalue of the scaled compliance, whose diagonal is one
 ROUND_OFF = 1e-12
 VOIGT = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
 """Components of a symmetric tensor as a vector, by dimension; of strains 2 eps_ij where i != j."""
+
+Modulus = Annotated[float, Positive, Unit("Pa")]
+Contraction = Annotated[float, Finite, RATIO]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,40 +37,36 @@ class Orthotropic:
     with i != j: nu_ij is the contraction along j under a stress along i alone.
 
     Args:
-        E1, E2, E3: Young's moduli [Pa] > 0.
-        G12, G13, G23: shear moduli [Pa] > 0.
-        rho: mass density [kg/m³] > 0.
+        E1, E2, E3: Young's moduli.
+        G12, G13, G23: shear moduli.
+        rho: mass density.
         nu12, nu13, nu23: Poisson's ratios.
         axes: the angle [rad] from x to axis 1, anticlockwise about z, which is axis 3; or a
             rotation matrix (3, 3) whose columns are the axes 1, 2, 3. A body in the plane needs z
             among the axes.
-        xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads
-            it.
+        xi: damping ratio at the frequency of ``DampingRatio``, the one law that reads it.
 
     Raises:
-        InputError: a modulus or density that is not positive, ratios with which some strain would
-            have negative energy, axes that are no rotation.
+        InputError: ratios with which some strain would have negative energy, axes that are no
+            rotation.
     """
 
-    E1: float
-    E2: float
-    E3: float
-    nu12: float
-    nu13: float
-    nu23: float
-    G12: float
-    G13: float
-    G23: float
-    rho: float
-    axes: float | Sequence[Sequence[float]] = 0.0
-    xi: float = 0.0
+    E1: Modulus
+    E2: Modulus
+    E3: Modulus
+    nu12: Contraction
+    nu13: Contraction
+    nu23: Contraction
+    G12: Modulus
+    G13: Modulus
+    G23: Modulus
+    rho: Annotated[float, Positive, Unit("kg/m³")]
+    axes: Annotated[float | Sequence[Sequence[float]], Unit("rad")] = 0.0
+    xi: DampedBy = 0.0
 
     def __post_init__(self) -> None:
-        for name in (*(f"E{i}" for i in NORMAL), *(f"G{ij}" for ij in SHEAR), "rho"):
-            number("Orthotropic", name, getattr(self, name), positive=True)
-        for name in (f"nu{ij}" for ij in SHEAR):
-            number("Orthotropic", name, getattr(self, name))
-        check_ratio("Orthotropic", self.xi)
+        _ = self._rotation
+        check_fields(self)
         root = np.sqrt([self.E1, self.E2, self.E3])
         if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
             raise InputError(

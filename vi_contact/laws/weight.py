@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array, largest, max_abs
-from ..core.checks import array, instance, number, several, whole
+from ..core.arguments import checked
+from ..core.checks import array, whole
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Finite, Remedy, Unit
 from ..core.system import SemiDiscreteSystem
 from ..core.units import STANDARD_GRAVITY
 from .free_motions import bodies_in
@@ -17,16 +20,19 @@ ALIKE = 0.05  # of a weight: what 9.81 for 9.80665, or a rounded unit weight, is
 SHARE = 0.1  # of the unknowns of a body: a load on so many is no traction
 
 
+@checked
 def with_weight(
-    system: SemiDiscreteSystem,
+    system: Annotated[SemiDiscreteSystem, Remedy("give a system, such as fem.assemble returns")],
     *,
-    acceleration: float = STANDARD_GRAVITY,
-    direction: tuple[float, ...] | None = None,
-    bodies: Sequence[int] | None = None,
+    acceleration: Annotated[float, Finite, Unit("m/s²")] = STANDARD_GRAVITY,
+    direction: Annotated[tuple[float, ...] | None, RATIO] = None,
+    bodies: Annotated[
+        Sequence[int] | None, Remedy("give numbers such as fem.bodies_of returns, or None")
+    ] = None,
 ) -> SemiDiscreteSystem:
     """Return the same system under its own weight, f + M r g: whatever its materials and densities.
 
-    acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by
+    acceleration: g; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by
     default, in one dimension (-1,). bodies: the numbers of those that have weight
     (``fem.bodies_of``), all by default. It is the load of ``BodyForce`` with the density of every
     material. InputError for a direction of another length, and a system without ``base_inertia``:
@@ -34,14 +40,6 @@ def with_weight(
     has already, as a constant load of nearly its size: of ``BodyForce``, or of this function.
     Collective.
     """
-    instance(
-        "with_weight",
-        "system",
-        system,
-        SemiDiscreteSystem,
-        "give a system, such as fem.assemble returns",
-    )
-    number("with_weight", "acceleration", acceleration, unit="m/s²")
     d = system.influence.shape[1]
     down = (*(0.0,) * (d - 1), -1.0)
     way = array("with_weight", "direction", down if direction is None else direction, (None,))
@@ -56,10 +54,7 @@ def with_weight(
     if bodies is not None:
         numbers = np.asarray(system.space.bodies)
         last = bodies_in(system.algebra.comm, numbers) - 1
-        given = several(
-            "with_weight", "bodies", bodies, "give numbers such as fem.bodies_of returns, or None"
-        )
-        heavy = [whole("with_weight", "the number of a body", one, most=last) for one in given]
+        heavy = [whole("with_weight", "the number of a body", one, most=last) for one in bodies]
         weight = np.where(np.isin(numbers, heavy), weight, 0.0)
     if bodies is None or len(bodies):
         _refuse_vain(system, weight)

@@ -10,13 +10,14 @@ six.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Unit
 from vi_contact.meshes.grid import Array, Grid, add_grids, lattice
 
 SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
@@ -31,12 +32,12 @@ class BlockMesh:
     InputError if the sizes make no box.
     """
 
-    lengths: tuple[float, ...] = (1.0, 1.0)
+    lengths: Annotated[tuple[float, ...], Unit("m")] = (1.0, 1.0)
     divisions: tuple[int, ...] = (1, 1)
     simplices: bool = False
-    corner: tuple[float, ...] | None = None
-    deform: Callable[[Array], Array] | None = None
-    angle: float = 0.0
+    corner: Annotated[tuple[float, ...] | None, Unit("m")] = None
+    deform: Annotated[Callable[[Array], Array] | None, Unit("m")] = None
+    angle: Annotated[float, Unit("rad")] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -13,13 +13,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import MOST_CELLS, attributes, counted
+from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Positive, Unit
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.grid import Array, add_outline
 from vi_contact.meshes.rows import Mask, Rows
@@ -27,34 +28,29 @@ from vi_contact.meshes.rows import Mask, Rows
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelMesh:
-    """Describe a layer, width x depth [m], and a channel in it.
+    """Describe a layer, width x depth, and a channel in it.
 
-    The channel is `outer_width` x `height`, of `wall` and `slab` [m].
+    The channel is `outer_width` x `height`, of `wall` and `slab`.
 
     `left` is x of the outer left side of the channel, which is in the middle by default. Every part
-    is divided evenly into rectangles of about `size` [m], or with `triangles` into their halves.
-    With `far` [m] the mesh has irregular triangles, which grow from `size` at the channel to `far`
+    is divided evenly into rectangles of about `size`, or with `triangles` into their halves.
+    With `far` the mesh has irregular triangles, which grow from `size` at the channel to `far`
     at bedrock and sides. Raises InputError for sizes that make no such layer.
     """
 
-    width: float = 24.0
-    depth: float = 8.0
-    outer_width: float = 4.0
-    height: float = 3.0
-    wall: float = 0.5
-    slab: float = 0.5
-    left: float | None = None
-    size: float = 0.5
-    far: float | None = None
+    width: Annotated[float, Positive, Unit("m")] = 24.0
+    depth: Annotated[float, Positive, Unit("m")] = 8.0
+    outer_width: Annotated[float, Positive, Unit("m")] = 4.0
+    height: Annotated[float, Positive, Unit("m")] = 3.0
+    wall: Annotated[float, Positive, Unit("m")] = 0.5
+    slab: Annotated[float, Positive, Unit("m")] = 0.5
+    left: Annotated[float | None, Unit("m")] = None
+    size: Annotated[float, Positive, Unit("m")] = 0.5
+    far: Annotated[float | None, Positive, Unit("m")] = None
     triangles: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self)
-        given = () if self.far is None else ("far",)
-        attributes(
-            self,
-            positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given),
-        )
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
             raise InputError(
                 f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a "

@@ -17,10 +17,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
-from vi_contact.core.checks import number, shown, whole
+from vi_contact.core.arguments import check_fields
+from vi_contact.core.checks import number, shown
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Between, Positive, Unit
 from vi_contact.meshes.geo_script import PREFIX, allowed
 from vi_contact.meshes.gmsh_session import options, session
 from vi_contact.meshes.mesh_file import safe_copy
@@ -46,7 +48,7 @@ class GeoFile:
         path: the script.
         refine: how often Gmsh divides all cells into 2^d; new nodes lie on the curves of the
             geometry.
-        time_limit: seconds that the meshing may take.
+        time_limit: what the meshing may take.
         numbers: values of names that the script uses and does not set, or sets by DefineConstant
             alone; as Gmsh's option -setnumber.
 
@@ -56,13 +58,11 @@ class GeoFile:
     """
 
     path: Path
-    refine: int = 0
-    time_limit: float = 300.0
+    refine: Annotated[int, Between(0, MOST)] = 0
+    time_limit: Annotated[float, Positive, Unit("s")] = 300.0
     numbers: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        whole("GeoFile", "refine", self.refine, most=MOST)
-        number("GeoFile", "time_limit", self.time_limit, positive=True, unit="seconds")
         if not isinstance(self.numbers, Mapping):
             raise InputError(
                 f"GeoFile: numbers is {shown(self.numbers)}; give names and their values"
@@ -73,6 +73,7 @@ class GeoFile:
                     f"GeoFile: numbers has the name {shown(name)}; give a name of the script"
                 )
             number("GeoFile", f"numbers of '{name}'", value)
+        check_fields(self)
 
     def build(self, gmsh: Any) -> None:
         """Mesh the script beside this process and read the mesh into Gmsh's current model."""

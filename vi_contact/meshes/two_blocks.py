@@ -8,10 +8,11 @@ lowest, highest), "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
 
 from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Unit
 from vi_contact.meshes.block import SIDES, BlockMesh
 from vi_contact.meshes.grid import Grid, add_grids
 
@@ -63,9 +64,9 @@ class TwoBlocks:
 
     lower: BlockMesh = field(default_factory=BlockMesh)
     upper: BlockMesh = field(default_factory=BlockMesh)
-    offset: tuple[float, ...] = (0.0, 0.0)
-    gap: float = 0.0
-    angle: float = 0.0
+    offset: Annotated[tuple[float, ...], Unit("m")] = (0.0, 0.0)
+    gap: Annotated[float, Unit("m")] = 0.0
+    angle: Annotated[float, Unit("rad")] = 0.0
 
     @property
     def interface(self) -> tuple[str, str]:

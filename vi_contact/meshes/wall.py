@@ -8,11 +8,12 @@ Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the c
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Unit
 from vi_contact.meshes.block import check_box
 from vi_contact.meshes.grid import Grid, add_grids, add_outline, lattice
 
@@ -29,10 +30,10 @@ class WallMesh:
     no wall.
     """
 
-    height: float = 9.0
-    width: float = 6.0
+    height: Annotated[float, Unit("m")] = 9.0
+    width: Annotated[float, Unit("m")] = 6.0
     divisions: tuple[int, int] | None = None
-    size: float | None = None
+    size: Annotated[float | None, Unit("m")] = None
     triangles: bool = False
 
     def __post_init__(self) -> None:

@@ -10,14 +10,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from ..core.algebra import Array, Indices, Mask, total
-from ..core.checks import array, attributes, column_name, instance
+from ..core.arguments import check_fields
+from ..core.checks import array, column_name, flag, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
+from ..core.quantities import Unit
 from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import ContactSurface
 from ..core.verify import Energies, energies, energy_balance
@@ -213,7 +215,7 @@ class Contact:
     _ARRAYS: ClassVar[tuple[str, ...]] = ("pressure", "gap", "active", "traction_t", "slip")
 
     def __post_init__(self) -> None:
-        attributes(self, flags=("arrays",))
+        check_fields(self)
 
     def columns(self) -> Columns:
         """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active.
@@ -331,13 +333,14 @@ class Probe:
     outside the body.
     """
 
-    points: Mapping[Any, Sequence[float]]
+    points: Annotated[Mapping[Any, Sequence[float]], Unit("m")]
     velocity: bool = False
     acceleration: bool = False
 
     def __post_init__(self) -> None:
-        attributes(self, flags=("velocity", "acceleration"))
         instance("Probe", "points", self.points, Mapping, "give labels and points, {'top': (x, y)}")
+        for name in ("velocity", "acceleration"):
+            flag("Probe", name, getattr(self, name))
         if not self.points:
             raise InputError(
                 "Probe: points is empty; give labels and points, {'top': (x, y)}, or leave it out"

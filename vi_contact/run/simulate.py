@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from ..core.algebra import Comm
 from ..core.arguments import check
@@ -17,6 +17,7 @@ from ..core.collective import Parts, agree, together, users
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
+from ..core.quantities import Unit
 from ..core.state_checks import check_problem_given, initial_state
 from ..core.step import Columns, Recorder, Report, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
@@ -40,8 +41,8 @@ def simulate(
     *,
     scheme: Scheme | None = None,
     solver: Solver | None = None,
-    dt: TimeSteps,
-    t_end: float | None = None,
+    dt: Annotated[TimeSteps, Unit("s")],
+    t_end: Annotated[float | None, Unit("s")] = None,
     steps: int | None = None,
     record: Sequence[Recorder] | None = None,
     out: str | Path | None = None,

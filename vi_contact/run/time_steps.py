@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, isfinite
-from typing import Any
+from typing import Annotated, Any
 
 from ..core.checks import number, shown, whole
 from ..core.errors import InputError
+from ..core.quantities import Unit
 
 HALVINGS = 20  # at most: a millionth of the base step
 SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece
@@ -36,7 +37,7 @@ class Schedule:
     not increase.
     """
 
-    pieces: tuple[tuple[float, float], ...]
+    pieces: Annotated[tuple[tuple[float, float], ...], Unit("s")]
 
     def __post_init__(self) -> None:
         try:
@@ -71,7 +72,7 @@ class HalvedAtImpact:
     not a whole number from 0 to 20.
     """
 
-    dt: float | Schedule
+    dt: Annotated[float | Schedule, Unit("s")]
     halvings: int = 3
 
     def __post_init__(self) -> None:

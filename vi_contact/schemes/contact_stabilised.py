@@ -33,7 +33,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask
-from ..core.checks import flag
+from ..core.arguments import check_fields
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
 from ..core.protocols import Frictionless
@@ -55,7 +55,7 @@ class ContactStabilisedNewmark(SingleStep):
     projected: bool = True
 
     def __post_init__(self) -> None:
-        flag("ContactStabilisedNewmark", "projected", self.projected)
+        check_fields(self)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 4/dt² M + 2/dt C + K."""

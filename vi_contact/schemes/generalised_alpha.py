@@ -30,14 +30,16 @@ Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix
-from ..core.checks import between, real, shown
+from ..core.arguments import checked
+from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.quantities import Between
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import BalanceStep, position_step
 from .consistent_data import consistent_acceleration, equilibrated, massless_take
@@ -197,13 +199,22 @@ class GeneralisedAlpha(AlphaStep):
         return self
 
     @classmethod
-    def spectral_radius(cls, rho_inf: float = 0.8) -> "GeneralisedAlpha":
+    @checked
+    def spectral_radius(
+        cls,
+        rho_inf: Annotated[
+            float,
+            Between(
+                0.0,
+                1.0,
+                remedy="give the amplification at infinite frequency, from 0 to 1 (no damping)",
+            ),
+        ] = 0.8,
+    ) -> "GeneralisedAlpha":
         """Return the member of order 2 with this amplification at infinite frequency.
 
         It goes from 0 (all damped) to 1 (none).
         """
-        remedy = "give the amplification at infinite frequency, from 0 to 1 (no damping)"
-        between("rho_inf", rho_inf, 0.0, 1.0, remedy)
         alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)
         apart = alpha_f - alpha_m
         return cls(alpha_m, alpha_f, beta=0.25 * (1.0 + apart) ** 2, gamma=0.5 + apart)

@@ -17,25 +17,24 @@ has numbers. Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
-from ..core.checks import between
+from ..core.arguments import check_fields
+from ..core.quantities import Between
 from .generalised_alpha import AlphaStep, GeneralisedAlpha
 
 
 @dataclass(frozen=True)
 class HHT(AlphaStep):
-    """Step by the module's equations. InputError unless -1/3 <= alpha <= 0."""
+    """Step by the module's equations."""
 
-    alpha: float = -0.1
+    alpha: Annotated[
+        float,
+        Between(-1.0 / 3.0, 0.0, remedy="give a number from -1/3 to 0, others are not stable"),
+    ] = -0.1
 
     def __post_init__(self) -> None:
-        between(
-            "HHT alpha",
-            self.alpha,
-            -1.0 / 3.0,
-            0.0,
-            "give a number from -1/3 to 0, others are not stable",
-        )
+        check_fields(self)
 
     @cached_property
     def weights(self) -> GeneralisedAlpha:

@@ -24,14 +24,16 @@ Impulses: those over a contact with free flight before and after are the change 
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix
+from ..core.arguments import check_fields
 from ..core.checks import array, number
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.quantities import RATIO, Finite
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import BalanceStep, position_step
 from .consistent_data import consistent_acceleration, equilibrated, massless_take
@@ -56,12 +58,12 @@ class LinearMultistep(BalanceStep):
     a: tuple[float, ...]
     b: tuple[float, ...]
     gamma: tuple[float, ...]
-    mu: float = 1.0
+    mu: Annotated[float, Finite, RATIO] = 1.0
 
     def __post_init__(self) -> None:
         for name in ("a", "b", "gamma"):
             array("LinearMultistep", name, getattr(self, name), (None,))
-        number("LinearMultistep", "mu", self.mu)
+        check_fields(self)
         q = len(self.a) - 1
         if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
             raise InputError(

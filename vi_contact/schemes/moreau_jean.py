@@ -30,14 +30,15 @@ of separating points is ours.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, largest, max_abs
-from ..core.checks import between, flag
+from ..core.arguments import check_fields
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.quantities import RATIO, Between
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import SingleStep, means, stepped
 from .consistent_data import ROUND_OFF
@@ -48,31 +49,25 @@ class MoreauJean(SingleStep):
     """Step by the module's equations.
 
     Attributes:
-        theta: weight of the end of the step, from ½ to 1/(1 + e).
-        e: restitution coefficient of the contact nodes, from 0 to 1.
-        allow_energy_gain: accept any theta from ½ to 1, and use Newton's law for points that
-            separate too.
-
-    InputError for numbers outside these ranges.
+        theta: weight of the end of the step, up to 1/(1 + e).
+        e: restitution coefficient of the contact nodes.
+        allow_energy_gain: accept any theta up to 1, and use Newton's law for points that separate
+            too.
     """
 
     penetrates: ClassVar[bool] = True
-    theta: float = 0.5
-    e: float = 0.0
+    theta: Annotated[
+        float, Between(0.5, 1.0, remedy="give a weight from 0.5 to 1, less is unstable")
+    ] = 0.5
+    e: Annotated[
+        float,
+        Between(0.0, 1.0, remedy="give a restitution from 0 (inelastic) to 1 (elastic)"),
+        RATIO,
+    ] = 0.0
     allow_energy_gain: bool = False
 
     def __post_init__(self) -> None:
-        flag("MoreauJean", "allow_energy_gain", self.allow_energy_gain)
-        between(
-            "MoreauJean e", self.e, 0.0, 1.0, "give a restitution from 0 (inelastic) to 1 (elastic)"
-        )
-        between(
-            "MoreauJean theta",
-            self.theta,
-            0.5,
-            1.0,
-            "give a weight from 0.5 to 1, less is unstable",
-        )
+        check_fields(self)
         largest = 1.0 / (1.0 + self.e)
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
             raise InputError(

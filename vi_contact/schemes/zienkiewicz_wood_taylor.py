@@ -18,34 +18,28 @@ accelerations are stored, so nothing restarts after an impact.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from ..core.algebra import Array, EffectiveMatrix
-from ..core.checks import between
+from ..core.arguments import check_fields
 from ..core.problem import ContactProblem
+from ..core.quantities import Between
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import SingleStep, means, position_step, stepped
 
 
 @dataclass(frozen=True)
 class ZienkiewiczWoodTaylor(SingleStep):
-    """Step by the module's equations.
-
-    ``phi`` in [½, 1]: InputError below ½, where the step is unstable.
-    """
+    """Step by the module's equations."""
 
     by_rows: ClassVar[bool] = True
 
-    phi: float = 0.5
+    phi: Annotated[
+        float, Between(0.5, 1.0, remedy="give a weight from 0.5 to 1, less is unstable")
+    ] = 0.5
 
     def __post_init__(self) -> None:
-        between(
-            "ZienkiewiczWoodTaylor phi",
-            self.phi,
-            0.5,
-            1.0,
-            "give a weight from 0.5 to 1, less is unstable",
-        )
+        check_fields(self)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M/(phi dt)² + C/(phi dt) + K."""

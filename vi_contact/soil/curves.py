@@ -3,17 +3,20 @@
 There are curves of G/Gmax and of the damping ratio over the shear strain.
 """
 
+import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, check_word, number, shown
+from ..core.arguments import checked
+from ..core.checks import array, check_word, shown
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Between, NotNegative, Positive, Unit
 
 # G/Gmax where a table must begin: below its first strain the soil has the values of its first row
 LINEAR = 0.95
@@ -33,9 +36,9 @@ class SoilCurves:
     end there. InputError for other tables.
     """
 
-    strain: Sequence[float]
-    reduction: Sequence[float]
-    damping: Sequence[float]
+    strain: Annotated[Sequence[float], RATIO]
+    reduction: Annotated[Sequence[float], RATIO]
+    damping: Annotated[Sequence[float], RATIO]
     name: str = "own curves"
 
     def __post_init__(self) -> None:
@@ -68,12 +71,15 @@ class SoilCurves:
             object.__setattr__(self, name, tuple(values.tolist()))
 
     @classmethod
-    def linear(cls, damping: float) -> "SoilCurves":
+    @checked
+    def linear(
+        cls, damping: Annotated[float, NotNegative, RATIO, "the damping ratio"]
+    ) -> "SoilCurves":
         """Return the curves of what keeps its stiffness and damping ratio at any strain.
 
         That is a structure, or stiff rock.
         """
-        xi = number("SoilCurves.linear", "the damping ratio", damping, not_negative=True)
+        xi = float(damping)
         return cls((1e-9, 1e9), (1.0, 1.0), (xi, xi), f"linear, {xi:g}")
 
     @classmethod
@@ -93,15 +99,16 @@ class SoilCurves:
         )
 
     @classmethod
-    def vucetic_dobry(cls, plasticity: float) -> "SoilCurves":
+    @checked
+    def vucetic_dobry(
+        cls, plasticity: Annotated[float, NotNegative, "the plasticity index [%]"]
+    ) -> "SoilCurves":
         """Return the curves of a plasticity index from 0 to 200 [%].
 
         They are those of Vucetic and Dobry (1991), read likewise. They are published for 0, 15, 30,
         50, 100 and 200, with straight lines over the index between. Strains up to 1 %.
         """
-        index = number(
-            "SoilCurves.vucetic_dobry", "the plasticity index [%]", plasticity, not_negative=True
-        )
+        index = float(plasticity)
         known = _TABLES["vucetic_dobry"]
         if index > known["plasticity"][-1]:
             raise InputError(
@@ -115,14 +122,15 @@ class SoilCurves:
         return cls(_TABLES["strain"], reduction, damping, f"Vucetic-Dobry PI {index:g}")
 
     @classmethod
+    @checked
     def darendeli(
         cls,
         *,
-        mean_stress: float,
-        plasticity: float = 0.0,
-        ocr: float = 1.0,
-        frequency: float = 1.0,
-        cycles: float = 10.0,
+        mean_stress: Annotated[float, Positive, Unit("Pa"), "mean_stress"],
+        plasticity: Annotated[float, NotNegative, "plasticity [%]"] = 0.0,
+        ocr: Annotated[float, Between(1.0, math.inf, remedy="give 1 or more")] = 1.0,
+        frequency: Annotated[float, Positive, Unit("Hz")] = 1.0,
+        cycles: Annotated[float, Positive] = 10.0,
     ) -> "SoilCurves":
         """Return the curves of Darendeli (2001).
 
@@ -132,18 +140,10 @@ class SoilCurves:
             xi = (0.6329 - 0.00566 ln N) (G/Gmax)^0.1 D_Masing + xi_min
             xi_min = (0.8005 + 0.0129 PI ocr^-0.1069) p^-0.2889 (1 + 0.2919 ln f)
 
-        with his D_Masing. mean_stress: effective [Pa] > 0; ocr: at least 1; frequency f [Hz], N
-        cycles > 0.
+        with his D_Masing. mean_stress: effective; frequency: f; cycles: N.
         """
-        owner = "SoilCurves.darendeli"
-        p = number(owner, "mean_stress [Pa]", mean_stress, positive=True) / ATMOSPHERE
-        index = number(owner, "plasticity [%]", plasticity, not_negative=True)
-        f, n = (
-            number(owner, name, one, positive=True)
-            for name, one in (("frequency", frequency), ("cycles", cycles))
-        )
-        if number(owner, "ocr", ocr, positive=True) < 1.0:
-            raise InputError(f"{owner}: ocr is {shown(ocr)}; give 1 or more")
+        p, index = float(mean_stress) / ATMOSPHERE, float(plasticity)
+        f, n = float(frequency), float(cycles)
         s, a = np.logspace(-4.0, 0.0, 41), 0.919
         s_r = (0.0352 + 0.001 * index * ocr**0.3246) * p**0.3483
         hyperbola = 4.0 * (s - s_r * np.log1p(s / s_r)) * (s + s_r) / s**2 - 2.0

@@ -15,15 +15,17 @@ Schnabel, Lysmer and Seed, EERC 72-12 (1972); Idriss and Sun, SHAKE91 (1992); Kr
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from ..core.algebra import Array, Comm, SerialComm, largest
+from ..core.arguments import checked
 from ..core.checks import instance, number, optional, refuse, several, shown, whole
 from ..core.errors import InputError, ViContactError
+from ..core.quantities import Positive, Unit
 from ..ground_motion.record import Record
 from ..laws.materials import LinearElastic
 from .curves import SoilCurves
@@ -50,16 +52,19 @@ class SiteResponse:
     surface: Record
     iterations: int
 
-    def column(self, *, frequency: float, height: float) -> SoilColumn:
+    @checked
+    def column(
+        self,
+        *,
+        frequency: Annotated[float, Positive, Unit("Hz")],
+        height: Annotated[float, Positive, Unit("m")],
+    ) -> SoilColumn:
         """Return the column for runs in time.
 
-        Its base is at y = 0. It is damped by beta = xi / (pi f) at this frequency [Hz]. Its
-        elements have at most this height [m], and Poisson's ratio is that of the layers.
+        Its base is at y = 0. It is damped by beta = xi / (pi f) at this frequency. Its
+        elements have at most this height, and Poisson's ratio is that of the layers.
         """
-        f, most = (
-            number("SiteResponse.column", name, one, positive=True)
-            for name, one in (("frequency", frequency), ("height", height))
-        )
+        f, most = float(frequency), float(height)
         thick = np.array([thickness for thickness, _, _ in self.layers])
         parts = np.ceil(thick / most * (1.0 - 1e-9)).astype(int)
         rows = zip(self.layers, self.shear, self.damping, strict=True)

@@ -5,13 +5,15 @@ It is run again with the stiffness and damping that its strains ask for.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 
 from ..core.algebra import Array, largest
-from ..core.checks import at, function, instance, number, refuse, several
+from ..core.arguments import checked
+from ..core.checks import at, refuse
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Positive, Remedy
 from ..fem import compat
 from ..fem.communicators import MpiComm
 from ..fem.forms import KINDS, Materials, cell_constants
@@ -41,15 +43,19 @@ class StrainCompatible(Generic[T]):
     changes: tuple[float, ...]
 
 
+@checked
 def strain_compatible(
     mesh: Any,
     material: Materials,
-    curves: Sequence[tuple[Cells, SoilCurves]],
-    run: Callable[[Heterogeneous, LargestStrain], T],
+    curves: Annotated[Sequence[tuple[Cells, SoilCurves]], Remedy("give (cells, SoilCurves) pairs")],
+    run: Annotated[
+        Callable[[Heterogeneous, LargestStrain], T],
+        Remedy("give a function of a material and a recorder"),
+    ],
     *,
-    ratio: float = 0.65,
-    tolerance: float = 0.01,
-    most: int = 20,
+    ratio: Annotated[float, Positive, RATIO] = 0.65,
+    tolerance: Annotated[float, Positive] = 0.01,
+    most: Annotated[int, Positive] = 20,
 ) -> StrainCompatible[T]:
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
@@ -72,15 +78,9 @@ def strain_compatible(
             curves, with place.
         ViContactError: no end after so many runs.
     """
-    function(OWNER, "run", run, "give a function of a material and a recorder")
-    number(OWNER, "ratio", ratio, positive=True)
-    comm, remedy = MpiComm(mesh.comm), "give (cells, SoilCurves) pairs"
+    comm = MpiComm(mesh.comm)
     pairs = [
-        (
-            cells_of(OWNER, "the cells of curves", cells, mesh).indices,
-            instance(OWNER, "curves", one, SoilCurves, remedy),
-        )
-        for cells, one in several(OWNER, "curves", curves, remedy)
+        (cells_of(OWNER, "the cells of curves", cells, mesh).indices, one) for cells, one in curves
     ]
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
     refuse(

@@ -7,6 +7,7 @@ Wording as in PLAXIS: a fixed base expects the *within* motion, a compliant base
 """
 
 from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..core.algebra import Array
 from ..core.checks import flag, number, provides
 from ..core.errors import InputError
 from ..core.protocols import EXCITATION, Excitation
+from ..core.quantities import RATIO, Unit
 from ..ground_motion.excitation import GroundMotion
 from ..ground_motion.record import Record
 
@@ -55,8 +57,8 @@ class UpgoingVelocity:
 def upgoing(
     motion: Record | Excitation | Sequence[Excitation],
     *,
-    direction: tuple[float, ...] = (1.0, 0.0),
-    dt: float | None = None,
+    direction: Annotated[tuple[float, ...], RATIO] = (1.0, 0.0),
+    dt: Annotated[float | None, Unit("s")] = None,
     outcrop: bool = True,
 ) -> Callable[[float], Array]:
     """Return the upgoing velocity of a motion: half its velocity.

@@ -9,10 +9,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any
 
 from ...core.algebra import Array
-from ...core.checks import between, check_word, number
+from ...core.arguments import check_fields
+from ...core.checks import check_word
+from ...core.quantities import RATIO, Between, Positive, Unit, quantities
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
@@ -21,6 +23,18 @@ Numbers = tuple[float, float, str, Inputs]
 _SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(
     files(__package__).joinpath("checks.toml").read_text("utf-8")
 )
+
+_RADIANS = "radians; 30 degrees are 0.5236"
+Length = Annotated[float, Positive, Unit("m")]
+Density = Annotated[float, Positive, Unit("kg/m³")]
+Gravity = Annotated[float, Positive, Unit("m/s²")]
+Poisson = Annotated[float, Between(0.0, 0.5, remedy="give one from 0 to 0.5"), RATIO]
+Friction = Annotated[
+    float, Between(0.0, 1.57, remedy=f"give one from 0 to 1.57 {_RADIANS}"), Unit("rad")
+]
+Incline = Annotated[
+    float, Between(-1.57, 1.57, remedy=f"give one from -1.57 to 1.57 {_RADIANS}"), Unit("rad")
+]
 
 
 @dataclass(frozen=True)
@@ -55,8 +69,7 @@ class Check(ABC):
     This is the base of all checks, which are frozen dataclasses with fields in SI units and angles
     in radians.
 
-    checks.toml tells what each says of itself. InputError for numbers that are not above zero, or
-    beyond its limits.
+    checks.toml tells what each says of itself.
     """
 
     of: str = ""
@@ -72,15 +85,7 @@ class Check(ABC):
     def __post_init__(self) -> None:
         name = type(self).__name__
         check_word(f"{name}: of", self.of, tuple(self.said["answers"]))
-        for key, (value, unit) in self.given().items():
-            if key in _SAID["limits"]:
-                angle = " radians; 30 degrees are 0.5236" if unit == "rad" else ""
-                low, high = _SAID["limits"][key]
-                between(
-                    f"{name}: {key}", value, low, high, f"give one from {low:g} to {high:g}{angle}"
-                )
-            else:
-                number(name, key, value, positive=True, unit=unit)
+        check_fields(self)
 
     @abstractmethod
     def numbers(self, history: History) -> Numbers:
@@ -91,9 +96,10 @@ class Check(ABC):
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
+        asked = quantities(type(self))
         return {
-            key: (it, unit)
-            for key, unit in self.said["fields"].items()
+            key: (it, asked[key].symbol or "-")
+            for key in self.said["fields"]
             if (it := getattr(self, key)) is not None
         }
 

@@ -10,12 +10,14 @@ these are to be met by such a run.
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...core.algebra import Array
-from .comparison import History, Numbers
+from ...core.quantities import RATIO, Between, Positive, Unit
+from .comparison import History, Length, Numbers, Poisson
 from .earth_pressure_static import Coulomb, EarthPressure
 
 # CHOSEN: share of the layer's lowest frequency below which inertia adds less than 5 %, 1/sqrt(1 -
@@ -56,8 +58,8 @@ class MononobeOkabe(Coulomb):
     does.
     """
 
-    kh: float
-    kv: float = 0.0
+    kh: Annotated[float, Between(0.0, 10.0), RATIO]
+    kv: Annotated[float, Between(-0.9, 0.9), RATIO] = 0.0
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
         """Return K (1 - kv) under gravity turned by psi [rad] and the earthquake, and why none."""
@@ -75,8 +77,8 @@ class _Layer(EarthPressure):
     on its right; acceleration: column of the ground's.
     """
 
-    nu: float
-    c_s: float
+    nu: Poisson
+    c_s: Annotated[float, Positive, Unit("m/s")]
     on_left: bool = False
     acceleration: str = "a_g_x"
 
@@ -121,7 +123,7 @@ class Wood(_Layer):
     motion is max a/(pi (max v - min v)).
     """
 
-    length: float | None = None
+    length: Length | None = None
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
         """Return the largest Q [N/m], its height [m], and why there is none."""
@@ -151,7 +153,7 @@ class VeletsosYounan(_Layer):
     than ``Wood``'s.
     """
 
-    damping: float = 0.05
+    damping: Annotated[float, Positive, RATIO] = 0.05
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
         """Return the largest Q [N/m], its height [m], and why there is none."""

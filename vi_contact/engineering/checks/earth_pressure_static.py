@@ -10,11 +10,23 @@ active and passive ones are bounds beside it.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from ...core.quantities import NotNegative, Unit
 from ...core.units import STANDARD_GRAVITY
-from .comparison import Check, History, Numbers
+from .comparison import (
+    Check,
+    Density,
+    Friction,
+    Gravity,
+    History,
+    Incline,
+    Length,
+    Numbers,
+    Poisson,
+)
 
 
 def wedge(
@@ -60,13 +72,13 @@ class EarthPressure(Check):
     width: of the model across its plane, of a slice its thickness.
     """
 
-    height: float
-    rho: float
+    height: Length
+    rho: Density
     part: str = "wall"
     of: str = "thrust"
-    surcharge: float = 0.0
-    gravity: float = STANDARD_GRAVITY
-    width: float = 1.0
+    surcharge: Annotated[float, NotNegative, Unit("Pa")] = 0.0
+    gravity: Gravity = STANDARD_GRAVITY
+    width: Length = 1.0
 
     def coefficient(self) -> tuple[float, str]:
         """Return the K of N, and why there is none."""
@@ -107,7 +119,7 @@ class AtRest(EarthPressure):
     K0/(1 + K0).
     """
 
-    nu: float
+    nu: Poisson
 
     def coefficient(self) -> tuple[float, str]:
         """Return K, and why there is none."""
@@ -123,8 +135,8 @@ class Rankine(EarthPressure):
     phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand.
     """
 
-    phi: float
-    slope: float = 0.0
+    phi: Friction
+    slope: Incline = 0.0
     passive: bool = False
 
     def coefficient(self) -> tuple[float, str]:
@@ -148,10 +160,10 @@ class Coulomb(EarthPressure):
     - psi >= 0.
     """
 
-    phi: float
-    delta: float = 0.0
-    slope: float = 0.0
-    batter: float = 0.0
+    phi: Friction
+    delta: Friction = 0.0
+    slope: Incline = 0.0
+    batter: Incline = 0.0
     passive: bool = False
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:

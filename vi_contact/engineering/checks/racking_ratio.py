@@ -4,10 +4,12 @@ The box is a thin frame that neither slips nor opens (Wang 1993).
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from .comparison import Check, History, Numbers
+from ...core.quantities import Positive, Unit
+from .comparison import Check, History, Length, Numbers, Poisson
 
 # ends of Wang's curves: F, and depth of the centre over the height of the box
 LARGEST, SHALLOWEST = (10.0, 1.5)
@@ -30,24 +32,27 @@ def racking_ratio(flexible: float, nu: float) -> float:
     return 4.0 * (1.0 - nu) * flexible / (3.0 - 4.0 * nu + flexible)
 
 
+Stiffness = Annotated[float, Positive, Unit("N m²/m")]
+
+
 @dataclass(frozen=True, kw_only=True)
 class RackingRatio(Check):
     """Expect the racking of a box over that of the free field, both recorded by ``Racking``.
 
-    width, height: of the frame's centre lines [m]; wall, roof, invert: bending stiffness per metre
-    E I [N m²/m], E/(1 - nu²) for E in plane strain; shear_modulus [Pa], nu: of the ground; depth:
-    of the box's centre [m]; box, free: labels of the box and of four points of the ground far away,
+    width, height: of the frame's centre lines; wall, roof, invert: bending stiffness per metre
+    E I, E/(1 - nu²) for E in plane strain; shear_modulus, nu: of the ground; depth:
+    of the box's centre; box, free: labels of the box and of four points of the ground far away,
     at the same depths. It applies up to F = 10, from 1.5 H down.
     """
 
-    width: float
-    height: float
-    wall: float
-    roof: float
-    invert: float
-    shear_modulus: float
-    nu: float
-    depth: float
+    width: Length
+    height: Length
+    wall: Stiffness
+    roof: Stiffness
+    invert: Stiffness
+    shear_modulus: Annotated[float, Positive, Unit("Pa")]
+    nu: Poisson
+    depth: Length
     box: str = "box"
     free: str = "free_field"
 

@@ -6,12 +6,14 @@ Sliding is after Newmark, Géotechnique 15, 1965; rocking is after Housner, Bull
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ...core.algebra import Array
+from ...core.quantities import RATIO, Between, Positive
 from ...core.units import STANDARD_GRAVITY
-from .comparison import Check, History, Numbers
+from .comparison import Check, Gravity, History, Incline, Length, Numbers
 
 # CHOSEN: of a step of the run; a slide ends within one, which costs less than r h²/8 of slip, h =
 # dt/32
@@ -55,11 +57,11 @@ class NewmarkBlock(Check):
     stays on the plane, and where it stands without motion.
     """
 
-    mu: float
-    slope: float = 0.0
+    mu: Annotated[float, Positive, RATIO]
+    slope: Incline = 0.0
     one_sided: bool = False
-    towards: float = 0.0
-    gravity: float = STANDARD_GRAVITY
+    towards: Annotated[float, Between(-1.0, 1.0), RATIO] = 0.0
+    gravity: Gravity = STANDARD_GRAVITY
     slip: str = "sliding_base"
     acceleration: str = "a_g_x"
     vertical: str = "a_g_y"
@@ -100,10 +102,10 @@ class Housner(Check):
     is chaotic: compare many, or the first impacts.
     """
 
-    width: float
-    height: float
+    width: Length
+    height: Length
     of: str = "angle"
-    gravity: float = STANDARD_GRAVITY
+    gravity: Gravity = STANDARD_GRAVITY
     theta: str = "theta_base"
     acceleration: str = "a_g_x"
     vertical: str = "a_g_y"

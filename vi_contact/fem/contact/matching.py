@@ -6,14 +6,16 @@ The rows of P sum to one, so that a common translation of both bodies opens and 
 """
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at, attributes
+from ...core.arguments import check_fields
+from ...core.checks import at
 from ...core.errors import InputError
+from ...core.quantities import Positive
 from .nodes import Nodes
 from .partners import Surface, one_of
 
@@ -114,10 +116,10 @@ class NodeToNode:
     that do not face each other.
     """
 
-    tolerance: float = BESIDE
+    tolerance: Annotated[float, Positive] = BESIDE
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",))
+        check_fields(self)
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
         """Return what every node of side 1 faces; InputError where a node has no partner."""

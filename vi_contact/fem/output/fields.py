@@ -16,12 +16,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each, on_first
-from ...core.checks import attributes
+from ...core.arguments import check_fields
 from ...core.files import (
     FIELDS,
     FIELDS_INDEX,
@@ -35,6 +35,7 @@ from ...core.files import (
 )
 from ...core.own_files import inner_folder, make_inner_folder, remove
 from ...core.problem import ContactProblem
+from ...core.quantities import Positive
 from ...core.step import Report, State
 from ..nodal_space import NodalSpace
 from ..own_matrices import MatrixSpace
@@ -103,17 +104,15 @@ _RUBBING = ("contact_traction_t", "slip")
 class XDMF:
     """Write a frame every so many steps, and one of the initial state.
 
-    InputError unless both numbers are >= 1.
-
     ``frames_per_file``: each time so many frames have files of their own they are put into one:
     some systems want few.
     """
 
-    every: int = 10
-    frames_per_file: int = 1
+    every: Annotated[int, Positive] = 10
+    frames_per_file: Annotated[int, Positive] = 1
 
     def __post_init__(self) -> None:
-        attributes(self, counts=("every", "frames_per_file"))
+        check_fields(self)
 
     def open(
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]

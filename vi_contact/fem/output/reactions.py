@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from ...core.algebra import largest
 from ...core.checks import array, column_name
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
+from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
 from ..groups import facets_of
 from ..mesh import Facets
@@ -56,9 +58,9 @@ class Reactions:
 
     name: str
     facets: Facets
-    centre: Sequence[float]
+    centre: Annotated[Sequence[float], Unit("m")]
     loads: Loads = ()
-    gravity: Sequence[float] | None = None
+    gravity: Annotated[Sequence[float] | None, Unit("m/s²")] = None
 
     def __post_init__(self) -> None:
         column_name("reaction name", self.name)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -17,6 +17,7 @@ from ...core.algebra import Array
 from ...core.checks import array, column_name, instance, optional, shape_of
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
+from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
 from .. import compat
 from ..groups import cells_of
@@ -74,10 +75,10 @@ class SectionForces:
             through cells of degree 2; corners of no rectangle.
     """
 
-    cuts: Mapping[str, Sequence[Sequence[float]]]
+    cuts: Annotated[Mapping[str, Sequence[Sequence[float]]], Unit("m")]
     cells: Cells | None = None
     loads: Loads = ()
-    gravity: Sequence[float] | None = None
+    gravity: Annotated[Sequence[float] | None, Unit("m/s²")] = None
 
     def __post_init__(self) -> None:
         instance(

@@ -6,12 +6,14 @@ The format is recognised by content, never by the file's name.
 import math
 import os
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
 from ...core.arguments import checked
-from ...core.checks import number, shown
+from ...core.checks import shown
 from ...core.errors import InputError
+from ...core.quantities import Positive, Unit
 from ...core.units import STANDARD_GRAVITY
 from ..processing import resampled
 from ..record import LARGEST_PEAK, Record
@@ -32,10 +34,10 @@ def read_record(
     path: str | os.PathLike[str],
     units: str | None = None,
     *,
-    dt: float | None = None,
-    resample_dt: float | None = None,
+    dt: Annotated[float | None, Unit("s")] = None,
+    resample_dt: Annotated[float | None, Unit("s")] = None,
     channel: int | str | None = None,
-    largest: float = LARGEST_PEAK,
+    largest: Annotated[float, Positive, Unit("m/s²")] = LARGEST_PEAK,
 ) -> Record:
     """Read one component of ground motion from a file of any known format.
 
@@ -60,7 +62,6 @@ def read_record(
             f"{text.path}: channel={shown(channel)} was passed but the file holds one record; "
             "leave channel out"
         )
-    number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = reader.read(text)
     peak = float(np.max(np.abs(record.acceleration)))
     if peak > largest:

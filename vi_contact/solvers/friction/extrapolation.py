@@ -15,12 +15,14 @@ before is forgotten.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.checks import provides, whole
+from ...core.arguments import check_fields
+from ...core.checks import provides
+from ...core.quantities import NotNegative, Positive
 
 Next = Callable[[Array, Array], Array]  # x (n,) and its image g(x) -> the point to try after x
 
@@ -50,17 +52,13 @@ class Plain:
 
 @dataclass(frozen=True)
 class Anderson:
-    """Extrapolate from the last ``depth`` steps, after ``after`` plain ones.
+    """Extrapolate from the last ``depth`` steps, after ``after`` plain ones."""
 
-    InputError for depth < 1 or after < 0.
-    """
-
-    depth: int = 5
-    after: int = 0
+    depth: Annotated[int, Positive] = 5
+    after: Annotated[int, NotNegative] = 0
 
     def __post_init__(self) -> None:
-        whole("Anderson", "depth", self.depth, least=1)
-        whole("Anderson", "after", self.after)
+        check_fields(self)
 
     def start(self) -> Next:
         """Return the choice of the next point."""

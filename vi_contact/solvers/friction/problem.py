@@ -27,14 +27,16 @@ sqrt(J), as in ``normal.lcp``.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 from scipy.linalg import blas, lapack
 
 from ...core.algebra import Array, Mask, max_abs
-from ...core.checks import attributes, provides
+from ...core.arguments import check_fields
+from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
+from ...core.quantities import Positive
 from ...laws.friction import project
 from ..normal.lcp import EPS, check_gap, energy_scale, scaled_matrix
 
@@ -82,11 +84,11 @@ class Settings:
     """
 
     carries_friction: ClassVar[bool] = True
-    tolerance: float = 1e-12
-    max_iterations: int = 1000
+    tolerance: Annotated[float, Positive] = 1e-12
+    max_iterations: Annotated[int, Positive] = 1000
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        check_fields(self)
 
 
 def inner_method(owner: str, meaning: str, value: Any) -> None:

@@ -17,15 +17,16 @@ over, a secant method for one point.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ...core.algebra import Array, max_abs
-from ...core.checks import attributes
+from ...core.arguments import check_fields
 from ...core.collective import slope_of
 from ...core.errors import StepFailure
 from ...core.protocols import FrictionLaw
+from ...core.quantities import Positive
 from ...core.step import StepProblem
 from .extrapolation import Anderson, Extrapolation, accelerated
 
@@ -40,13 +41,13 @@ class RateIteration:
     each iteration.
     """
 
-    tolerance: float = 1e-12
-    max_iterations: int = 200
+    tolerance: Annotated[float, Positive] = 1e-12
+    max_iterations: Annotated[int, Positive] = 200
     extrapolation: Extrapolation = field(default_factory=lambda: Anderson(depth=5, after=4))
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
         accelerated("RateIteration", self.extrapolation)
+        check_fields(self)
 
     def solve(
         self,

@@ -14,14 +14,16 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ...core.algebra import EffectiveMatrix
-from ...core.checks import attributes, check_word, instance, shown, whole
-from ...core.errors import InputError, StepFailure
+from ...core.arguments import check_fields
+from ...core.checks import check_word, instance
+from ...core.errors import StepFailure
 from ...core.problem import ContactProblem
+from ...core.quantities import Between, NotNegative, Positive
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
@@ -78,9 +80,11 @@ class Iterative:
     preconditioner: str = AUTO
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)
     prefix: str = "vi_contact_iterative_"
-    tolerance: float = 3e-10
-    changes: int = 15
-    patience: int = 1000
+    tolerance: Annotated[
+        float, Between(0.0, 1.0, "()", "give a relative error below 1, such as 3e-10")
+    ] = 3e-10
+    changes: Annotated[int, NotNegative] = 15
+    patience: Annotated[int, Positive] = 1000
 
     def __post_init__(self) -> None:
         check_word("preconditioner", self.preconditioner, (AUTO, *KINDS))
@@ -89,13 +93,7 @@ class Iterative:
         instance(
             "Iterative", "prefix", self.prefix, str, "give a text such as 'vi_contact_iterative_'"
         )
-        attributes(self, positive=("tolerance",), counts=("patience",))
-        whole("Iterative", "changes", self.changes)
-        if not self.tolerance < 1.0:
-            raise InputError(
-                f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, "
-                "such as 3e-10"
-            )
+        check_fields(self)
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that does not fit.

@@ -20,16 +20,17 @@ single exchanges, the other finite fallback, took up to 1000 changes where this 
 from ctypes import c_double
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Indices, Mask, SerialComm, lowest
-from ...core.checks import attributes
+from ...core.arguments import check_fields
 from ...core.compiled import library
 from ...core.contact_last import at
 from ...core.errors import ViContactError
+from ...core.quantities import Positive
 from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
@@ -47,11 +48,11 @@ class ActiveSet:
     rows moved in each.
     """
 
-    tolerance: float = 1e-9
-    max_iterations: int = 1000
+    tolerance: Annotated[float, Positive] = 1e-9
+    max_iterations: Annotated[int, Positive] = 1000
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        check_fields(self)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.

@@ -12,12 +12,14 @@ min ½ sᵀD s over s >= -q, which is (49) up to the constant ½ x_freeᵀ D x_f
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, max_abs
-from ...core.checks import attributes
+from ...core.arguments import check_fields
+from ...core.quantities import Positive
 from .lcp import EPS, Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 
@@ -32,14 +34,12 @@ class Hildreth:
     """
 
     primal: bool = True
-    tolerance: float = 1e-13
-    max_sweeps: int = 10_000
+    tolerance: Annotated[float, Positive] = 1e-13
+    max_sweeps: Annotated[int, Positive] = 10_000
     record: bool = False
 
     def __post_init__(self) -> None:
-        attributes(
-            self, positive=("tolerance",), counts=("max_sweeps",), flags=("primal", "record")
-        )
+        check_fields(self)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check G (m, m), and invert it for the primal form. InputError when it is not SPD."""

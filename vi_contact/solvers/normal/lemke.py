@@ -17,14 +17,15 @@ m rows. Bilateral rows are eliminated before.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, max_abs
-from ...core.checks import attributes
+from ...core.arguments import check_fields
 from ...core.errors import InputError, StepFailure
 from ...core.matrix_checks import probe
+from ...core.quantities import Positive
 from .lcp import EPS, Found, PreparedLCP, ScaledLCP, failure, scaled_dense
 
 TINY = 1e-11  # of the largest entry of a column: no pivot
@@ -43,11 +44,11 @@ class Lemke:
     """
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
-    tolerance: float = 1e-9
-    max_iterations: int = 10_000
+    tolerance: Annotated[float, Positive] = 1e-9
+    max_iterations: Annotated[int, Positive] = 10_000
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_iterations",))
+        check_fields(self)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check any square G (m, m) and eliminate its bilateral rows.

@@ -13,7 +13,7 @@ from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
 from ...core.renamed import WORDS
 from .own_classes import own_class
-from .quantities import FIELD, HISTORY, Expression, list_node, text_node, unit_of
+from .quantities import FIELD, HISTORY, Expression, list_node, text_node
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
 
 
@@ -75,7 +75,7 @@ def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words
     if missing:
         raise spot.inside(f"lacks the key '{missing[0]}', which {target.name} needs: give it")
     nodes = {
-        key: read(value, target.hints[key], spot.at(key, unit_of(target.name, key)), words)
+        key: read(value, target.hints[key], spot.at(key, target.unit(key)), words)
         for key, value in given.items()
     }
     return Call(target, nodes, spot)

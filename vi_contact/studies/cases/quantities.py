@@ -1,7 +1,7 @@
 """Read texts where numbers or functions are asked for: "30 MPa", "2*9.81", "9810*max(0, 35 - y)".
 
 A unit is a product of powers, as "kN/m3", "kg/m^3", "Pa*s", "1/s"; its dimension must be that of
-the key, whose unit one table here tells.
+the key, whose unit stands in the annotation of the argument (``core.quantities``).
 """
 
 import math
@@ -33,13 +33,6 @@ _UNITS = _TABLES["alone"] | {
     for start, factor in _TABLES["prefixes"].items()
     for name, unit in _TABLES["with_prefix"].items()
 }
-KEYS = {unit: keys.split() for unit, keys in _TABLES["keys"].items()}
-_UNIT_OF = {key: unit for unit, keys in KEYS.items() for key in keys}
-
-
-def unit_of(name: str, key: str) -> str | None:
-    """Return the unit of a key of what a table calls; None where none is known."""
-    return _UNIT_OF.get(f"{name}.{key}", _UNIT_OF.get(key)) or None
 
 
 def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:

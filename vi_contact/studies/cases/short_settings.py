@@ -12,7 +12,7 @@ from typing import Any
 from ...core.checks import shown
 from ...core.errors import InputError
 from .parsing import nearest
-from .quantities import text_node, unit_of
+from .quantities import text_node
 from .stage_tables import refuse_own
 from .table_calls import Spot
 from .toml_file import toml_value, with_settings
@@ -137,11 +137,13 @@ class ShortOptions:
         shaking = tables.get("excitation")
         found = []
         for number, one in enumerate(_tables(shaking), start=1):
-            key = "scale" if one.get("type") == "GroundMotion" else "amplitude"
+            key, unit = (
+                ("scale", "1") if one.get("type") == "GroundMotion" else ("amplitude", "m/s2")
+            )
             value = one.get(key, 1.0 if key == "scale" else None)
             if isinstance(value, str):
                 value = text_node(
-                    value, [float], Spot("--scale", f"excitation[{number}]", key, unit_of("", key))
+                    value, [float], Spot("--scale", f"excitation[{number}]", key, unit)
                 )
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise InputError(

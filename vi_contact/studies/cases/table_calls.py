@@ -14,10 +14,12 @@ excitations for what must know them. Nothing of the file is ever evaluated as co
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
+from functools import cached_property
 from inspect import Parameter, signature
-from typing import Any, get_type_hints
+from typing import Any
 
 from ...core.errors import InputError
+from ...core.quantities import Quantity, quantities
 
 Context = Mapping[str, Any]
 Node = (
@@ -102,14 +104,24 @@ GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
 class Callee:
     """Describe a function that tables may call.
 
-    It has the hints of its parameters, those it needs, and those that are supplied.
+    It has what the annotations of its parameters say, those it needs, and those that are supplied.
     """
 
     name: str
     function: Callable[..., Any]
-    hints: Mapping[str, Any]
+    said: Mapping[str, Quantity]
     required: frozenset[str] = frozenset()
     given: tuple[str, ...] = ()
+
+    @cached_property
+    def hints(self) -> Mapping[str, Any]:
+        """Return the types of its parameters."""
+        return {key: one.kind for key, one in self.said.items()}
+
+    def unit(self, key: str) -> str | None:
+        """Return the unit of a parameter, as one types it; None where it has none."""
+        found = self.said[key].unit
+        return None if found is None else found.typed
 
 
 def callee(
@@ -124,7 +136,7 @@ def callee(
     ``only`` is what a file may give; parameters ``given`` are supplied.
     """
     plain_class = isinstance(function, type) and not is_dataclass(function)
-    hints = get_type_hints(function.__init__ if plain_class else function)  # type: ignore[misc]
+    said = quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
     found = signature(function).parameters
     parameters = {
         key: one
@@ -135,7 +147,7 @@ def callee(
     return Callee(
         name or getattr(function, "__name__", ""),
         function,
-        {one: hints.get(one, Any) for one in settable},
+        {one: said.get(one, Quantity(Any)) for one in settable},
         frozenset(one for one in settable if parameters[one].default is Parameter.empty),
         tuple(one for one in parameters if one in given),
     )

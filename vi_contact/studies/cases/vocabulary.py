@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any, get_origin, get_type_hints
+from typing import Annotated, Any, get_origin, get_type_hints
 
 from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, soil, solvers
 from ...core import (
@@ -24,8 +24,9 @@ from ...core import (
     Scheme,
     Solver,
 )
-from ...core.checks import number
+from ...core.arguments import checked
 from ...core.corners import FEATURE_ANGLE
+from ...core.quantities import RATIO, Positive, Unit
 from ...core.system import SemiDiscreteSystem
 from ...core.units import STANDARD_GRAVITY
 from ...engineering import checks
@@ -98,10 +99,10 @@ def record(
     path: Path,
     units: str | None = None,
     *,
-    dt: float | None = None,
-    resample_dt: float | None = None,
+    dt: Annotated[float | None, Unit("s")] = None,
+    resample_dt: Annotated[float | None, Unit("s")] = None,
     channel: int | str | None = None,
-    largest: float = LARGEST_PEAK,
+    largest: Annotated[float, Unit("m/s²")] = LARGEST_PEAK,
     processing: "ground_motion.Processing | None" = None,
 ) -> Record:
     """Read a record, ``read_record``, then apply ``processing``."""
@@ -116,10 +117,10 @@ def surface(
     facets: Facets,
     *,
     obstacle: Obstacle | None = None,
-    points: Sequence[tuple[float, ...]] | None = None,
-    feature_angle: float = FEATURE_ANGLE,
+    points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
+    feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
     held: bool = False,
-    springs: float | None = None,
+    springs: Annotated[float | None, Unit("Pa/m")] = None,
     frictionless_corners: bool = False,
     hinges: bool = False,
     name: str = "",
@@ -144,8 +145,8 @@ def pair(
     facets2: Facets,
     *,
     matching: Matching | None = None,
-    points: Sequence[tuple[float, ...]] | None = None,
-    feature_angle: float = FEATURE_ANGLE,
+    points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
+    feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
     held: bool = False,
     frictionless_corners: bool = False,
     hinges: bool = False,
@@ -168,8 +169,8 @@ def pair(
 def weight(
     system: SemiDiscreteSystem,
     *,
-    acceleration: float = STANDARD_GRAVITY,
-    direction: tuple[float, ...] | None = None,
+    acceleration: Annotated[float, Unit("m/s²")] = STANDARD_GRAVITY,
+    direction: Annotated[tuple[float, ...] | None, RATIO] = None,
     cells: Cells | None = None,
 ) -> SemiDiscreteSystem:
     """Return the system ``with_weight``.
@@ -183,9 +184,9 @@ def weight(
 def first_mode_harmonic(
     system: SemiDiscreteSystem,
     *,
-    amplitude: float,
-    ratio: float = 0.5,
-    direction: tuple[float, ...] = (1.0, 0.0),
+    amplitude: Annotated[float, Unit("m/s²")],
+    ratio: Annotated[float, RATIO] = 0.5,
+    direction: Annotated[tuple[float, ...], RATIO] = (1.0, 0.0),
 ) -> laws.Harmonic:
     """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
     return laws.Harmonic(
@@ -193,18 +194,17 @@ def first_mode_harmonic(
     )
 
 
-def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
+@checked
+def first_mode_period(system: SemiDiscreteSystem, *, parts: Annotated[float, Positive]) -> float:
     """Return the time step that divides the body's longest period into so many parts [s]."""
-    return 1.0 / (
-        number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system)
-    )
+    return 1.0 / (parts * engineering.lowest_frequency(system))
 
 
 def heterogeneous(
-    E: float | Expression,
-    nu: float | Expression,
-    rho: float | Expression,
-    xi: float | Expression = 0.0,
+    E: Annotated[float | Expression, Unit("Pa")],
+    nu: Annotated[float | Expression, RATIO],
+    rho: Annotated[float | Expression, Unit("kg/m³")],
+    xi: Annotated[float | Expression, RATIO] = 0.0,
 ) -> Heterogeneous:
     """Make a heterogeneous material."""
 
@@ -214,14 +214,14 @@ def heterogeneous(
     return Heterogeneous(of(E), of(nu), of(rho), of(xi))
 
 
-def analytic_gap(function: Expression) -> core.AnalyticGap:
+def analytic_gap(function: Annotated[Expression, Unit("m")]) -> core.AnalyticGap:
     """Make a ``core.AnalyticGap``."""
     return core.AnalyticGap(Places(function))
 
 
 def resultants(
     name: str = "",
-    centre: tuple[float, ...] | None = None,
+    centre: Annotated[tuple[float, ...] | None, Unit("m")] = None,
     normal: tuple[float, ...] | None = None,
     part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
 ) -> engineering.Resultants:
@@ -233,8 +233,8 @@ def upgoing(
     excitations: Any,
     motion: Record | Excitation | Sequence[Excitation] | None = None,
     *,
-    direction: tuple[float, ...] = (1.0, 0.0),
-    dt: float | None = None,
+    direction: Annotated[tuple[float, ...], RATIO] = (1.0, 0.0),
+    dt: Annotated[float | None, Unit("s")] = None,
     outcrop: bool = True,
 ) -> Any:
     """Return ``soil.upgoing`` of a motion, or of the run's excitations.

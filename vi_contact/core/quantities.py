@@ -1,0 +1,194 @@
+"""Say limits, unit and meaning of an argument once, in its annotation.
+
+    E: Annotated[float, Positive, Unit("Pa"), "Young's modulus E"]
+    depth: Annotated[int, Positive] = 5                    a whole number of at least 1
+    nu: Annotated[float, Between(-1.0, 0.5, "()"), RATIO]  both ends excluded
+    delay: Annotated[float | None, NotNegative, Unit("s")] = None
+
+From it come the check and its sentence (``core.arguments``), the unit in which case files take a
+number without one, and the schema of case files. Marks hold for every number of a value, those of a
+list too, and not for None, functions and other objects.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+ENDS = ("[]", "[)", "(]", "()")
+_ASCII = str.maketrans({"²": "2", "³": "3", "·": "*", " ": "*"})
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Name the SI unit of a quantity, as "kg/m³"; "1" is that of ratios."""
+
+    symbol: str
+
+    @property
+    def typed(self) -> str:
+        """Return it as one types it in a case file, "kg/m3"."""
+        return self.symbol.translate(_ASCII)
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """Say what to give in place of a value of another type, as "give a mesh of DOLFINx"."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Between:
+    """Bound a number by two ends.
+
+    ends: "[]", "()", "[)" or "(]": a square bracket for an end that is included, a round one for
+    an end that is not; infinite numbers never hold. remedy: what to do, such as "give a ratio, not
+    per cent"; without one it is told from the ends. Where the annotation is ``int`` it bounds whole
+    numbers.
+    """
+
+    low: float
+    high: float
+    ends: str = "[]"
+    remedy: str = ""
+
+    def __post_init__(self) -> None:
+        if self.ends not in ENDS or not self.low < self.high:
+            raise TypeError(f"{self}: give low < high, and ends out of {', '.join(ENDS)}")
+
+    def __repr__(self) -> str:
+        ends = "" if self.ends == "[]" else f", {self.ends!r}"
+        return _NAMES.get(self, f"Between({self.low!r}, {self.high!r}{ends})")
+
+    def holds(self, value: float) -> bool:
+        """Return whether a number is finite and between the ends."""
+        return (
+            self.low <= value <= self.high
+            and math.isfinite(value)
+            and (value != self.low or self.ends[0] == "[")
+            and (value != self.high or self.ends[1] == "]")
+        )
+
+    def told(self, whole: bool = False) -> str:
+        """Return the remedy: what to give, as the end of a sentence."""
+        return self.remedy or f"give {self._whole() if whole else self._real()}"
+
+    def least(self) -> float:
+        """Return the least whole number that holds; -inf where there is none."""
+        least = math.ceil(self.low) if math.isfinite(self.low) else self.low
+        return least + 1 if self.ends[0] == "(" and least == self.low else least
+
+    def most(self) -> float:
+        """Return the largest whole number that holds; inf where there is none."""
+        most = math.floor(self.high) if math.isfinite(self.high) else self.high
+        return most - 1 if self.ends[1] == ")" and most == self.high else most
+
+    def _whole(self) -> str:
+        ends = [f"at least {self.least()}"] if math.isfinite(self.low) else []
+        ends += [f"at most {self.most()}"] if math.isfinite(self.high) else []
+        return f"a whole number{' of ' if ends else ''}{' and '.join(ends)}"
+
+    def _real(self) -> str:
+        if self in _WORDS:
+            return _WORDS[self]
+        opened, closed = self.ends[0] == "(", self.ends[1] == ")"
+        if math.isinf(self.high):
+            return f"a finite number {'above' if opened else 'of at least'} {self.low:g}"
+        if math.isinf(self.low):
+            return f"a finite number {'below' if closed else 'of at most'} {self.high:g}"
+        if opened and closed:
+            return f"a number between {self.low:g} and {self.high:g}, both excluded"
+        lower = f"above {self.low:g} and" if opened else f"from {self.low:g}"
+        upper = "to less than" if closed else "at most" if opened else "to"
+        return f"a number {lower} {upper} {self.high:g}"
+
+
+Finite = Between(-math.inf, math.inf)
+"""Any number but NaN and the infinite ones."""
+Positive = Between(0.0, math.inf, "(]")
+"""Above zero and finite; of whole numbers at least 1."""
+NotNegative = Between(0.0, math.inf)
+"""Zero or above, and finite."""
+RATIO = Unit("1")
+"""The unit of ratios and coefficients, which case files take in per cent too."""
+_NAMES = {Finite: "Finite", Positive: "Positive", NotNegative: "NotNegative"}
+_WORDS = {
+    Finite: "a finite number",
+    Positive: "a finite number above zero",
+    NotNegative: "zero or a positive finite number",
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Hold what the annotation of an argument says of it.
+
+    kind: its type without marks; meaning: words for it, with its name in them; other: what to do
+    about another type.
+    """
+
+    kind: Any
+    limit: Between | None = None
+    unit: Unit | None = None
+    meaning: str = ""
+    other: Remedy | None = None
+
+    @property
+    def symbol(self) -> str:
+        """Return the symbol of its unit; "" where it has none, or is a ratio."""
+        return "" if self.unit in (None, RATIO) else self.unit.symbol
+
+    def named(self, name: str) -> str:
+        """Return the words for it in a sentence, of which the unit is one.
+
+        The unit of an argument without a meaning stands in the remedy.
+        """
+        unit = f" [{self.symbol}]" if self.symbol else ""
+        return f"{self.meaning}{unit}" if self.meaning else name
+
+    def remedy(self, whole: bool = False) -> str:
+        """Return the end of the sentence about a wrong number; "" where all are right."""
+        if self.limit is None:
+            return ""
+        plain = self.symbol and not (self.meaning or self.limit.remedy)
+        return f"{self.limit.told(whole)}{f' in {self.symbol}' if plain else ''}"
+
+
+@cache
+def quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
+    """Return what the annotations of a dataclass or function say, by argument.
+
+    Of a class whose own annotations cannot be resolved, as one made in a function, those that it
+    inherits are read.
+    """
+    try:
+        marked, bare = get_type_hints(owner, include_extras=True), get_type_hints(owner)
+    except NameError:
+        if not isinstance(owner, type) or owner.__base__ is object:
+            raise
+        return quantities(owner.__mro__[1])
+    return MappingProxyType({name: _quantity(marked[name], bare[name]) for name in bare})
+
+
+def _quantity(hint: Any, kind: Any) -> Quantity:
+    """Return what a hint says; the kind is the hint without marks."""
+    found: dict[type, Any] = {}
+    for mark in _marks(hint):
+        if found.setdefault(type(mark), mark) != mark:
+            raise TypeError(f"{hint} says two things at once: {found[type(mark)]!r} and {mark!r}")
+    return Quantity(
+        kind, found.get(Between), found.get(Unit), found.get(str, ""), found.get(Remedy)
+    )
+
+
+def _marks(hint: Any) -> Iterator[Any]:
+    """Yield the marks of a hint, those inside unions and lists too."""
+    if get_origin(hint) is Annotated:
+        yield from (
+            one for one in hint.__metadata__ if isinstance(one, Between | Unit | Remedy | str)
+        )
+    for one in get_args(hint):
+        yield from _marks(one)
