@@ -58,8 +58,9 @@ class RegularisedFriction:
 
         F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
 
-    ``tolerance``: |F| over c eps² (plus the round-off of F); ``absolute`` replaces it: 1e-10 in the source. F has one zero, between 0 and the frictionless slip g/c, but
-    is not monotonic where the slip is large beside eps; Newton's method may then run away.
+    ``tolerance``: |F| over c eps² (plus the round-off of F); ``absolute`` replaces it: 1e-10 in the
+    source. F has one zero, between 0 and the frictionless slip g/c, but is not monotonic where the
+    slip is large beside eps; Newton's method may then run away.
     ``safeguard`` bisects when an iterate leaves the bracket of the zero; off, the method is the
     source's.
     """

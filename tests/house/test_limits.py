@@ -33,7 +33,8 @@ BEHIND = {  # checked behind what needs a body, which the tests of these have
 
 
 def marked() -> Iterator[tuple[str, Callable[..., Any], str, Quantity]]:
-    """(room.name, function or class, argument, what is said of it) of all limits of public names."""
+    """(room.name, function or class, argument, what is said of it) of all limits of public
+    names."""
     cases = [
         (f"case files.{one.__name__}", one)
         for words in _FUNCTIONS.values()
