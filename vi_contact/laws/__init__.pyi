@@ -25,5 +25,6 @@ from .materials import PlaneStrain as PlaneStrain
 from .materials import PlaneStress as PlaneStress
 from .materials import Rayleigh as Rayleigh
 from .materials import Solid as Solid
+from .near_fault import NearFaultPulse as NearFaultPulse
 from .orthotropic import Orthotropic as Orthotropic
 from .weight import with_weight as with_weight
