@@ -43,12 +43,14 @@ def add_case_commands(commands: Any) -> None:
             ]
         ),
     )
-    add_command(
-        commands,
-        "schema",
-        lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip(),
-    )
+    add_command(commands, "schema", _schema)
     add_command(commands, "new", _new, "new", words=words)
+
+
+def _schema(options: argparse.Namespace) -> str:
+    from ..studies.cases.schema import text  # late: finite elements
+
+    return text().rstrip()
 
 
 def _new(options: argparse.Namespace) -> str:

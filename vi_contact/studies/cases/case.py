@@ -58,7 +58,7 @@ from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
 # in the order in which they are read: type of what a table makes, or the one call it is
-_TABLES: dict[str, Any] = {
+TABLES: dict[str, Any] = {
     "title": str,
     "mesh": MeshScript | MeshFile,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
@@ -382,10 +382,10 @@ def _read(
     known = words(base_folder(path), allowed)
     check_format(path, tables)
     for name in tables:
-        if name not in ("format", *_TABLES, "stage"):
+        if name not in ("format", *TABLES, "stage"):
             raise InputError(
                 f"{path}: the table [{name}] is unknown: "
-                f"{nearest(name, ('format', *_TABLES, 'stage'))}"
+                f"{nearest(name, ('format', *TABLES, 'stage'))}"
             )
     if "mesh" not in tables:
         raise InputError(f"{path}: the table [mesh] is missing: give the mesh of the body")
@@ -426,12 +426,12 @@ def _unread_in(
 def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:
     given = {"run": {}, "system": {}} | dict(tables)
     return {
-        name: _node(name, given, Spot(source, "", name), known) for name in _TABLES if name in given
+        name: _node(name, given, Spot(source, "", name), known) for name in TABLES if name in given
     }
 
 
 def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:
-    value, asked = tables[name], _TABLES[name]
+    value, asked = tables[name], TABLES[name]
     if isinstance(asked, Callee):
         if not isinstance(value, dict):
             raise spot.wrong("is not a table: write its keys below it")

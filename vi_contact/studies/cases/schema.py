@@ -1,36 +1,25 @@
-"""Write the JSON schema of case files from the type hints that read them.
+"""Write the JSON schema of case files, which tells editors tables, keys, types, limits and units.
 
-The schema tells editors the tables, the keys and their types. Write it after every change of what
-case files may say:
-
-    python3 docs/make_schema.py
-
-``tests/studies/test_schema.py`` tells when the file is not what this writes.
+It is made from the annotations that read case files.
 """
-
-from __future__ import annotations
 
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from inspect import getdoc
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # of this clone, installed or not
+from ...core.quantities import Between
+from ...laws.materials import LinearElastic
+from .case import TABLES
+from .own_classes import is_protocol
+from .parsing import Words, choices_of, is_list, is_path, members_of
+from .quantities import AT_START, FIELD, HISTORY, Expression
+from .stage_tables import BY_KEY, WHOLE
+from .table_calls import Callee
+from .vocabulary import words
 
-from vi_contact.core.quantities import Between
-from vi_contact.laws.materials import LinearElastic
-from vi_contact.studies.cases.case import _TABLES
-from vi_contact.studies.cases.own_classes import is_protocol
-from vi_contact.studies.cases.parsing import Words, choices_of, is_list, is_path, members_of
-from vi_contact.studies.cases.quantities import AT_START, FIELD, HISTORY, Expression
-from vi_contact.studies.cases.stage_tables import BY_KEY, WHOLE
-from vi_contact.studies.cases.table_calls import Callee
-from vi_contact.studies.cases.vocabulary import words
-
-FILE = Path(__file__).resolve().parents[1] / "vi_contact" / "studies" / "cases" / "case.schema.json"
 DRAFT = "http://json-schema.org/draft-07/schema#"
 _PLAIN: Mapping[Any, Any] = {
     float: {"type": ["number", "string"]},
@@ -55,7 +44,7 @@ def text() -> str:
     found = _Schema(words(Path()))
     properties = {
         name: found.call(one) if isinstance(one, Callee) else found.of(one)
-        for name, one in _TABLES.items()
+        for name, one in TABLES.items()
     }
     properties["stage"] = {
         "type": "array",
@@ -193,7 +182,3 @@ class _Schema:
                 else {"allOf": [one, {"required": ["type"]}]}
             )
         return found + [_OWN_CLASS] * any(is_protocol(member) for member in members)
-
-
-if __name__ == "__main__":
-    FILE.write_text(text(), encoding="utf-8")
