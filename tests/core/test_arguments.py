@@ -172,8 +172,11 @@ def test_annotations_are_read_as_they_are_written() -> None:
     assert said["width"].kind == float | None and said["width"].limit is Positive
     assert Unit("kg/m³").typed == "kg/m3" and Unit("Pa·s").typed == "Pa*s"
     assert repr(Positive) == "Positive" and repr(Between(0, 1, "[)")) == "Between(0, 1, '[)')"
+
+    def nothing(x: Annotated[float, Between(1.0, 0.0)]) -> None: ...
+
     with pytest.raises(TypeError, match="give low < high"):
-        Between(1.0, 0.0)
+        quantities(nothing)
 
     def twice(x: Annotated[Length, Unit("s")]) -> None: ...
 

@@ -15,17 +15,19 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 ENDS = ("[]", "[)", "(]", "()")
 _ASCII = str.maketrans({"²": "2", "³": "3", "·": "*", " ": "*"})
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """Name the SI unit of a quantity, as "kg/m³"; "1" is that of ratios."""
 
     symbol: str
+
+    def __repr__(self) -> str:
+        return f"Unit({self.symbol!r})"
 
     @property
     def typed(self) -> str:
@@ -33,15 +35,13 @@ class Unit:
         return self.symbol.translate(_ASCII)
 
 
-@dataclass(frozen=True)
-class Remedy:
+class Remedy(NamedTuple):
     """Say what to give in place of a value of another type, as "give a mesh of DOLFINx"."""
 
     text: str
 
 
-@dataclass(frozen=True)
-class Between:
+class Between(NamedTuple):
     """Bound a number by two ends.
 
     ends: "[]", "()", "[)" or "(]": a square bracket for an end that is included, a round one for
@@ -54,10 +54,6 @@ class Between:
     high: float
     ends: str = "[]"
     remedy: str = ""
-
-    def __post_init__(self) -> None:
-        if self.ends not in ENDS or not self.low < self.high:
-            raise TypeError(f"{self}: give low < high, and ends out of {', '.join(ENDS)}")
 
     def __repr__(self) -> str:
         ends = "" if self.ends == "[]" else f", {self.ends!r}"
@@ -179,9 +175,10 @@ def _quantity(hint: Any, kind: Any) -> Quantity:
     for mark in _marks(hint):
         if found.setdefault(type(mark), mark) != mark:
             raise TypeError(f"{hint} says two things at once: {found[type(mark)]!r} and {mark!r}")
-    return Quantity(
-        kind, found.get(Between), found.get(Unit), found.get(str, ""), found.get(Remedy)
-    )
+    limit = found.get(Between)
+    if limit is not None and (limit.ends not in ENDS or not limit.low < limit.high):
+        raise TypeError(f"{hint}: give low < high, and ends out of {', '.join(ENDS)}")
+    return Quantity(kind, limit, found.get(Unit), found.get(str, ""), found.get(Remedy))
 
 
 def _marks(hint: Any) -> Iterator[Any]:
