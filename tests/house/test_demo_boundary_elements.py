@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from demo_runs import demo
+from pictures import is_drawn
 
 from demos.pictures import deformed
 from demos.pictures.boundary import SHEAR, plot_panels
@@ -49,7 +50,7 @@ def test_the_boundary_elements_demo(
         )
         assert numbers[f"{name}: certificate"] < 1e-12
     for figure in ("snapshots.png", "tractions.png", "energies.png"):
-        assert (tmp_path / figure).stat().st_size > 4_000, figure
+        assert is_drawn(tmp_path / figure)
     assert "fem energy" in capsys.readouterr().out
 
 

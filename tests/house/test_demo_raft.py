@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from demo_runs import ROOT, demo
+from pictures import is_drawn
 
 from meshes.raft import RaftMesh
 from vi_contact import read_run, simulate
@@ -47,7 +48,7 @@ def test_the_raft_demo(shared_tmp, capsys):
     assert moved > 1.5 * np.hypot(history["a_x_field"], history["a_y_field"]).max()
     assert "run finished: 150 steps" in capsys.readouterr().out
     for name in FIGURES:
-        assert (shared_tmp / f"{name}.png").stat().st_size > 4_000, name
+        assert is_drawn(shared_tmp / f"{name}.png")
     files_of_paraview(shared_tmp, 16)
 
 
