@@ -128,19 +128,6 @@ def test_the_command_line_of_the_wall_demo(
     ).read_bytes()
 
 
-def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """The command line in the scripts' environment, in which MPI keeps its remarks to itself."""
-    quiet = f'. "{ROOT}/install/setup.sh"; vi_clean_environment; vi_mpi_environment; exec "$0" "$@"'
-    return subprocess.run(
-        ["bash", "-c", quiet, sys.executable, "-m", "vi_contact", *arguments],
-        cwd=folder,
-        capture_output=True,
-        encoding="utf-8",
-        timeout=600,
-        env=dict(os.environ),  # see shell() in test_cli.py
-    )
-
-
 def recorded(folder: Path) -> Path:
     """El Centro 1940 where it is beside the checkout, else a record like it written here."""
     real = SHARED / "elcentro_1940_ns_peknold.at2"
@@ -223,12 +210,8 @@ def test_bad_input_is_one_sentence(
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "binary.at2").write_bytes(b"\0\1\2")
     before = sorted(tmp_path.rglob("*"))
-    if name == "missing record":  # one as users do it; the others in this process, which is quicker
-        done = vi_contact(tmp_path, "run", "wall", *arguments)
-        status, out, err = done.returncode, done.stdout, done.stderr
-    else:
-        monkeypatch.chdir(tmp_path)
-        status, (out, err) = main(["run", "wall", *arguments]), capsys.readouterr()
+    monkeypatch.chdir(tmp_path)
+    status, (out, err) = main(["run", "wall", *arguments]), capsys.readouterr()
     assert status == 1 and out == ""
     assert err.startswith("vi-contact: ") and err.count("\n") == 1
     assert [word for word in words if word not in err] == []
