@@ -204,7 +204,8 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
     )
     assert 3 <= np.count_nonzero(expected) <= 11
     u = np.linalg.solve(K, f - B.T @ expected).reshape(-1, 3)
-    every = list(SHAPES).index(shape) == (1, 2, 0).index(n)  # the others where it stands, and turned
+    # the other pairs of shape and n where they stand, and turned
+    every = list(SHAPES).index(shape) == (1, 2, 0).index(n)
     for place in PLACED if every else ("as it is", "turned"):
         placed, rows = built if place == "as it is" else Corner(shape, place, n).build()
         order_there = numbered(placed, rows)

@@ -15,7 +15,7 @@ pytest.importorskip("dolfinx")
 from all_ranks import seen
 from fem_problems import field, held_by, max_over_ranks, run
 from mpi4py import MPI
-from turned_blocks import LENGTHS, rotation, unlike
+from turned_blocks import rotation, unlike
 from two_bodies import SOFT, forces, momenta, per_body, relative, thrown, two_blocks
 
 from vi_contact.core.algebra import Array

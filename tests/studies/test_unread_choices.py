@@ -931,9 +931,8 @@ class Answers:
     """What cases compute, and products with their matrices."""
 
     def __init__(self, folder: Path, tables: dict[str, Any]) -> None:
-        self.case = read_case(
-            written(folder, "\n".join(f"{name} = {toml_value(one)}" for name, one in tables.items()))
-        )
+        lines = [f"{name} = {toml_value(one)}" for name, one in tables.items()]
+        self.case = read_case(written(folder, "\n".join(lines)))
         self.parts = self.case.parts(COMM)
 
     @cached_property
