@@ -6,17 +6,21 @@ Times are not looked at here.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import logging
 import re
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from site_pages import ROOT, loaded
+
+from vi_contact.run.march import March
 
 pytest.importorskip("dolfinx")
 pytestmark = [pytest.mark.slow, pytest.mark.serial]
@@ -24,15 +28,33 @@ FOLDER = ROOT / "benchmarks"
 
 
 def first_step(benchmark: Any) -> Any:
-    """What benchmarks/small_systems.py runs in a process of its own, once."""
+    """What benchmarks/small_systems.py runs in a process of its own, once and in this one."""
 
     def start_up(rounds: int) -> tuple[float, list[float]]:
-        command = [sys.executable, "-c", benchmark.FIRST_STEP, "run"]
-        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout), [
-            1.0
-        ]
+        printed = io.StringIO()
+        with (
+            patch.object(March, "_attempt", March._attempt),
+            patch("os._exit", side_effect=SystemExit),
+            patch.object(sys, "argv", ["-c", "run"]),
+            contextlib.redirect_stdout(printed),
+            pytest.raises(SystemExit),
+        ):
+            exec(benchmark.FIRST_STEP, {})
+        return float(printed.getvalue()), [1.0]
 
     return start_up
+
+
+def once(study: Any) -> Any:
+    """What computes a study, for the runs that have a process each: the others take its rows."""
+    rows: list[Any] = []
+
+    def run(asked: Any, folder: Path, **more: Any) -> Any:
+        if not rows:
+            rows.append(study(asked, folder.with_name("apart"), **more))
+        return rows[0]
+
+    return run
 
 
 def at_most(measured: Any, size: float) -> Any:
@@ -65,7 +87,11 @@ SMALL: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
         {"PROBLEMS": lambda one: {"hertz": one.PROBLEMS["hertz"][:1]}},
     ),
     "friction_cost": ("--sizes 5e2 --steps 2", r"^ +560 +20 FixedPoint, Anderson ", {}),
-    "ida": ("--records 1 --scales 1 --duration 0.1 --mesh 2 3", r"^worst_difference +0$", {}),
+    "ida": (
+        "--records 1 --scales 1 --duration 0.1 --mesh 2 3",
+        r"^worst_difference +0$",
+        {"run_ida": lambda one: once(one.run_ida)},
+    ),
     "ledger": (
         "--steps 3 --only Midpoint() --json",
         r'^ +"defect, thrown": \d',

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from random import Random
 
@@ -22,7 +23,7 @@ pytest.importorskip("matplotlib")
 
 import vi_contact as vc
 from vi_contact import ground_motion
-from vi_contact.cli.entry import main
+from vi_contact.cli.entry import main, parser
 from vi_contact.cli.errors import printable
 
 pytestmark = pytest.mark.serial
@@ -382,6 +383,8 @@ def check(
     """Try a line in an empty folder: one sentence about the very fault that it has. An exception
     that is no SystemExit would be a traceback, and ends the test; so does a warning of numpy."""
     monkeypatch.chdir(tmp_path)
+    # made once, not for each line
+    monkeypatch.setattr("vi_contact.cli.entry.parser", cache(parser))
     monkeypatch.setattr("signal.signal", lambda *_: None)  # ida makes Ctrl-C of SIGTERM for good
     warnings.simplefilter("error", RuntimeWarning)
 

@@ -108,20 +108,18 @@ CHANGES: dict[str, Change] = {
 }
 
 
-@pytest.mark.parametrize("kind", SCHEMES)
+LEVEL = ("loaded", "on_springs", "other plane", "other facets", "friction", "excitation")
+STARTS = [(oblique, name) for name in CHANGES] + [(level, name) for name in LEVEL]
+EVERY = ("loaded", "changed", "other plane")  # load, matrices and frames: with each scheme
+
+
 @pytest.mark.parametrize(
-    ("start", "name"),
-    [(oblique, name) for name in CHANGES]
-    + [
-        (level, name)
-        for name in (
-            "loaded",
-            "on_springs",
-            "other plane",
-            "other facets",
-            "friction",
-            "excitation",
-        )
+    ("start", "name", "kind"),
+    [
+        (start, name, kind)
+        for number, (start, name) in enumerate(STARTS)
+        for turn, kind in enumerate(SCHEMES)
+        if turn == number % len(SCHEMES) or (start is oblique and name in EVERY)
     ],
 )
 def test_another_argument_is_another_answer(start, name, kind):

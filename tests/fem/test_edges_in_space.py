@@ -18,7 +18,7 @@ from all_ranks import seen
 from fem_problems import dense, field, max_over_ranks
 from mpi4py import MPI
 from reference_lcp import enumerate_lcp
-from test_mortar_in_space import rotation, unlike
+from turned_blocks import rotation, unlike
 from two_bodies import SOFT, forces, momenta, per_body, relative, thrown
 
 from vi_contact.core.algebra import Array
@@ -204,7 +204,9 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
     )
     assert 3 <= np.count_nonzero(expected) <= 11
     u = np.linalg.solve(K, f - B.T @ expected).reshape(-1, 3)
-    for place in PLACED:
+    # the other pairs of shape and n where they stand, and turned
+    every = list(SHAPES).index(shape) == (1, 2, 0).index(n)
+    for place in PLACED if every else ("as it is", "turned"):
         placed, rows = built if place == "as it is" else Corner(shape, place, n).build()
         order_there = numbered(placed, rows)
         for solver in (Condensed(), Volume()) if place == "turned" else (Condensed(),):

@@ -39,7 +39,7 @@ SAME = 1e-7  # of the weight: certificates are below 1e-9
     swapped=st.booleans(),
     offset=st.integers(-90, 90),
     sliver=st.integers(-12, -1),
-    examples=40,
+    examples=20,
 )
 def test_contact_forces_balance_the_weight(
     upper: int, lower: int, simplices: bool, swapped: bool, offset: int, sliver: int

@@ -71,7 +71,7 @@ def test_random_records_are_read_back(name: str, tmp_path: Path) -> None:
 
     @hypothesis.settings(
         derandomize=True,
-        max_examples=25,
+        max_examples=10,
         deadline=None,
         database=None,
         suppress_health_check=list(hypothesis.HealthCheck),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from demo_runs import demo
+from pictures import is_drawn
 
 from demos.pictures import deformed
 from demos.pictures.boundary import SHEAR, plot_panels
@@ -29,6 +31,8 @@ def test_the_boundary_elements_demo(
         "plot_panels",
         lambda rows, *a, **k: drawn.append(rows) or plot_panels(rows, *a, **k),
     )
+    inside = partial(module.points_inside, spacing=0.4)  # fewer dots in the picture
+    monkeypatch.setattr(module, "points_inside", inside)
     numbers: dict[str, Any] = module.main(quick=True, out=tmp_path, progress=False)
     # concrete on steel: the support holds the corners together, by both methods
     shear = drawn[0][1][2]
@@ -49,7 +53,7 @@ def test_the_boundary_elements_demo(
         )
         assert numbers[f"{name}: certificate"] < 1e-12
     for figure in ("snapshots.png", "tractions.png", "energies.png"):
-        assert (tmp_path / figure).stat().st_size > 4_000, figure
+        assert is_drawn(tmp_path / figure)
     assert "fem energy" in capsys.readouterr().out
 
 

@@ -6,6 +6,7 @@ import json
 
 import pytest
 from demo_runs import demo
+from pictures import is_drawn
 
 
 @pytest.mark.serial
@@ -20,5 +21,5 @@ def test_the_tower_on_soil_demo(comm, shared_tmp, capsys):
     assert numbers["uplift"] > 0.5 and 0.0 < numbers["slip"] < 0.01
     told = json.loads((shared_tmp / "summary.json").read_text())["boundaries"]
     assert len(told) == 3 and all("upgoing motion" in line for line in told)
-    assert (shared_tmp / "motions.png").stat().st_size > 4_000
+    assert is_drawn(shared_tmp / "motions.png")
     assert comm.rank or "outcrop 3.00 (upgoing wave 1.50)" in capsys.readouterr().out

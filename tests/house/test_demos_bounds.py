@@ -8,15 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from demo_runs import demo
+from pictures import is_drawn
 
 from demos.exact.crack import critical
 from demos.exact.membrane import Membrane
 from demos.exact.torsion import disk_torque, square_elastic
-
-
-def drawn(path: Path) -> bool:
-    """A PNG with something in it."""
-    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 20_000
 
 
 def test_the_membrane_over_a_ball(comm: Any, shared_tmp: Path) -> None:
@@ -31,7 +27,7 @@ def test_the_membrane_over_a_ball(comm: Any, shared_tmp: Path) -> None:
         assert numbers[f"{cells}: error"] < error
         assert numbers[f"{cells}: force"] == pytest.approx(known.force, rel=force)
         assert abs(numbers[f"{cells}: radius"] - known.radius) < 4.0 / cells
-    assert comm.rank or drawn(shared_tmp / "obstacle.png")
+    assert comm.rank or is_drawn(shared_tmp / "obstacle.png")
 
 
 def test_torsion(comm: Any, shared_tmp: Path) -> None:
@@ -57,7 +53,7 @@ def test_torsion(comm: Any, shared_tmp: Path) -> None:
     assert numbers["square 0.5: plastic"] == 0.0 < numbers["square 1: plastic"]
     assert numbers["square 5: torque"] == pytest.approx(8.0 / 3.0, rel=2e-2)
     assert numbers["relaxation"] < 1e-10
-    assert comm.rank or drawn(shared_tmp / "torsion.png")
+    assert comm.rank or is_drawn(shared_tmp / "torsion.png")
 
 
 @pytest.mark.serial
@@ -74,4 +70,4 @@ def test_the_bar_that_cracks(comm: Any, shared_tmp: Path) -> None:
     assert numbers["elastic"] < 0.1 and numbers["d"] > 0.98 and abs(numbers["middle"]) < 0.02
     assert numbers["crack alone"] == pytest.approx(numbers["1 + h / (2 l)"], rel=0.1)
     assert numbers["crack alone"] < numbers["surface"] < 1.5
-    assert comm.rank or drawn(shared_tmp / "crack.png")
+    assert comm.rank or is_drawn(shared_tmp / "crack.png")

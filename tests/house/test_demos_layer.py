@@ -8,15 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from demo_runs import demo
+from pictures import is_drawn
 
 from demos.pictures.layer import plot_thin_limit
 
 serial = pytest.mark.serial
-
-
-def is_picture(path: Path) -> bool:
-    """A PNG with something in it."""
-    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 2_000
 
 
 @pytest.mark.slow
@@ -31,7 +27,7 @@ def test_the_particle_demo(tmp_path: Path, capsys: Any) -> None:
     assert numbers["DOMINANT 0.8"] == pytest.approx(numbers["DOMINANT 1"], abs=1e-8)
     assert numbers["FULL 1"] == pytest.approx(0.56918, abs=5.1e-6)
     assert numbers["wanted"] == pytest.approx(0.7, abs=1e-12)
-    assert all(is_picture(tmp_path / f"figure_{number}.png") for number in (1, 2, 3))
+    assert all(is_drawn(tmp_path / f"figure_{number}.png") for number in (1, 2, 3))
     assert "0.593624" in capsys.readouterr().out  # k = c = 2
 
 
@@ -46,7 +42,7 @@ def test_the_rigid_body_demo(tmp_path: Path) -> None:
         and numbers["worst_restitution"] < 2e-4
         and numbers["energy_error"] < 1e-4
     )
-    assert is_picture(tmp_path / "thin_limit.png") and is_picture(tmp_path / "tumbling.png")
+    assert is_drawn(tmp_path / "thin_limit.png") and is_drawn(tmp_path / "tumbling.png")
 
 
 @pytest.mark.slow
@@ -65,7 +61,7 @@ def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
     assert 0.0 < numbers["wall b 8e-06: deepest"] < 8e-6
     if comm.rank == 0:
         assert all(
-            is_picture(shared_tmp / f"{name}.png")
+            is_drawn(shared_tmp / f"{name}.png")
             for name in ("ThrownBar", "ThrownBar_limit", "wall_limit")
         )
 
@@ -74,6 +70,6 @@ def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
 def test_thin_limit_figure(tmp_path: Path) -> None:
     """One curve is enough."""
     widths = np.array([1.0, 0.1])
-    assert is_picture(
+    assert is_drawn(
         plot_thin_limit({"x": (widths, widths)}, tmp_path / "a.png", quantity="error [m]")
     )

@@ -117,6 +117,7 @@ def test_options_exist(document: Path) -> None:
         assert given - set(command._option_string_actions) == set(), line
 
 
+@cache
 def anchors(document: Path) -> set[str]:
     """Anchors of the headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", document.read_text(encoding="utf-8"), re.MULTILINE)

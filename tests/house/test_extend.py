@@ -3,8 +3,11 @@ of the registry."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -54,7 +57,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def printed(folder: Path) -> dict[str, str]:
     """What its scripts print."""
     scripts = [file for file in FILES if file.endswith(".py") and "/" not in file]
-    return {file: python([file], folder, f"{ROOT}:{folder}") for file in scripts}
+    found = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        patch.chdir(folder)
+        for file in scripts:
+            with contextlib.redirect_stdout(io.StringIO()) as said:
+                runpy.run_path(file, run_name="__main__")
+            found[file] = said.getvalue()
+    return found
 
 
 def test_examples_print_what_the_guide_says(printed: dict[str, str]) -> None:

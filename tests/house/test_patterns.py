@@ -77,7 +77,7 @@ PIECES = (
     "2 corrected ",
     "\n$Nodes ",
 )
-SHORT, LONG = 400, 6400
+SHORT, LONG = 200, 3200
 MANY = 20  # tries, where few may tell of what else ran beside the short text or beside the long one
 SLOWER = 64.0  # of LONG over SHORT: 16 where time grows as the text, 256 where as its square
 

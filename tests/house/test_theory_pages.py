@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from pictures import is_drawn
 
 import vi_contact as vc
 from vi_contact import solvers
@@ -49,7 +50,7 @@ def test_pages_state_what_their_figures_show(
 ) -> None:
     phrases = figures.PAGES[name](tmp_path / "figure.png")
     assert len(phrases) >= 3 and figures.lacking(name, phrases) == []
-    assert (tmp_path / "figure.png").stat().st_size > 20_000
+    assert is_drawn(tmp_path / "figure.png")
     # a page that states another number is found
     assert figures.lacking(name, ["$f = 2$ N it rests at $u = 0.03$ m"])
 

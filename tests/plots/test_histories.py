@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from contextlib import nullcontext
 from typing import Any
 
@@ -49,6 +50,13 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return keep_figures(monkeypatch, plotting)
 
 
+@pytest.fixture
+def plain() -> Iterator[None]:
+    """What is asked of the figures does not depend on how they are arranged."""
+    with plain_pictures():
+        yield
+
+
 DRAW = {
     "points": lambda h, path: plotting.plot_points(
         h, ["4", "6", "12"], path, title="Wall", unilateral=["4"], reference=h
@@ -82,7 +90,7 @@ def lines(axis: Any) -> dict[str, np.ndarray]:
     return {line.get_label(): line.get_ydata() for line in axis.lines}
 
 
-def test_displacements_are_drawn_in_a_readable_unit(tmp_path, figures):
+def test_displacements_are_drawn_in_a_readable_unit(plain, tmp_path, figures):
     """6e-5 m at most: micrometres, the same scale in every panel; bound at zero for contact points
     only."""
     h = history()
@@ -95,7 +103,7 @@ def test_displacements_are_drawn_in_a_readable_unit(tmp_path, figures):
         assert ("contact point" in axis.get_title(loc="left")) == (label == "4")
 
 
-def test_energy_terms_share_one_unit(tmp_path, figures):
+def test_energy_terms_share_one_unit(plain, tmp_path, figures):
     h = history()
     plotting.plot_energy(h, tmp_path / "e.png")
     top, bottom = figures[0].axes
@@ -138,7 +146,7 @@ def test_nothing_happened(tmp_path):
                 assert draw(h, tmp_path / f"{name}.png").stat().st_size > 1000
 
 
-def test_one_contact_point_is_visible(tmp_path, figures):
+def test_one_contact_point_is_visible(plain, tmp_path, figures):
     """A map of one row has a height."""
     plotting.plot_contact(history(m=1), tmp_path / "c.png", position=np.array([4.0]))
     mesh = figures[0].axes[0].collections[0]
@@ -146,7 +154,7 @@ def test_one_contact_point_is_visible(tmp_path, figures):
     assert corners.shape[0] == 2 and np.ptp(corners[:, :, 1]) > 0.0
 
 
-def test_held_points_that_pull_are_not_called_open(tmp_path, figures):
+def test_held_points_that_pull_are_not_called_open(plain, tmp_path, figures):
     h = history()
     h["pressure"] -= 1e5
     plotting.plot_contact(h, tmp_path / "c.png", position=np.linspace(0.75, 8.25, 11))
@@ -163,7 +171,7 @@ def test_the_users_matplotlib_is_left_alone(tmp_path):
     assert (dict(matplotlib.rcParams), matplotlib.get_backend()) == before
 
 
-def test_contact_map_is_sorted_by_position(tmp_path, figures):
+def test_contact_map_is_sorted_by_position(plain, tmp_path, figures):
     h = history()
     plotting.plot_contact(h, tmp_path / "c.png", position=np.linspace(8.25, 0.75, 11))
     drawn = np.asarray(figures[0].axes[0].collections[0].get_array()).reshape(11, 401)

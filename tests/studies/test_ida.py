@@ -3,13 +3,15 @@ stop, failed runs."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
-import sys
 import time
 import tomllib
 from collections.abc import Sequence
@@ -53,31 +55,25 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder in which the whole example of docs/guide/studies.md has run in a shell, and what
-    it printed."""
+    """The folder in which the whole example of docs/guide/studies.md has run, and what it
+    printed."""
     folder = tmp_path_factory.mktemp("ida")
-    case, (make, read) = blocks("toml")[0], blocks("python")
-    commands = [one for one in blocks("sh") if "schema" not in one]
-    (folder / "wall.toml").write_text(case, encoding="utf-8")
-    (folder / "make.py").write_text(make, encoding="utf-8")
-    (folder / "read.py").write_text(read, encoding="utf-8")
-    lines = [
-        "set -e",
-        'vi-contact() { "$0" -m vi_contact "$@"; }',
-        '"$0" make.py',
-        *commands,
-        '"$0" read.py',
+    (folder / "wall.toml").write_text(blocks("toml")[0], encoding="utf-8")
+    make, read = blocks("python")
+    commands = [
+        shlex.split(one.replace("\\\n", ""), comments=True)
+        for one in blocks("sh")
+        if "schema" not in one
     ]
-    done = subprocess.run(
-        ["bash", "-c", "\n".join(lines), sys.executable],
-        cwd=folder,
-        capture_output=True,
-        encoding="utf-8",
-        timeout=600,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
-    )
-    assert done.returncode == 0, done.stderr
-    return folder, done.stdout
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.chdir(folder)
+        patch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)  # for the runs of the study
+        exec(compile(make, "make.py", "exec"), {"__name__": "__main__"})
+        for program, *words in commands:
+            assert program == "vi-contact" and main(words) == 0
+        exec(compile(read, "read.py", "exec"), {"__name__": "__main__"})
+    return folder, printed.getvalue()
 
 
 @pytest.fixture

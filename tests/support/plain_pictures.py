@@ -1,5 +1,5 @@
-"""Pictures of few pixels, drawn once: matplotlib arranges a picture by drawing it a second time,
-labels and titles by measuring every number on the axes, and pixels take time.
+"""Pictures of few pixels, drawn once and without axes: matplotlib arranges a picture by drawing it a
+second time, titles by measuring every number on the axes, and ticks take longer than all curves.
 
 How they are arranged is seen in tests/plots, which draws them as users do, and in docs/figures.
 """
@@ -16,8 +16,8 @@ DPI = 50
 
 @contextmanager
 def plain_pictures() -> Iterator[None]:
-    """Let figures have no layout engine, labels and titles stay where they begin, and files have 50
-    dots per inch and all of the canvas."""
+    """Let figures have no layout engine, titles stay where they begin, axes be left out, and files
+    have 50 dots per inch and all of the canvas."""
     try:
         from matplotlib.axes import Axes
         from matplotlib.axis import Axis
@@ -37,7 +37,8 @@ def plain_pictures() -> Iterator[None]:
             (Figure, "savefig", saved),
             (Figure, "align_ylabels", lambda figure, axes=None: None),
             (Axes, "_update_title_position", lambda axes, renderer: None),
-            (Axis, "_update_label_position", lambda axis, renderer: None),
+            (Axis, "draw", lambda axis, renderer: None),
+            (Axis, "get_tightbbox", lambda axis, renderer=None, **more: None),
         ):
             if hasattr(owner, name):  # matplotlib may rename what is its own
                 stack.enter_context(patch.object(owner, name, new))

@@ -37,7 +37,7 @@ def report_packages() -> None:
 
 
 def browser() -> str:
-    """Return the command of a headless browser; skip the module that calls this where there is
+    """Return the command of a headless browser; skip what calls this, a module too, where there is
     none."""
     found = next(
         filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
