@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.arguments import check_fields, checked
@@ -182,3 +183,32 @@ def test_annotations_are_read_as_they_are_written() -> None:
 
     with pytest.raises(TypeError, match="two things at once"):
         quantities(twice)
+
+
+@dataclass(frozen=True)
+class Short(Beam):
+    """A field that is declared anew for another default keeps its limits."""
+
+    length: float = 0.5
+
+
+def test_another_default_keeps_the_limits() -> None:
+    assert Short().length == 0.5 and quantities(Short)["length"] == quantities(Beam)["length"]
+    with pytest.raises(InputError, match="Short: length is -1; give a finite number above zero"):
+        Short(length=-1)
+
+
+def test_truth_values_are_no_numbers() -> None:
+    for wrong in ((True, False), np.array([True, False])):
+        with pytest.raises(InputError, match="Beam: mu"):
+            Beam(mu=wrong)
+
+
+def test_a_protocol_with_brackets_is_that_protocol() -> None:
+    """As those in numpy's ArrayLike are."""
+
+    @checked
+    def centre(where: ArrayLike) -> ArrayLike:
+        return where
+
+    assert centre((0.0, 1.0)) == (0.0, 1.0)

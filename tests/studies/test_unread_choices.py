@@ -24,7 +24,6 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.studies import read_case
 from vi_contact.studies.cases.description import describe
 from vi_contact.studies.cases.toml_file import toml_value
-from vi_contact.studies.cases.vocabulary import _choices as choices
 
 COMM = MPI.COMM_WORLD
 CASE = """
@@ -885,38 +884,6 @@ KEYS: list[tuple[str, str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
         {"excitation": WAVE},
     ),
 ]
-KINDS = (
-    "LinearElastic",
-    "Orthotropic",
-    "Heterogeneous",
-    "Section",
-    "Damping",
-    "FrictionLaw",
-    "ImpactLaw",
-    "MassLaw",
-    "Excitation",
-    "Obstacle",
-    "ContactSurface",
-    "Prescribed",
-    "Traction",
-    "BodyForce",
-    "Dashpots",
-    "Scheme",
-)
-ELSEWHERE = {  # type or type.key -> why nothing changes here, or where it is tested
-    "FirstModeHarmonic": "a Harmonic whose frequency is found",
-    "FreeField": "tests/soil/test_free_field.py",
-    "LinearMultistep": "its coefficients belong together; newmark names them",
-    "MoreauJean.allow_energy_gain": "a permission",
-    "contact_surface.name": "a label",
-    "contact_pair.name": "a label",
-    "contact_surface.hinges": "a permission",
-    "contact_pair.hinges": "a permission",
-    "contact_surface.feature_angle": "of curved faces",
-    "contact_pair.feature_angle": "of curved faces",
-    "contact_surface.frictionless_corners": "of corners",
-    "contact_pair.frictionless_corners": "of corners",
-}
 
 
 def put(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
@@ -996,21 +963,3 @@ def test_every_key_changes_the_model(shared_tmp: Path, number: int) -> None:
         assert changes(before, shared_tmp, put(base, table, own | keys | {key: value})), (
             f"{table} {word}: {key} = {value} changes nothing"
         )
-
-
-@pytest.mark.serial
-def test_no_key_is_forgotten() -> None:
-    """Each key of each type of these kinds stands in the list above, or there is a reason why
-    not."""
-    tried = {f"{word}.{key}" for _, word, _, others, _ in KEYS for key in others}
-    listed = {getattr(kind, "__name__", ""): words for kind, words in choices().items()}
-    missing = [
-        f"{word}.{key}"
-        for kind in KINDS
-        for word, call in listed[kind].items()
-        for key in call.hints
-        if f"{word}.{key}" not in tried
-        and word not in ELSEWHERE
-        and f"{word}.{key}" not in ELSEWHERE
-    ]
-    assert len(listed) > 20 and missing == []

@@ -10,7 +10,8 @@ PNG = b"\x89PNG"
 
 
 def is_drawn(path: Path, share: float = 0.005) -> bool:
-    """Whether a PNG is whole and at least this share of its pixels is not of the ground's colour."""
+    """Whether a PNG is whole and at least this share of its pixels has another colour than the
+    ground."""
     from matplotlib.image import imread
 
     assert path.read_bytes().startswith(PNG), path

@@ -1,5 +1,7 @@
-"""Pictures of few pixels, drawn once and without axes: matplotlib arranges a picture by drawing it a
-second time, titles by measuring every number on the axes, and ticks take longer than all curves.
+"""Pictures of few pixels, drawn once and without axes.
+
+Matplotlib arranges a picture by drawing it a second time, titles by measuring every number on the
+axes, and ticks take longer than all curves.
 
 How they are arranged is seen in tests/plots, which draws them as users do, and in docs/figures.
 """

@@ -131,6 +131,8 @@ def _beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
     """
     if _is_number(value):
         return (None if limit.holds(real(value)) else ""), value
+    if isinstance(value, bool | np.bool_):
+        return "", value
     if not _is_sequence(value):
         return None, value
     ends = (np.min(value), np.max(value)) if _are_numbers(value) and np.size(value) else ()
@@ -171,8 +173,9 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
     """Return whether a value is a function, satisfies a protocol, or is of a class."""
     if kind is Callable or origin is Callable:
         return callable(value) and not isclass(value)
-    if getattr(kind, "_is_protocol", False):
-        return not isclass(value) and all(hasattr(value, name) for name in _asked(kind))
+    protocol = kind if origin is None else origin  # without what stands in its brackets
+    if getattr(protocol, "_is_protocol", False):
+        return not isclass(value) and all(hasattr(value, name) for name in _asked(protocol))
     return isinstance(value, kind) if isclass(kind) and origin is None else True
 
 

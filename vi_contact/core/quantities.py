@@ -12,7 +12,7 @@ list too, and not for None, functions and other objects.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
@@ -157,16 +157,24 @@ class Quantity:
 def quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
     """Return what the annotations of a dataclass or function say, by argument.
 
-    Of a class whose own annotations cannot be resolved, as one made in a function, those that it
-    inherits are read.
+    A field that a class declares anew without marks, for another default, keeps those of the class
+    that it inherits from. Of a class whose own annotations cannot be resolved, as one made in a
+    function, those that it inherits are read.
     """
+    inherited = (
+        quantities(owner.__mro__[1]) if isinstance(owner, type) and owner is not object else {}
+    )
     try:
         marked, bare = get_type_hints(owner, include_extras=True), get_type_hints(owner)
     except NameError:
         if not isinstance(owner, type) or owner.__base__ is object:
             raise
-        return quantities(owner.__mro__[1])
-    return MappingProxyType({name: _quantity(marked[name], bare[name]) for name in bare})
+        return inherited
+    found = {name: _quantity(marked[name], bare[name]) for name in bare}
+    for name, one in inherited.items():
+        if name in found and not any(_marks(marked[name])):
+            found[name] = replace(one, kind=found[name].kind)
+    return MappingProxyType(found)
 
 
 def _quantity(hint: Any, kind: Any) -> Quantity:
