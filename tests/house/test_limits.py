@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from test_wrong_types import callables, right
+from public_callables import callables, right
 
 from vi_contact.core.arguments import _check, fits
 from vi_contact.core.errors import InputError
