@@ -89,7 +89,7 @@ def test_rate_dependent_friction() -> None:
     """mu = |rate|/100: of the old step in Algorithm 10, of the step itself in SlipRateCoulomb;
     order 1 between them."""
     elements, apart = Elements(50), []
-    for steps in (200, 400):
+    for steps in (100, 200):
         law = vc.SlipRateCoulomb(lambda rate: published_mu(0.0, 1.0) * rate)
         problem = beam_problem(
             BEAM, elements, normal_force=lambda t: PUSH, friction=law, start=published_start()

@@ -30,7 +30,7 @@ RHO = 2.5
 
 def with_hole() -> BoundaryMesh:
     """A square with a smaller one cut out: two loops, elements of two lengths."""
-    outer, inner = polygon(SQUARE, 0.2), polygon(0.4 * np.array(SQUARE[::-1]), 0.1, exterior=True)
+    outer, inner = polygon(SQUARE, 0.25), polygon(0.4 * np.array(SQUARE[::-1]), 0.2, exterior=True)
     return from_segments(
         np.concatenate([outer.points, inner.points]),
         np.concatenate([outer.elements, inner.elements + len(outer)]),
@@ -38,15 +38,15 @@ def with_hole() -> BoundaryMesh:
 
 
 SHAPES = {
-    "square": (lambda: polygon(SQUARE, 0.125), 0.125, 32),
+    "square": (lambda: polygon(SQUARE, 0.2), 0.2, 32),
     "thin slab": (
         lambda: polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 0.02), (0.0, 0.02)], [5, 1, 5, 1]),
         0.1,
         44,
     ),
     "disk": (lambda: circle(0.5, 25), 0.15, 30),
-    "hole": (with_hole, 0.2, 24),
-    "outside": (lambda: circle(0.5, 20, exterior=True), 0.15, 30),
+    "hole": (with_hole, 0.25, 28),
+    "outside": (lambda: circle(0.5, 14, exterior=True), 0.2, 30),
 }
 
 

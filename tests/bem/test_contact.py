@@ -253,14 +253,14 @@ def test_a_weld_is_no_cut():
     lower, upper = polygon(corners, 0.1), polygon([(x, y + 0.5) for x, y in corners], 0.1)
     whole = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 0.1)
     top = pressed(
-        steklov(upper, MATERIAL, dt=0.1, steps=30),
+        steklov(upper, MATERIAL, dt=0.1, steps=20),
         pressure=lambda t: 1.0,
         top=2,
         contact=upper.labels == 0,
     )
     clamped = np.tile(lower.nodes_of(lower.labels == 0), (2, 1))
     base = unloaded(
-        steklov(lower, MATERIAL, dt=0.1, steps=30), contact=lower.labels == 2, fixed=clamped
+        steklov(lower, MATERIAL, dt=0.1, steps=20), contact=lower.labels == 2, fixed=clamped
     )
     bodies = TwoBodies(top, base, welded=upper.labels == 0)
     one, two = bodies.solve()
@@ -270,7 +270,7 @@ def test_a_weld_is_no_cut():
     assert np.abs(joint).max() < 1e-12 * np.abs(one.displacement).max()
     held = np.tile(whole.nodes_of(whole.labels == 0), (2, 1))
     mono = pressed(
-        steklov(whole, MATERIAL, dt=0.1, steps=30),
+        steklov(whole, MATERIAL, dt=0.1, steps=20),
         pressure=lambda t: 1.0,
         top=2,
         contact=whole.labels == 2,

@@ -188,11 +188,10 @@ def test_plane_pulses(operators, shear):
 def test_energetic_and_convolution_agree(operators):
     """B11: top of the rod under the smooth load, Radau against energetic, 10 elements a side."""
     problem = rod(operators[10], smooth_load)
-    blocks = energetic_blocks(problem.operator.mesh, MATERIAL, dt=0.1, steps=60)
-    means = np.tensordot([1.0 / 3.0, 2.0 / 3.0], problem.forces, (0, 1))
+    blocks = energetic_blocks(problem.operator.mesh, MATERIAL, dt=0.1, steps=40)
+    means = np.tensordot([1.0 / 3.0, 2.0 / 3.0], problem.forces, (0, 1))[:40]
     energetic = BoundaryProblem(PoincareSteklov(blocks, 1.0), means, problem.fixed).solve()
-    convolution = problem.solve()
-    difference = energetic.displacement - convolution.displacement
+    difference = energetic.displacement - problem.solve().displacement[:40]
     assert np.linalg.norm(difference) < 5e-3 * np.linalg.norm(energetic.displacement)
 
 
@@ -273,7 +272,7 @@ def test_density_and_the_unsymmetric_form(operators):
         for material in (MATERIAL, heavy)
     )
     assert np.allclose(2.0 * twice.W, light.W)
-    other = convolution_operator(polygon(SQUARE, 0.1), MATERIAL, dt=0.1, steps=60, symmetric=False)
+    other = convolution_operator(polygon(SQUARE, 0.2), MATERIAL, dt=0.2, steps=30, symmetric=False)
     assert top_error(other, smooth_load, smooth_integral) < 0.04
 
 

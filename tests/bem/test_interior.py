@@ -42,7 +42,7 @@ def test_pulse_crosses_the_square():
 def test_rod_inside_and_density():
     """The rod's wave before its echo from the top, at chosen steps; density divides
     displacement."""
-    blocks = energetic_blocks(polygon(SQUARE, 0.1), MATERIAL, dt=0.1, steps=20)
+    blocks = energetic_blocks(polygon(SQUARE, 0.1), MATERIAL, dt=0.1, steps=15)
     problem = rod(blocks, smooth_load, rho=2.0)
     steps = [4, 9, 14]
     found = interior_displacement(problem.operator, problem.solve(), POINTS, steps=steps)

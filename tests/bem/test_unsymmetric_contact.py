@@ -42,10 +42,10 @@ LAWS = {
 
 @cache
 def square(k: int, form: str) -> BoundaryProblem:
-    """The unit square pressed on its top, T = 6, c_P dt = h, from one set of blocks for both
+    """The unit square pressed on its top, T = 4, c_P dt = h, from one set of blocks for both
     forms."""
     if form == "symmetric":
-        return square_problem(k, MATERIAL, dt=1.0 / k, steps=6 * k)
+        return square_problem(k, MATERIAL, dt=1.0 / k, steps=4 * k)
     given = square(k, "symmetric")
     return replace(
         given, operator=PoincareSteklov(given.operator.blocks, MATERIAL.rho, symmetric=False)
@@ -83,7 +83,7 @@ def test_both_forms_meet(law):
     assert coarse[0] < 6e-3 and coarse[1] < 3e-2
     assert fine[0] < 0.8 * coarse[0] and fine[1] < (1.2 if law == "Coulomb" else 0.8) * coarse[1]
     found = run(10, "unsymmetric", law)
-    assert found.worst < 1e-13 and len(found.certificates) == 60
+    assert found.worst < 1e-13 and len(found.certificates) == 40
     assert (
         found.gap.min() >= -1e-15
         and found.r_n.min() >= 0.0
@@ -91,29 +91,11 @@ def test_both_forms_meet(law):
     )
     limit = (
         LAWS[law]
-        .limit(found.r_n.ravel(), np.tile(found.contact.surface.weights, 60), 1.0)
-        .reshape(60, -1)
+        .limit(found.r_n.ravel(), np.tile(found.contact.surface.weights, 40), 1.0)
+        .reshape(40, -1)
     )
     assert (np.abs(found.r_t) <= limit * (1.0 + 1e-12) + 1e-15).all()
     assert (np.diff(found.friction_loss, prepend=0.0) >= -1e-14).all()
-
-
-def test_the_bars_at_twenty_elements():
-    """Impulses within 0.2 % and energies within 1.5 %, up to t = 2: measured 0.03 and 0.25 %."""
-    given = square_problem(20, MATERIAL, dt=0.05, steps=40)
-    pair = (
-        given,
-        replace(
-            given, operator=PoincareSteklov(given.operator.blocks, MATERIAL.rho, symmetric=False)
-        ),
-    )
-    runs = [
-        march_contact(BoundaryContact(problem.condensed(), friction=LAWS["Coulomb"]))
-        for problem in pair
-    ]
-    works = [problem.solve(found.forces).work for problem, found in zip(pair, runs, strict=True)]
-    assert np.abs(runs[1].impulse - runs[0].impulse).max() < 2e-3 * np.abs(runs[0].impulse).max()
-    assert np.abs(works[1] - works[0]).max() < 1.5e-2 * works[0].max()
 
 
 def test_the_sharp_triangle():

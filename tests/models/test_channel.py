@@ -271,7 +271,7 @@ def test_any_number_of_ranks(friction):
     runs = []
     for alone in (False, True):
         one = model(alone=alone)
-        runs.append(follow(one, one.problem(friction=friction), 40).history)
+        runs.append(follow(one, one.problem(friction=friction), 20).history)
     together, single = runs
     for names in ([n for n in single if n.startswith("u_")], ["pressure"]):
         size = max(np.abs(np.asarray(single[name])).max() for name in names)
@@ -442,7 +442,7 @@ def test_waves_from_below(ends):
         ("compliant", vc.LinearElastic(E=2e14, nu=0.25, rho=2400.0)),
     ):
         _, history = on_base(
-            base, ends, (CHANNEL.harmonic(),), dt=0.005, steps=60, weighing=("channel",), rock=rock
+            base, ends, (CHANNEL.harmonic(),), dt=0.005, steps=40, weighing=("channel",), rock=rock
         )
         opening.append(history["opening_left"])
     assert np.abs(opening[1] - opening[0]).max() < 0.03 * opening[0].max()

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from drawn_run import drawn_run
 from marched_chain import chain, run
+from mpi4py import MPI
 
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
@@ -38,6 +39,14 @@ def notes(tmp_path: Path) -> Path:
     path = tmp_path / "notes"
     path.write_text(NOTES)
     return path
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run with frames, to be copied."""
+    folder = tmp_path_factory.mktemp("drawn") / "run"
+    drawn_run(MPI.COMM_WORLD, folder)
+    return folder
 
 
 def with_fields(folder: Path, steps: int = 4, **more: Any) -> Any:
@@ -232,7 +241,7 @@ def test_reports_and_pictures_replace_links(
     """By plot, film, report and post: a file takes the place of the link."""
     pytest.importorskip("matplotlib")
     folder = tmp_path / "run"
-    drawn_run(comm, folder)
+    drawn_run(comm, folder, 2)
     for name in PICTURES:
         (folder / name).symlink_to(notes)
     given, out = str(folder), "--out"
@@ -265,12 +274,12 @@ def test_reports_and_pictures_replace_links(
     ],
 )
 def test_links_are_not_followed_by_readers(
-    comm: Any, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+    drawn: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """report, plot, film and post of somebody's folder: a sentence that names the link."""
     pytest.importorskip("matplotlib")
     folder = tmp_path / "run"
-    drawn_run(comm, folder)
+    shutil.copytree(drawn, folder)
     if name in (MODEL, COPY):
         (folder / name).write_text("{}" if name == MODEL else "")
     os.replace(folder / name, tmp_path / "moved")
@@ -289,10 +298,10 @@ def test_links_are_not_followed_by_readers(
 
 @pytest.mark.parametrize("link", ["external", "soft"])
 def test_frames_elsewhere_are_not_drawn(
-    comm: Any, tmp_path: Path, link: str, capsys: pytest.CaptureFixture[str]
+    drawn: Path, tmp_path: Path, link: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, other = tmp_path / "run", tmp_path / "other.h5"
-    drawn_run(comm, folder)
+    shutil.copytree(drawn, folder)
     with h5py.File(other, "w") as file:
         file["u"] = np.ones((13, 3))
     with h5py.File(folder / FIELDS / "frame_000006.h5", "a") as file:

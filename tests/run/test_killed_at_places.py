@@ -19,7 +19,7 @@ from vi_contact.run.files.reading import read_run
 
 pytestmark = [pytest.mark.serial, pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")]
 FUZZ = Fuzz("kills at places", __file__)
-COUNT, KILLS, STEPS = 4, 3, 60
+COUNT, KILLS, STEPS = 3, 2, 40
 PLACES = (
     "vi_contact.core.files.write_all",
     "vi_contact.run.files.history.write_all",

@@ -199,9 +199,9 @@ def test_another_friction_method():
     """Gauss-Seidel: the same history to 1e-9."""
     problem = bar_on_bed(Coulomb(0.25), lambda t: float(8.0 * THRESHOLD * H * np.sin(t)), cells=20)
     other = quasi_static(
-        problem, range(1, 7), solver=Condensed(friction_method=NSGS(tolerance=1e-13))
+        problem, range(1, 4), solver=Condensed(friction_method=NSGS(tolerance=1e-13))
     )
-    for one, two in zip(ends(problem, range(1, 7)), other, strict=True):
+    for one, two in zip(ends(problem, range(1, 4)), other, strict=True):
         assert np.abs(one.u - two.u).max() < 1e-9 * np.abs(one.u).max()
 
 

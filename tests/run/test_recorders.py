@@ -95,7 +95,7 @@ def test_v9_7_ledger_closes(scheme: Any, impact: Any) -> None:
         consistent=True,
         constant=1.0,
     )
-    found = history(problem, scheme)
+    found = history(problem, scheme, 120)
     assert found["contact_active"].max() > 0
     assert np.abs(ledger_defect(found)).max() < 1e-10
     size = (found["energy_kinetic"] + found["energy_strain"]).max()

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bar import run, thrown
+from bar import bar, run, thrown
 from chain import chain_problem
 from marched_chain import difference
 from marched_chain import run as run_chain
@@ -23,13 +23,11 @@ from vi_contact.core.step import Report
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Energy
-from vi_contact.run.simulate import simulate
 from vi_contact.run.time_steps import HalvedAtImpact, Schedule, StepPlan, step_plan
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
-from vi_contact.solvers.condensed import Condensed
 
 serial = pytest.mark.serial
 HALF, NEWMARK, DISSIPATIVE = (
@@ -240,16 +238,19 @@ def test_ledger_closes_across_changes(scheme, plan):
     """V9.7: a change of dt changes neither u nor v, and no energy appears or is lost between two
     steps."""
     problem = with_mass_of(scheme)
-    reports = list(run(problem, scheme, dt=plan, steps=600))
+    # the thrown bar has to leave its wall
+    steps = 600 if isinstance(scheme, Trapezoidal) else 360
+    reports = list(run(problem, scheme, dt=plan, steps=steps))
     sizes = [report.new.t - report.old.t for report in reports]
     assert sum(abs(b / a - 1.0) > 0.1 for a, b in pairwise(sizes)) >= 2 and changes(reports) >= 2
     for one, two in pairwise(reports):
         assert np.array_equal(two.old.u, one.new.u) and np.array_equal(two.old.v, one.new.v)
         assert two.old.t == one.new.t and two.new.k == two.old.k + 1
-    solution = simulate(
-        problem, scheme=scheme, solver=Condensed(), dt=plan, steps=600, record=[Energy()]
-    )
-    assert solution.facts["energy_defect"] < 1e-10 and solution.history["certificate"].max() < 1e-9
+    ledger = Energy()
+    rows = [ledger.start(problem, reports[0].old), *map(ledger.row, reports)]
+    size = max(row["energy_kinetic"] + row["energy_strain"] for row in rows)
+    assert max(abs(row["energy_defect"]) for row in rows) < 1e-10 * size
+    assert max(report.certificate.worst for report in reports) < 1e-9
 
 
 def linear_error(scheme: Any, dt: float) -> float:
@@ -448,9 +449,11 @@ def test_means_over_arrival_times_of_the_thrown_bar():
     for halvings in range(4):
         for i in range(16):
             dt = 0.5 / (44.0 + (i + 1.0 / np.pi) / 16.0)
-            reports = run(thrown(100), HALF, dt=HalvedAtImpact(dt, halvings), steps=100)
+            t = 0.5 - 40.0 * dt  # forty steps of the fall, in which nothing happens, are left out
+            problem = bar(100, gap=10.0 * t, v0=lambda x: np.full_like(x, -10.0))
+            reports = run(problem, HALF, dt=HalvedAtImpact(dt, halvings), steps=60)
             first = next(report for report in reports if report.new.active.any())
-            delay[halvings] += (first.new.t - 0.5) / dt / 16.0
+            delay[halvings] += (first.new.t - t) / dt / 16.0
             lost[halvings] += float(first.balance.r_n @ (first.new.u - first.old.u)[:1]) / 16.0
     np.testing.assert_allclose(delay, [0.511, 0.261, 0.136, 0.0739], rtol=5e-3)
     np.testing.assert_allclose(lost, [5.71, 2.98, 1.74, 1.28], rtol=5e-3)

@@ -68,7 +68,7 @@ PLANS = [
 @serial
 @pytest.mark.parametrize(
     "scheme, plan",
-    [*zip((HALF, NEWMARK, DISSIPATIVE), PLANS, strict=True), (NEWMARK, PLANS[2])],
+    [*zip((HALF, NEWMARK, DISSIPATIVE), PLANS, strict=True)],
     ids=repr,
 )
 def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: Any):
@@ -83,7 +83,7 @@ def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: 
         if loop.ended and loop.dt < step_plan(plan, 199, None).dt(loop.base - 1)
     ]
     assert bool(halved) == isinstance(plan, HalvedAtImpact)
-    stops = sorted({50, 75, 101, 150, *halved[:2]})
+    stops = sorted({50, 101, *halved[:2]})
     for stop in stops:
         run_chain(tmp_path / "parts", stop, scheme=scheme, dt=plan, restart=stop != stops[0])
     parts = run_chain(tmp_path / "parts", 200, scheme=scheme, dt=plan, restart=True)

@@ -146,9 +146,9 @@ def ledger(problem: ContactProblem, reports: Iterable[Report]) -> tuple[float, R
 def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
     """V9.7: what the energy of each step becomes is known to 1e-10 of the largest energy, with mass
     or without."""
-    dt = 0.5 / 20 * (1.0 if given is period_three else 1 / 3)
+    dt = 1 / 20 * (1.0 if given is period_three else 1 / 3)
     problem = given(20, mass=mass)
-    defect, last = ledger(problem, run(problem, scheme, dt=dt, steps=160))
+    defect, last = ledger(problem, run(problem, scheme, dt=dt, steps=80))
     assert defect <= 1e-12 and last.certificate.worst <= 1e-10
 
 
@@ -160,11 +160,11 @@ def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
 def test_ledger_closes_with_damping_and_base_motion(scheme: Any, impact: Any) -> None:
     """V9.7, also when impact laws change velocities and accelerations restart; on massless nodes
     the same loads."""
-    reports = list(run(shaken(impact), scheme, dt=0.005, steps=300))
-    assert changes(reports) > 8 and ledger(shaken(impact), reports)[0] <= 1e-12
+    reports = list(run(shaken(impact), scheme, dt=0.005, steps=150))
+    assert changes(reports) > 4 and ledger(shaken(impact), reports)[0] <= 1e-12
     if impact is None:
-        damped = thrown(40, damping=1e-3, mass=MASSLESS, excitation=SHAKEN)
-        assert ledger(damped, run(damped, scheme, dt=1 / 120, steps=160))[0] <= 1e-12
+        damped = thrown(20, damping=1e-3, mass=MASSLESS, excitation=SHAKEN)
+        assert ledger(damped, run(damped, scheme, dt=1 / 60, steps=80))[0] <= 1e-12
 
 
 def momentum(problem: ContactProblem, state: State) -> float:
@@ -292,7 +292,7 @@ def test_memory_of_another_time_or_scheme_is_not_used(scheme: Any) -> None:
         )
 
 
-@schemes
+@pytest.mark.parametrize("scheme", SCHEMES[1::2], ids=repr)
 def test_V15_oblique_impact_with_friction(scheme: Any) -> None:
     """V1.5 on redistributed mass: slip speed, impulses and friction work of the exact solution, and
     a closed ledger."""

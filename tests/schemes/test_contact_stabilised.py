@@ -45,18 +45,18 @@ def chain(n: int = 6, **more: Any) -> ContactProblem:
 def test_kanes_form_is_the_midpoint_rule(other):
     """1.7 (ii): without the projection it equals Zienkiewicz-Wood-Taylor(½) and SS22(½, ½) to 1e-10
     in every third step of the thrown bar; with the former even the end of the run does."""
-    problem, closed = thrown(**MASS), 0
-    for report in run(problem, ContactStabilisedNewmark(False), dt=1 / 300, steps=450):
+    problem, closed = thrown(40, **MASS), 0
+    for report in run(problem, ContactStabilisedNewmark(False), dt=1 / 120, steps=180):
         closed += int(report.new.active[0])
         if report.new.k % 3:
             continue
-        new = next(run(problem, other, dt=1 / 300, steps=1, state=report.old)).new
+        new = next(run(problem, other, dt=1 / 120, steps=1, state=report.old)).new
         assert np.abs(new.u - report.new.u).max() <= 1e-10 * 5.0
         assert np.abs(new.v - report.new.v).max() <= 1e-10 * 10.0
         assert abs(new.r_n[0] - report.new.r_n[0]) <= 1e-10 * 300.0
-    assert 150 < closed < 250
+    assert 60 < closed < 100
     if isinstance(other, ZienkiewiczWoodTaylor):
-        *_, last = run(problem, other, dt=1 / 300, steps=450)
+        *_, last = run(problem, other, dt=1 / 120, steps=180)
         assert np.abs(last.new.v - report.new.v).max() <= 1e-10 * 10.0
 
 
@@ -69,7 +69,7 @@ def test_kanes_form_with_damping_base_motion_and_springs():
     soft = replace(problem, surface=problem.surface.on_springs(4.0e3))
     for body, projected in ((problem, False), (soft, False), (soft, True)):
         closed = 0
-        for report in run(body, ZienkiewiczWoodTaylor(), dt=5e-3, steps=200):
+        for report in run(body, ZienkiewiczWoodTaylor(), dt=5e-3, steps=80):
             closed += int(report.new.active[0])
             if report.new.k % 2:
                 continue
@@ -79,7 +79,7 @@ def test_kanes_form_with_damping_base_motion_and_springs():
             assert np.abs(other.new.u - report.new.u).max() <= 1e-10 * np.abs(report.new.u).max()
             assert np.abs(other.new.v - report.new.v).max() <= 1e-10 * np.abs(report.new.v).max()
             assert abs(other.new.r_n[0] - report.new.r_n[0]) <= 1e-10 * max(report.new.r_n[0], 30.0)
-        assert 5 < closed < 195
+        assert 5 < closed < 75
 
 
 def test_order_and_stability_without_contact():
@@ -114,15 +114,18 @@ def test_V11_pressure_does_not_oscillate(courant, oscillation):
 
 @pytest.mark.slow
 def test_V12_energy_after_five_periods():
-    """Table 1.7: E/E0 = 0.839 after five periods of the bouncing bar at Courant number one."""
-    found = course(bouncing(**MASS), STABILISED, dt=1 / 300, steps=8000)
-    assert found.last / 500.0 + 1.0 == pytest.approx(0.839, abs=1e-3)
-    assert found.rise <= 1e-11 * 500.0 and abs(found.defect) <= 1e-10 * found.largest
+    """Table 1.7: E/E0 = 0.839 after five periods of the bouncing bar at Courant number one. (That it
+    falls in every step, and what becomes of it: V9.5 below.)"""
+    problem = bouncing(**MASS)
+    *_, last = run(problem, STABILISED, dt=1 / 300, steps=8000)
+    assert energy(problem, last.new) / 500.0 + 1.0 == pytest.approx(0.839, abs=1e-3)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
-@pytest.mark.parametrize("name", BARS)
+@pytest.mark.parametrize(
+    ("name", "courant"),
+    [("V1.1", 1.0), ("V1.1", 0.5), ("V1.2", 1.0), ("V1.2", 0.5), ("V1.3", 1.0), ("V1.3", 0.1)],
+)
 def test_V95_energy_never_rises(name, courant):
     """V9.5, V9.7: no step gains 1e-11 E0 under constant load, every ledger closes, nothing
     penetrates. (Kane's form is the midpoint rule step by step, see above; the energy of that one:
@@ -179,7 +182,7 @@ def test_damping_never_gains_energy_in_impacts():
     """V9.5: heavy damping with C (u1 - u0)/dt keeps the energy non-increasing where the projection
     moves points."""
     assert (
-        course(bouncing(50, damping=0.02, **MASS), STABILISED, dt=1 / 150, steps=1600).rise
+        course(bouncing(25, damping=0.02, **MASS), STABILISED, dt=1 / 75, steps=800).rise
         <= 1e-11 * 500.0
     )
 

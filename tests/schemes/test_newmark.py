@@ -59,9 +59,9 @@ def test_same_as_the_multistep_form(beta: float, gamma: float) -> None:
     a plan of steps."""
     ours, theirs = Newmark(beta, gamma), LinearMultistep.newmark(beta, gamma)
     for problem, dt, steps in (
-        (thrown(40, mass=Redistributed(), damping=1e-4), 1 / 120, 200),
-        (bouncing(30, mass=Redistributed()), 1 / 90, 200),
-        (thrown(40, mass=Redistributed()), Schedule(((1 / 120, 0.8), (1 / 300, inf))), 200),
+        (thrown(20, mass=Redistributed(), damping=1e-4), 1 / 60, 90),
+        (bouncing(20, mass=Redistributed()), 1 / 60, 120),
+        (thrown(20, mass=Redistributed()), Schedule(((1 / 60, 0.8), (1 / 150, inf))), 110),
     ):
         one, two = (list(run(problem, scheme, dt=dt, steps=steps)) for scheme in (ours, theirs))
         assert changes(one) >= 1 and largest_difference(one, two) <= 1e-9
@@ -72,7 +72,7 @@ def test_same_as_the_multistep_form(beta: float, gamma: float) -> None:
 
 @pytest.mark.parametrize(
     ("height", "damping", "per_second"),
-    [(5.0, 0.0, 301), (0.05, 0.0, 601), (0.05, 1e-3, 301), (0.05, 1e-3, 601)],
+    [(5.0, 0.0, 151), (0.05, 0.0, 301), (0.05, 1e-3, 151)],
 )
 def test_quarter_half_is_the_trapezoidal_rule(
     height: float, damping: float, per_second: int
@@ -81,7 +81,7 @@ def test_quarter_half_is_the_trapezoidal_rule(
     same ledger. No step ends at touch-down, a tie that round-off decides; it also starts from 5 cm,
     for less round-off."""
     v0 = lambda x: np.full_like(x, -10.0)  # noqa: E731
-    problem = bar(100, gap=height, v0=v0, damping=damping, mass=Redistributed())
+    problem = bar(50, gap=height, v0=v0, damping=damping, mass=Redistributed())
     schemes, steps = (Newmark(), Trapezoidal()), round(1.5 * per_second)
     one, two = (list(run(problem, scheme, dt=1 / per_second, steps=steps)) for scheme in schemes)
     assert largest_difference(one, two) <= 1e-9

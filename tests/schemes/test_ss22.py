@@ -48,14 +48,14 @@ def test_V41_half_half_is_the_midpoint_rule_with_contact(impact):
     motion and contact."""
     problem = chain_problem(5, gap=0.02, damping=1e-3, excitation=SHAKEN, impact=impact)
     changes = 0
-    for report in run(problem, ZienkiewiczWoodTaylor(), dt=0.01, steps=300):
+    for report in run(problem, ZienkiewiczWoodTaylor(), dt=0.01, steps=150):
         other = next(run(problem, SS22(), dt=0.01, steps=1, state=report.old))
         assert np.abs(other.new.u - report.new.u).max() <= 1e-10 * np.abs(report.new.u).max()
         assert np.abs(other.new.v - report.new.v).max() <= 1e-10 * np.abs(report.new.v).max()
         assert abs(other.new.r_n[0] - report.new.r_n[0]) <= 1e-10 * max(report.new.r_n[0], 1.0)
         assert other.new.active == report.new.active
         changes += int(report.new.active[0] != report.old.active[0])
-    assert changes > 5
+    assert changes > 2
 
 
 def test_V41_the_printed_formulas():

@@ -59,8 +59,9 @@ def test_without_contact_it_is_the_midpoint_rule_but_for_the_load() -> None:
     assert np.allclose(ours.v, theirs.v, rtol=0.0, atol=1e-12 * np.abs(theirs.v).max())
 
 
-@pytest.mark.parametrize("courant", [1.0, 0.5, 0.1])
-@pytest.mark.parametrize("given", [thrown, bouncing, period_three])
+@pytest.mark.parametrize(
+    ("given", "courant"), [(thrown, 0.5), (bouncing, 1.0), (period_three, 1.0), (period_three, 0.1)]
+)
 def test_ledger_closes(given: Any, courant: float) -> None:
     """V9.7: defect <= 1e-10 of the largest energy in every step; V9.4: nothing is lost but contact
     work."""

@@ -4,7 +4,7 @@ contact points."""
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from math import cos, pi, sin, sqrt
 from typing import Any
 
@@ -96,18 +96,16 @@ def test_incline_sticks(comm: Any, scale: float) -> None:
         static_equilibrium(resting(comm, Coulomb(0.5), scale=scale), solver=Condensed())
 
 
-def slid(
-    comm: Any, scale: float, *, cells: int = 4, steps: int = 300
-) -> tuple[float, float, Array]:
+@cache
+def slid(scale: float, cells: int) -> tuple[float, float, Array]:
     """mu = 0.5: (acceleration of the centre of mass, friction force over weight) once vibrations
     have died out, means of 50 steps over which the ringing of contact nodes cancels, and the way in
     block heights after every 50 steps."""
-    problem, dt, rows = (
-        resting(comm, Coulomb(0.5), scale=scale, cells=cells),
-        0.01 * sqrt(scale),
-        [],
-    )
-    for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=steps):
+    from mpi4py import MPI
+
+    comm, dt, rows = MPI.COMM_WORLD, 0.01 * sqrt(scale), []
+    problem = resting(comm, Coulomb(0.5), scale=scale, cells=cells)
+    for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=300):
         assert report.certificate.worst <= 1e-9
         rows.append(
             (
@@ -123,13 +121,13 @@ def slid(
 
 @pytest.mark.serial
 @pytest.mark.slow
-def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
+def test_incline_slides_alike_in_every_unit() -> None:
     """g (sin - mu cos) to 1e-9 at 1, 0.1 and 0.01 times the length; the same dimensionless motion
     to 1e-9."""
     expected = G * (sin(SLOPE) - 0.5 * cos(SLOPE))
     first: Array | None = None
     for scale in (1.0, 0.1, 0.01):
-        acceleration, _, u = slid(comm, scale)
+        acceleration, _, u = slid(scale, 4)
         assert acceleration == pytest.approx(expected, rel=1e-9)
         first = u if first is None else first
         assert np.abs(u - first).max() <= 1e-9 * first.max()
@@ -137,41 +135,44 @@ def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_friction_force_does_not_depend_on_the_number_of_points(comm: Any) -> None:
+def test_friction_force_does_not_depend_on_the_number_of_points() -> None:
     """4 and 10 elements along the base in full sliding: mu times the normal weight, 1e-6 asked,
     1e-9 found."""
     for cells in (4, 10):
-        assert slid(comm, 1.0, cells=cells)[1] == pytest.approx(0.5 * cos(SLOPE), rel=1e-9)
+        assert slid(1.0, cells)[1] == pytest.approx(0.5 * cos(SLOPE), rel=1e-9)
 
 
 LAWS = [Coulomb(0.2), SlipRateCoulomb(ExponentialDecay(0.3, 0.15, 0.05))]
-PERIOD = 100  # steps
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize(
-    ("friction", "cycles"), zip(LAWS, (9, 6), strict=True), ids=["constant", "slip rate"]
+    ("friction", "cycles", "period"),
+    zip(LAWS, (9, 6), (50, 100), strict=True),
+    ids=["constant", "slip rate"],
 )
-def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw, cycles: int) -> None:
-    """A block on a table that shakes with 0.4 g and 2 Hz. The last cycle: the area inside the
-    closed loops of tangential reaction over slip, point by point, is the friction work of the
+def test_loop_area_is_friction_work(
+    comm: Any, friction: FrictionLaw, cycles: int, period: int
+) -> None:
+    """A block on a table that shakes with 0.4 g and 2 Hz, so many steps a period. The last cycle:
+    the area inside the closed loops of tangential reaction over slip, point by point, is the friction work of the
     ledger, to 1e-8. The whole run: the work of the shaking force on the mean displacement is
     friction, damping and what the energy gained, to 1e-8."""
     shake = vc.Harmonic(0.4 * G, 2.0, direction=(1.0, 0.0))
-    problem, dt = resting(comm, friction, angle=0.0, excitation=shake), 0.5 / PERIOD
+    problem, dt = resting(comm, friction, angle=0.0, excitation=shake), 0.5 / period
     start = static_equilibrium(problem, solver=Condensed())
     ledger = vc.Energy()
     rows, drive = [dict(ledger.start(problem, start))], 0.0
     slips, forces = [problem.surface.tangential_values(start.u)], []
-    for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=PERIOD * cycles, state=start):
+    for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=period * cycles, state=start):
         assert report.certificate.worst <= 1e-9
         rows.append(dict(ledger.row(report)))
         slips.append(problem.surface.tangential_values(state.u))
         forces.append(report.balance.r_t)
         moved = along(problem, state.u - report.old.u, 0.0)
         drive += 2.0e3 * shake.acceleration(report.old.t + 0.5 * dt) * moved
-    work = rows[-1]["loss_friction"] - rows[-1 - PERIOD]["loss_friction"]
-    area = loops(np.array(slips[-1 - PERIOD :]), np.array(forces[-PERIOD:]))
+    work = rows[-1]["loss_friction"] - rows[-1 - period]["loss_friction"]
+    area = loops(np.array(slips[-1 - period :]), np.array(forces[-period:]))
     assert area == pytest.approx(work, rel=1e-8) and work > 100.0
     energy = [row["energy_kinetic"] + row["energy_strain"] for row in rows]
     lift = 2.0e3 * G * along(problem, state.u - start.u, pi / 2.0)

@@ -43,7 +43,7 @@ def thrown_building(comm):
 def test_factors_are_made_again_and_the_answer_is_the_condensed_one(problem, caplog):
     with caplog.at_level(logging.INFO):
         runs = [
-            [state for state, _ in march(problem, dt=5e-3, steps=4, solver=solver)]
+            [state for state, _ in march(problem, dt=5e-3, steps=2, solver=solver)]
             for solver in (Iterative("icc"), Condensed())
         ]
     again = [line for line in caplog.messages if "incomplete factors of a larger diagonal" in line]

@@ -112,7 +112,8 @@ def test_steps_agree_with_the_condensed_route(name: str, kind: str) -> None:
     """u and r_n of every step to 1e-9 of their largest values; contact closes, and on most of them
     opens again."""
     make, dt = PROBLEMS[name]
-    checked = vc.cross_check(make(), solvers=(Iterative(kind), vc.Condensed()), dt=dt, steps=8)
+    steps = 8 if name in ("springs", "inclined") else 4  # until the walls have closed
+    checked = vc.cross_check(make(), solvers=(Iterative(kind), vc.Condensed()), dt=dt, steps=steps)
     assert max_over_ranks(COMM, np.array([checked.found[0].size["r_n"]])) > 0.0
     assert checked.worst <= 1e-9
 

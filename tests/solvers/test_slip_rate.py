@@ -115,19 +115,17 @@ def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 1
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("scheme", "fine", "t_end", "error", "gain"),
-    [(MIDPOINT, 2e-3, 4.0, 5e-4, 12.0), (vc.MoreauJean(), 4e-3, 2.8, 0.03, 3.0)],
+    ("scheme", "fine", "error", "gain"),
+    [(MIDPOINT, 2e-3, 3e-4, 48.0), (vc.MoreauJean(), 4e-3, 0.03, 3.0)],
     ids=["displacements", "velocities"],
 )
-def test_stick_slip_on_a_belt(
-    scheme: Any, fine: float, t_end: float, error: float, gain: float
-) -> None:
-    """Rides on the belt to 0.06 m, slips back, is caught: two cycles and a half of the differential
-    equation. Order 2 where the rate is that of the mean reaction; order 1, in the first cycle, with
-    the impulses of Moreau and Jean."""
+def test_stick_slip_on_a_belt(scheme: Any, fine: float, error: float, gain: float) -> None:
+    """Rides on the belt to 0.06 m, slips back, is caught and rides on, as the differential equation
+    says. Order 2 where the rate is that of the mean reaction, with an eighth of the step; order 1,
+    with a quarter, with the impulses of Moreau and Jean."""
     errors = []
-    for dt in (4.0 * fine, fine):
-        run = reports(belted(DECAY, lambda t: started(t, 0.05)), dt, t_end, scheme=scheme)
+    for dt in (1.6e-2, fine):
+        run = reports(belted(DECAY, lambda t: started(t, 0.05)), dt, 2.3, scheme=scheme)
         x, t = np.array([r.new.u[0] for r in run]), np.array([r.new.t for r in run])
         assert max(r.certificate.worst for r in run) <= 1e-11
         errors.append(np.abs(x - stick_slip(0.05, t)).max() / 0.06)
@@ -156,20 +154,21 @@ def test_oscillator_slides_to_rest() -> None:
         x = float(way.y[0, -1])
         turns.append(x)
     run = reports(
-        rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.15
+        rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.132
     )
     u = np.array([r.new.u[0] for r in run])
     peaks = u[1:-1][(np.diff(u)[:-1] * np.diff(u)[1:] <= 0.0) & (np.diff(u)[:-1] != 0.0)]
     assert len(turns) >= 3 and peaks == pytest.approx(turns, rel=0.0, abs=2e-4 * 0.45e-3)
-    assert u[-1] == u[-80] == peaks[-1]
+    assert u[-1] == u[-20] == peaks[-1]
 
 
 @pytest.mark.slow
 def test_steady_sliding() -> None:
     """mu = 0.2 + v damps: the mass comes to rest at x = mu(V) N/k, the belt slides on under mu(V)
     N."""
-    for scheme in (MIDPOINT, vc.MoreauJean(), vc.Newmark()):
-        last = reports(belted(lambda v: 0.2 + v, lambda t: 0.2 * t), 0.05, 6.0, scheme=scheme)[-1]
+    for scheme, t_end in ((MIDPOINT, 5.0), (vc.MoreauJean(), 6.0), (vc.Newmark(), 4.0)):
+        run = reports(belted(lambda v: 0.2 + v, lambda t: 0.2 * t), 0.05, t_end, scheme=scheme)
+        last = run[-1]
         assert last.new.u[0] == pytest.approx(0.4 * 10.0 / 100.0, rel=1e-9)
         assert last.new.r_t[0, 0] == pytest.approx(-4.0, rel=1e-9) and rate(last) == pytest.approx(
             0.2, rel=1e-9
@@ -201,8 +200,9 @@ def test_slow_slip_stays_inside_the_cone(law: str, scheme: Any) -> None:
     it slips, with the exact law at the rate of the step; mu_s where it sticks. Rates over five
     decades occur under growing friction."""
     growth, mu = np.log(1e6) / 6.0, LAWS[law]
+    dt = 4e-2 if law == "growing logarithm" else 8e-2
     run = reports(
-        belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 4e-2, 6.0, scheme=scheme
+        belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), dt, 6.0, scheme=scheme
     )
     speeds = np.array([rate(r)[0] for r in run])
     friction = np.array([abs(r.result.r_t[0, 0]) for r in run])
@@ -240,10 +240,10 @@ def test_every_scheme_knows_its_rate(scheme: Any) -> None:
 
 
 def test_static_and_kinetic_coefficients() -> None:
-    """A pull that grows by 0.01 N a step: rest up to mu_s N, in motion mu_k N at once; the static
+    """A pull that grows by less than 0.1 N a step: rest up to mu_s N, in motion mu_k N at once; the static
     stage rests too."""
     problem = belted(StaticKinetic(0.6, 0.3), lambda t: 0.5 * t**2)
-    run = reports(problem, 1e-3, 0.4, scheme=BACKWARD)
+    run = reports(problem, 2e-3, 0.36, scheme=BACKWARD)
     friction = np.array([-r.result.r_t[0, 0] for r in run])
     first = int(np.argmax([rate(r)[0] > 0.0 for r in run]))
     assert 0.58 * 10.0 < friction[first - 1] <= 6.0 and np.all(np.diff(friction[:first]) > 0.0)
@@ -268,7 +268,7 @@ def test_static_and_kinetic_coefficients() -> None:
 def rubbed() -> list[Report]:
     """The block of the next test by the default method."""
     law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
-    return reports(rubbing_block(law), 0.1, 9.0, scheme=BACKWARD)
+    return reports(rubbing_block(law), 0.1, 6.0, scheme=BACKWARD)
 
 
 @pytest.mark.slow
@@ -279,7 +279,7 @@ def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> 
     """A block that rubs along a wall with three points: certified with the exact law, the same with
     all methods; few outer iterations, logged with every step."""
     law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
-    run = reports(rubbing_block(law), 0.1, 9.0, scheme=BACKWARD, friction_method=method)
+    run = reports(rubbing_block(law), 0.1, 6.0, scheme=BACKWARD, friction_method=method)
     assert np.allclose(run[-1].new.u, rubbed[-1].new.u, rtol=0.0, atol=1e-8)
     touching = [r for r in run if r.new.r_n.any()]
     assert len(touching) > 20 and max(r.certificate.worst for r in run) <= 1e-10

@@ -105,7 +105,7 @@ def test_agrees_with_the_condensed_route(parallel: bool, law: Any, options: dict
     """V4.0 with friction: x, r_n and r_t of both routes to 1e-9, in steps with open, sticking and
     slipping points."""
     seen = []
-    for seed in range(6):
+    for seed in range(3):
         c = random_case(law, seed=seed, parallel=parallel, **options)
         result = solve(c)
         agree(c, result, solve(c, Condensed()))
@@ -191,7 +191,7 @@ def test_history_is_that_of_the_thresholds(parallel: bool) -> None:
 def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
     """V4.0 with friction in space: the exact disk, no polygon; both routes to 1e-9."""
     seen = []
-    for seed in range(12):
+    for seed in range(5):
         c, _ = spatial(law, seed, parallel=parallel)
         result = solve(c)
         agree(c, result, solve(c, Condensed()))

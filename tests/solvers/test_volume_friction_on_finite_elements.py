@@ -55,9 +55,9 @@ def test_routes_agree_in_the_plane(
 ) -> None:
     """u, r_n and r_t of every step to 1e-9; open, sticking and slipping points in the same step."""
     problem = tipped(comm, friction, simplices=simplices, angle=angle)
-    checked, states = compared(problem, ZienkiewiczWoodTaylor(), 30)
+    checked, states = compared(problem, ZienkiewiczWoodTaylor(), 20)
     found = checked.found[0]
-    assert found.size["r_t"] > 0.0 and found.steps == 30
+    assert found.size["r_t"] > 0.0 and found.steps == 20
     assert max(found.relative.values()) <= 1e-9
     assert max(min(counts) for counts in states) >= 2
     assert checked.report()["Volume(ReducedNewton)"]["r_t"] == found.relative["r_t"]
@@ -70,7 +70,7 @@ def test_routes_agree_in_space(comm: Any, friction: FrictionLaw) -> None:
     """The circular cone on an inclined plane, another scheme: to 1e-9."""
     box = thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 3, 3))
     problem = replace(box, friction=friction, mass=Redistributed())
-    checked, states = compared(problem, Trapezoidal(), 20)
+    checked, states = compared(problem, Trapezoidal(), 10)
     assert 0.0 < checked.worst <= 1e-9
     assert max(slips for _, _, slips in states) >= 10
 

@@ -11,7 +11,7 @@ from bar import before_impact, energy, run
 from vi_contact.core.algebra import total
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
-from vi_contact.core.step import State
+from vi_contact.core.step import Report, State
 from vi_contact.core.verify import energies, energy_balance
 
 
@@ -42,14 +42,17 @@ def course(
     dt: float,
     steps: int,
     state: State | None = None,
+    seen: list[Report] | None = None,
     **more: Any,
 ) -> Course:
-    """The energies of a run; other keywords go to ``bar.run``."""
+    """The energies of a run; its reports are added to ``seen``, other keywords go to ``bar.run``."""
     surface, state = problem.surface, state or initial_state(problem)
     first = last = energy(problem, state)
     rise = contact = algorithmic = friction = min_gap = float("inf")
     rise, defect, largest = -rise, 0.0, 0.0
     for report in run(problem, scheme, dt=dt, steps=steps, state=state, **more):
+        if seen is not None:
+            seen.append(report)
         step = energy_balance(problem, report.old, before_impact(report), report.balance)
         now = energy(problem, report.new)
         rise, last, defect = max(rise, now - last), now, defect + step.defect

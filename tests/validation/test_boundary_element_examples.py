@@ -21,7 +21,7 @@ from demos.problems.boundary_elements import (
 from demos.problems.compare_tractions import Tractions, compared, shares
 from demos.problems.contact_ledger import ContactLedger, ledger
 from demos.problems.disk import Push
-from vi_contact.bem import BoundaryProblem
+from vi_contact.bem import BoundaryProblem, PoincareSteklov
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import ContactRun, march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
@@ -158,6 +158,20 @@ def test_forces_are_collected_on_the_nodes_of_the_boundary_elements():
     assert both.difference() == pytest.approx(off, rel=1e-12)
 
 
+def test_the_unsymmetric_form_at_twenty_elements():
+    """B16: impulses within 0.2 % and energies within 1.5 % of those of the symmetric form, up to t
+    = 2: measured 0.03 and 0.25 %."""
+    given, steps = square(), 40
+    operator = PoincareSteklov(given.operator.blocks, UNIT.rho, symmetric=False)
+    other = replace(given, operator=operator, forces=given.forces[:steps])
+    found = march_contact(BoundaryContact(other.condensed(), friction=LAWS["coulomb"]))
+    work = other.solve(found.forces).work
+    symmetric, books = run("coulomb")
+    impulse, energy = symmetric.impulse[:steps], books.energy[:steps]
+    assert np.abs(found.impulse - impulse).max() < 2e-3 * np.abs(impulse).max()
+    assert np.abs(work - energy).max() < 1.5e-2 * energy.max()
+
+
 def test_concrete_on_steel():
     """V7.2, B8: 40 ms of a slow load in 163 steps of c_P dt = 4 h: the top goes down by the static
     175.308 µm within 0.05 %, energy f²a²/(2E') within 0.2 %; with mu = 0.3 the base sticks, top
@@ -218,7 +232,7 @@ def test_tennis_ball():
     round-off; momentum is the slope of the mean displacement; the plane's work is the energy;
     friction lowers speed and energy, slightly."""
     problem = disk_problem(
-        40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=102, radius=0.5
+        40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=88, radius=0.5
     )
     mesh, speed, energy = problem.operator.mesh, {}, {}
     contact = disk_contact(problem, Push(height=0.1, rise=4.0))

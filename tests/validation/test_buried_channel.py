@@ -83,7 +83,7 @@ def test_v4_2_both_routes(friction):
     1e-9."""
     problem = model().problem(friction=friction)
     start = vc.static_equilibrium(problem, solver=vc.Condensed())
-    steps = 40 if friction is None else 7
+    steps = 15 if friction is None else 5
     checked = vc.cross_check(
         problem, scheme=SCHEME, solvers=(vc.Condensed(), REFERENCE), dt=DT, steps=steps, state=start
     )
@@ -132,8 +132,12 @@ def test_mirror_symmetry(contact):
     """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to the run's round-off, that a change of the shaking
     by a last digit shows: 1e-12 of the largest displacement. Mirrored runs differ by 0.4 to 2 times
     that, by processor and release."""
-    one, two = shaken(contact).history, shaken(contact, amplitude=-2.0).history
-    last_digit = shaken(contact, amplitude=np.nextafter(2.0, 3.0)).history
+    whole, steps = shaken(contact).history, 200
+    one = {name: np.asarray(whole[name])[: steps + 1] for name in displacements(whole)}
+    two, last_digit = (
+        shaken(contact, amplitude=amplitude, steps=steps).history
+        for amplitude in (-2.0, float(np.nextafter(2.0, 3.0)))
+    )
     round_off = max(
         float(np.abs(one[name] - last_digit[name]).max()) for name in displacements(one)
     )
@@ -198,8 +202,8 @@ def test_frame_invariance(friction, excitation):
     """An inertia load in the frame of the bedrock and a moved bedrock: the same contact forces, to
     1e-8."""
     one = model()
-    relative = follow(one, one.problem(friction=friction, excitation=excitation), 120).history
-    absolute = moved(excitation, 120, friction=friction).history
+    relative = follow(one, one.problem(friction=friction, excitation=excitation), 60).history
+    absolute = moved(excitation, 60, friction=friction).history
     for column in ("pressure", "traction_t", "gap") if friction else ("pressure", "gap"):
         there, here = np.asarray(relative[column]), np.asarray(absolute[column])
         assert np.abs(there - here).max() < 1e-8 * np.abs(there).max(), column

@@ -4,6 +4,7 @@ the slow limit."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from mpi4py import MPI
 from two_bodies import relative
 
 import vi_contact as vc
-from demos.problems.embedded import CONTACT, Embedded, build
+from demos.problems.embedded import CONTACT, Embedded, EmbeddedModel, build
 from demos.problems.square import concrete
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
@@ -31,6 +32,7 @@ from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_of
 from vi_contact.meshes.rows import cell_sides
 from vi_contact.run.march import march
+from vi_contact.run.simulate import Solution
 from vi_contact.run.static import quasi_static
 from vi_contact.solvers.condensed import Condensed
 
@@ -48,14 +50,29 @@ cases = pytest.mark.parametrize(
 laws = pytest.mark.parametrize("law", LAWS)
 
 
+@cache
+def model() -> EmbeddedModel:
+    return build(EMBEDDED, COMM)
+
+
+@cache
+def slowly(law: str, scheme: Any) -> Solution:
+    """The load put on within 20 ms."""
+    return vc.simulate(
+        model().problem(friction=LAWS[law]),
+        scheme=scheme,
+        dt=2.5e-4,
+        t_end=T_END,
+        progress=False,
+        record=(vc.Energy(), vc.Contact()),
+    )
+
+
 @cases
 def test_certificates_and_ledger(law, scheme):
     """V9.7: every step certified to 1e-9, the ledger closed to 1e-10; what is put in is more than
     what is stored by what friction takes."""
-    problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
-    solution = vc.simulate(
-        problem, scheme=scheme, dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(),)
-    )
+    solution = slowly(law, scheme)
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
     assert 0.0 < solution.facts["energy_defect"] <= 1e-10
     history = solution.history
@@ -82,7 +99,7 @@ def test_action_is_reaction(law, scheme):
     """V7.3, V9.8: what the box gains in momentum beyond the impulse of the pressure, the block
     loses beyond the impulse of its base, to 1e-12; without friction it is the sum of the reactions
     along the normals."""
-    problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
+    problem = model().problem(friction=LAWS[law])
     dt, impulses, base = 2.5e-4, [], []
     for _, report in march(problem, scheme=scheme, dt=dt, steps=80):
         equations, balance = report.problem.equations, report.balance
@@ -163,7 +180,7 @@ def test_a_welded_interface_is_none(law):
     for mesh in (None, lambda: Whole(EMBEDDED)):
         model = build(EMBEDDED, COMM, mesh=mesh)
         problem = model.problem(friction=LAWS[law])
-        motion = run(problem, scheme=vc.Midpoint(), dt=2.5e-4, steps=60)
+        motion = run(problem, scheme=vc.Midpoint(), dt=2.5e-4, steps=30)
         order = in_order(model.system, EMBEDDED.box.cells)
         points = field(model.system, model.system.u0)[0][order]
         found.append(
@@ -202,19 +219,7 @@ def test_friction_takes_energy():
     """V7.3: less energy, and less work put in, with friction from 2 ms on; its work never
     decreases; none without it. Walls and floor carry the load: m a of the box apart, forces on it
     sum to 0."""
-    histories = {}
-    for law, friction in LAWS.items():
-        model = build(EMBEDDED, COMM)
-        problem = model.problem(friction=friction)
-        solution = vc.simulate(
-            problem,
-            scheme=vc.Midpoint(),
-            dt=2.5e-4,
-            t_end=T_END,
-            progress=False,
-            record=(vc.Energy(), vc.Contact()),
-        )
-        histories[law] = solution.history
+    histories = {law: slowly(law, vc.Midpoint()).history for law in LAWS}
     smooth, rough = histories["smooth"], histories["rough"]
     energy = {law: h["energy_kinetic"] + h["energy_strain"] for law, h in histories.items()}
     late = smooth["t"] > 2e-3
@@ -232,10 +237,8 @@ def test_friction_takes_energy():
 def test_slow_limit(law, tolerance):
     """The energy at 20 ms is that of the same load put on without inertia, and the load is in
     equilibrium there."""
-    problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
-    history = vc.simulate(
-        problem, scheme=vc.Midpoint(), dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(),)
-    ).history
+    problem = model().problem(friction=LAWS[law])
+    history = slowly(law, vc.Midpoint()).history
     *_, state = quasi_static(problem, T_END * np.arange(1, 5) / 4, solver=Condensed())
     energy = problem.equations.strain_energy(state.u)
     assert history["energy_kinetic"][-1] + history["energy_strain"][-1] == pytest.approx(

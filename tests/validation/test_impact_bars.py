@@ -36,7 +36,6 @@ BODIES = {
     "strip": {"dimension": 2},
     "triangles": {"dimension": 2, "triangles": True},
 }
-COURANTS = (1.0, 0.5, 0.1)
 
 
 @dataclass(frozen=True)
@@ -85,10 +84,7 @@ def follow(
             # one body on two ranks: the others have the same path
             pytest.param(body, courant, marks=pytest.mark.serial)
             for body, courant in (
-                ("bar", 1.0),
-                ("triangles", 1.0),
-                ("bar", 0.1),
-                ("strip", 0.5),
+                ("bar", 0.25),
                 ("triangles", 0.5),
             )
         ),
@@ -111,13 +107,13 @@ def test_thrown_bar(body: str, courant: float) -> None:
 @pytest.mark.serial
 @pytest.mark.parametrize(
     "body, courant",
-    [(body, 1.0) for body in BODIES] + [("bar", 0.1), ("strip", 0.5), ("triangles", 0.5)],
+    [("bar", 1.0), ("bar", 0.25), ("strip", 1.0), ("triangles", 0.5)],
 )
 def test_period_three(body: str, courant: float) -> None:
     """V1.3, four bounces: energy never above 1/8 nor below 98 % of it, force up to 1.8 times the
     exact one, impulse of the first contact within 2 %. Of all four together 4 % are missing at
-    Courant number 1, 2.5 % at ½, 1.5 % at 0.1: it has gone into waves too short for the mesh."""
-    missing = {1.0: 0.04, 0.5: 0.025, 0.1: 0.015}[courant]
+    Courant number 1, 2.5 % at ½, 1.5 % at ¼: it has gone into waves too short for the mesh."""
+    missing = {1.0: 0.04, 0.5: 0.025, 0.25: 0.015}[courant]
     found = follow(Bar(PeriodicBar(), **BODIES[body]), courant, 12.0)  # type: ignore[arg-type]
     assert found.energy.max() <= 0.125 * (1.0 + 1e-9) and found.energy[-1] >= 0.98 * 0.125
     assert found.force.max() <= 1.8 * 0.5
@@ -126,12 +122,11 @@ def test_period_three(body: str, courant: float) -> None:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 4, 0.988), (0.5, 1, 0.998)])
-@pytest.mark.parametrize("body", ["strip"])
-def test_bouncing_strip(body: str, courant: float, periods: float, floor: float) -> None:
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 2, 0.993), (0.5, 0.5, 0.999)])
+def test_bouncing_strip(courant: float, periods: float, floor: float) -> None:
     """V1.2: energy after so many periods (ten of the bar: below), impulse of the first contact
     800/3 within 0.5 %."""
-    bar = Bar(BouncingBar(), **BODIES[body])  # type: ignore[arg-type]
+    bar = Bar(BouncingBar(), **BODIES["strip"])  # type: ignore[arg-type]
     found = follow(bar, courant, periods * 16.0 / 3.0)
     above = found.energy + bar.case.energy  # zero is the bar standing on the wall
     assert floor <= above[-1] / 500.0 and above.max() <= 500.0 * (1.0 + 1e-3)
@@ -168,7 +163,7 @@ def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", ["bar", "triangles"])
 def test_code_aster_sdnv100(body: str) -> None:
     """The second data set of V1.1: contact from 2e-5 to 1e-4 s, the top 4 mm lower at the deepest
     than at touch-down (6 mm than at the start), 8e6 S joule, velocity of the top -100 to 100 m/s
@@ -208,8 +203,16 @@ def test_code_aster_sdnv100(body: str) -> None:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant", COURANTS)
-@pytest.mark.parametrize("scheme", [Midpoint(), ContactStabilisedNewmark(), MoreauJean()], ids=repr)
+@pytest.mark.parametrize(
+    ("scheme", "courant"),
+    [
+        *((scheme, 1.0) for scheme in (Midpoint(), ContactStabilisedNewmark(), MoreauJean())),
+        (ContactStabilisedNewmark(), 0.5),
+        (MoreauJean(), 0.5),
+        (MoreauJean(), 0.1),
+    ],
+    ids=repr,
+)
 def test_dissipative_schemes_never_gain(scheme: Any, courant: float) -> None:
     """No step of V1.3 raises the energy by more than 1e-11 of its start: two periods, at Courant
     number 0.1 the first contact."""
@@ -224,18 +227,11 @@ def test_dissipative_schemes_never_gain(scheme: Any, courant: float) -> None:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant", [1.0, 0.5])
-def test_newmark_on_consistent_mass_blows_up(courant: float) -> None:
-    """Negative test, V1.3: more than ten times the energy after four bounces, more so with the
-    smaller step."""
-    problem = period_three(100, mass=ConsistentMass())
-    *_, last = serial_run(problem, Newmark(), dt=courant / 100.0, steps=round(1200 / courant))
-    assert energy(problem, last.new) > 10.0 * 0.125
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("courant", COURANTS)
-@pytest.mark.parametrize("case", [ThrownBar(), PeriodicBar()], ids=lambda case: type(case).__name__)
+@pytest.mark.parametrize(
+    ("case", "courant"),
+    [(ThrownBar(), 1.0), (ThrownBar(), 0.5), (PeriodicBar(), 1.0), (PeriodicBar(), 0.1)],
+    ids=lambda value: type(value).__name__ if not isinstance(value, float) else str(value),
+)
 def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) -> None:
     """The same on strips of 40 elements: the contact-stabilised scheme in V1.1 and in one period of
     V1.3."""
@@ -249,7 +245,7 @@ def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) ->
 @pytest.mark.serial
 def test_newmark_on_consistent_mass_blows_up_on_a_strip() -> None:
     """Negative test: V1.3 on a strip of triangles, Courant number ½, where not all nodes of the
-    foot act as one."""
+    foot act as one (bars: schemes/test_newmark.py)."""
     found = follow(
         Bar(PeriodicBar(), dimension=2, triangles=True),
         0.5,

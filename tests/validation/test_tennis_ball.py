@@ -51,7 +51,7 @@ def run(law: str, scheme: str, push: Push = PUSH, size: float = 0.04) -> dict[st
         disk.problem(friction=LAWS[law]),
         scheme=SCHEMES[scheme],
         dt=disk.disk.time_step,
-        t_end=4.0,
+        t_end=2.5 if push is PUSH else 3.2,
         progress=False,
         record=(
             vc.Energy(),

@@ -321,7 +321,7 @@ def test_condensed_and_volume_agree(d, scheme, mass):
     """Every step from the same state, to 1e-9."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))
     compared = cross_check(
-        meeting(COMM, d, mass=mass), scheme=scheme, solvers=solvers, dt=1e-3, steps=30
+        meeting(COMM, d, mass=mass), scheme=scheme, solvers=solvers, dt=1e-3, steps=15
     )
     assert compared.worst <= 1e-9
 

@@ -83,8 +83,8 @@ def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -
 @pytest.mark.serial
 def test_creation_of_energy_is_told() -> None:
     """A wave crosses seven elements in a step of the seed's: the default scheme gains there and
-    says so; with an eighth of the step it does not."""
-    coarse, fine = (run(wall(), "b", "trapezoidal", refined=refined) for refined in (1, 8))
+    says so; with a quarter of the step it does not."""
+    coarse, fine = (run(wall(), "b", "trapezoidal", refined=refined) for refined in (1, 4))
     assert coarse.facts["energy_created"] > 0.5
     assert "WARNING: contact and time scheme created" in coarse.summary()
     assert fine.facts["energy_created"] < 0.01 and "WARNING" not in fine.summary()
@@ -92,16 +92,16 @@ def test_creation_of_energy_is_told() -> None:
 
 @pytest.mark.serial
 def test_schemes_agree_when_dt_is_fine() -> None:
-    """Case b, 2½ periods with a sixteenth of the seed's dt: the extreme displacement of the top, of
-    which five periods have no other, within 10 %."""
+    """Case b, 1¼ periods with an eighth of the seed's dt: the extreme displacement of the top within
+    3 % (0.5 found)."""
     model = wall()
     found = {
-        name: run(model, "b", name, refined=16, steps=100, record=[Probe(model.probes())])
+        name: run(model, "b", name, refined=8, steps=50, record=[Probe(model.probes())])
         .history["u_x_12"]
         .min()
         for name in ("zwt", "trapezoidal", "hht", "contact-stabilised", "generalised-alpha")
     }
-    assert max(found.values()) == pytest.approx(min(found.values()), rel=0.1), found
+    assert max(found.values()) == pytest.approx(min(found.values()), rel=0.03), found
 
 
 def test_the_default_needs_no_names() -> None:
