@@ -45,9 +45,7 @@ SCHEMES = [
 RUBBING = [SCHEMES[0], *SCHEMES[4:]]
 
 
-def pushed(
-    mass: Any, elements: int = 60, *, speed: float = 10.0, **more: Any
-) -> ContactProblem:
+def pushed(mass: Any, elements: int = 60, *, speed: float = 10.0, **more: Any) -> ContactProblem:
     """The bar of V1.1 at rest, 5 m above a wall that rises with 10 m/s: V1.1 seen from the wall's
     rest frame."""
     given = bar(elements, gap=5.0, mass=mass, **more)

@@ -106,7 +106,9 @@ def test_order_and_stability_without_contact(theta, order):
     """Second order at theta = ½, else first, with damping, constant load and base motion; stable at
     every frequency."""
     scheme = MoreauJean(theta)
-    assert observed_order(scheme, steps=400 if theta == 1.0 else 200) == pytest.approx(order, abs=0.06)
+    assert observed_order(scheme, steps=400 if theta == 1.0 else 200) == pytest.approx(
+        order, abs=0.06
+    )
     for frequency in np.logspace(-2, 4, 7):
         for damping in (0.0, 0.3):
             radius = np.abs(

@@ -102,9 +102,7 @@ def test_limits_of_friction_below_zero(solver, d):
         ({"cohesion": math.inf}, r"limit\(0\) is inf"),
     ):
         law = Own(x=1.2, points=surface.points, **wrong)
-        with pytest.raises(
-            InputError, match=rf"Own: {said} at \(1.5, 0.*and t = 0(.0004)? s"
-        ):
+        with pytest.raises(InputError, match=rf"Own: {said} at \(1.5, 0.*and t = 0(.0004)? s"):
             steps(ContactProblem(system, surface, friction=law), solver=METHODS[solver])
     right = Own(points=surface.points)
     assert len(steps(ContactProblem(system, surface, friction=right), solver=METHODS[solver])) == 6

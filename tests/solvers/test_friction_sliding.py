@@ -154,10 +154,12 @@ LAWS = [Coulomb(0.2), SlipRateCoulomb(ExponentialDecay(0.3, 0.15, 0.05))]
 def test_loop_area_is_friction_work(
     comm: Any, friction: FrictionLaw, cycles: int, period: int
 ) -> None:
-    """A block on a table that shakes with 0.4 g and 2 Hz, so many steps a period. The last cycle:
-    the area inside the closed loops of tangential reaction over slip, point by point, is the friction work of the
-    ledger, to 1e-8. The whole run: the work of the shaking force on the mean displacement is
-    friction, damping and what the energy gained, to 1e-8."""
+    """A block on a table that shakes with 0.4 g and 2 Hz, so many steps a period.
+
+    The last cycle: the area inside the closed loops of tangential reaction over slip, point by
+    point, is the friction work of the ledger, to 1e-8. The whole run: the work of the shaking
+    force on the mean displacement is friction, damping and what the energy gained, to 1e-8.
+    """
     shake = vc.Harmonic(0.4 * G, 2.0, direction=(1.0, 0.0))
     problem, dt = resting(comm, friction, angle=0.0, excitation=shake), 0.5 / period
     start = static_equilibrium(problem, solver=Condensed())

@@ -240,8 +240,10 @@ def test_every_scheme_knows_its_rate(scheme: Any) -> None:
 
 
 def test_static_and_kinetic_coefficients() -> None:
-    """A pull that grows by less than 0.1 N a step: rest up to mu_s N, in motion mu_k N at once; the static
-    stage rests too."""
+    """A pull that grows by less than 0.1 N a step: rest up to mu_s N, in motion mu_k N at once.
+
+    The static stage rests too.
+    """
     problem = belted(StaticKinetic(0.6, 0.3), lambda t: 0.5 * t**2)
     run = reports(problem, 2e-3, 0.36, scheme=BACKWARD)
     friction = np.array([-r.result.r_t[0, 0] for r in run])

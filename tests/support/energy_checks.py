@@ -45,7 +45,10 @@ def course(
     seen: list[Report] | None = None,
     **more: Any,
 ) -> Course:
-    """The energies of a run; its reports are added to ``seen``, other keywords go to ``bar.run``."""
+    """The energies of a run; its reports are added to ``seen``.
+
+    Other keywords go to ``bar.run``.
+    """
     surface, state = problem.surface, state or initial_state(problem)
     first = last = energy(problem, state)
     rise = contact = algorithmic = friction = min_gap = float("inf")

@@ -232,9 +232,7 @@ def followed(case: Any, name: str, t_end: float) -> tuple[Array, Array, Array, A
     return t, *(value / bar.section for value in values), dt
 
 
-@pytest.mark.parametrize(
-    "name", ["P2", pytest.param("Q2", marks=pytest.mark.serial)]
-)
+@pytest.mark.parametrize("name", ["P2", pytest.param("Q2", marks=pytest.mark.serial)])
 def test_v1_1_thrown_bar(name: str) -> None:
     """The force in the window within 5 % of 300 (measured 1.6; P1 0.02), contact 2/3 s ± 4 dt,
     impulse 200 within 1 %, energy within 0.1 %."""

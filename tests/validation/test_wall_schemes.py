@@ -92,8 +92,10 @@ def test_creation_of_energy_is_told() -> None:
 
 @pytest.mark.serial
 def test_schemes_agree_when_dt_is_fine() -> None:
-    """Case b, 1¼ periods with an eighth of the seed's dt: the extreme displacement of the top within
-    3 % (0.5 found)."""
+    """Case b, 1¼ periods with an eighth of the seed's dt.
+
+    The extreme displacement of the top within 3 % (0.5 found).
+    """
     model = wall()
     found = {
         name: run(model, "b", name, refined=8, steps=50, record=[Probe(model.probes())])
