@@ -2,7 +2,8 @@
 
 Each page has a folder that looks like a clone. In the order of the page, ``python`` blocks run and
 share their names, ``sh`` blocks run as a reader types them, and the lines of a ``text`` block must
-have been printed, in their order, by the blocks above it. Every block is also a file, block.py or
+have been printed, in their order, by the blocks above it; a word ``...`` of theirs stands for any
+word, where a number hangs on the rounding of the machine. Every block is also a file, block.py or
 block.toml or block.geo, until the next one of its language.
 
 What a page needs and does not show stands in it as a comment, and so does what is not run:
@@ -27,6 +28,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -66,11 +68,22 @@ def residuals(size: float, other: float) -> bool:
     return most <= BOUND or (most <= SMALL and most <= ORDER * least)
 
 
-def agree(line: str, other: str) -> bool:
-    """Say whether two lines have the same words and, but for rounding, the same numbers."""
-    if NUMBER.sub("#", line).split() != NUMBER.sub("#", other).split():
+def agree(line: str, printed: str) -> bool:
+    """Say whether two lines have the same words and, but for rounding, the same numbers.
+
+    A word ``...`` of the page stands for any word.
+    """
+    words, others = line.split(), printed.split()
+    return len(words) == len(others) and all(map(alike, words, others))
+
+
+def alike(word: str, printed: str) -> bool:
+    """Say whether two words are the same but for the rounding of numbers in them."""
+    if word == "...":
+        return True
+    if NUMBER.sub("#", word) != NUMBER.sub("#", printed):
         return False
-    pairs = zip(map(float, NUMBER.findall(line)), map(float, NUMBER.findall(other)), strict=True)
+    pairs = zip(map(float, NUMBER.findall(word)), map(float, NUMBER.findall(printed)), strict=True)
     return all(
         abs(a - b) <= NEAR * max(abs(a), abs(b)) or residuals(abs(a), abs(b)) for a, b in pairs
     )
@@ -106,7 +119,9 @@ def compare(example: Example) -> None:
     for line in filter(str.strip, str(example.parsed).splitlines()):
         if line.strip().startswith("wall time"):  # the clock's
             continue
-        assert any(agree(line, one) for one in printed), f"not printed here: {line}"
+        if not any(agree(line, one) for one in printed):
+            nearest = get_close_matches(line, PRINTED, n=3, cutoff=0.0)
+            raise AssertionError("\n".join([f"not printed here: {line}", "but:", *nearest]))
 
 
 def keep(example: Example, file: str) -> None:

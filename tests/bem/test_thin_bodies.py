@@ -8,6 +8,7 @@ import pytest
 from boundary_matrices import in_time
 from convolution_operator import convolution_operator
 from plane_waves import MATERIAL, SQUARE
+from thin_slab import H, slab
 
 from demos.problems.interior import interior_displacement
 from vi_contact.bem import (
@@ -26,12 +27,7 @@ from vi_contact.bem.quadrature import point_sets
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
-H = 0.125
 MANY = Orders(far=8, near=12, outer=12, inner=12, touching=24, close=20)
-
-
-def slab(width: float, h: float = H) -> BoundaryMesh:
-    return polygon([(-width / 2, -0.5), (width / 2, -0.5), (width / 2, 0.5), (-width / 2, 0.5)], h)
 
 
 def wedge(height: float) -> BoundaryMesh:

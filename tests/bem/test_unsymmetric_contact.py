@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plane_waves import MATERIAL
-from test_thin_bodies import slab
+from thin_slab import slab
 
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, square_problem, steklov

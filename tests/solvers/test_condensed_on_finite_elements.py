@@ -11,10 +11,9 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from contact_cases import PROBLEMS, WEAKENING, pressed
 from fem_problems import BOX_DT, max_over_ranks, thrown_box
 from mpi4py import MPI
-from test_iterative_friction_on_finite_elements import RATES
-from test_iterative_on_finite_elements import PROBLEMS, pressed
 
 import vi_contact as vc
 from vi_contact.core.algebra import EffectiveMatrix
@@ -56,7 +55,7 @@ class Twice:
 
 COULOMB, TRESCA = vc.Coulomb(0.3), vc.Tresca(2e4)
 LAWS = {
-    "box, C = 5": RATES,
+    "box, C = 5": WEAKENING,
     "springs": None,
     "inclined": COULOMB,
     "bilateral": None,
@@ -65,7 +64,7 @@ LAWS = {
     "pair, 2D": None,
     "pair, 3D": COULOMB,
     "corner": TRESCA,
-    "moving": RATES,
+    "moving": WEAKENING,
 }
 
 

@@ -12,9 +12,9 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from chain import chain_problem
+from contact_cases import PROBLEMS, WEAKENING, pressed
 from fem_problems import BOX_DT, thrown_box
 from mpi4py import MPI
-from test_iterative_on_finite_elements import PROBLEMS, pressed
 from tipped import ROUGH_ON_ONE_SIDE, tipped
 
 import vi_contact as vc
@@ -25,7 +25,7 @@ from vi_contact.solvers import Iterative
 from vi_contact.solvers.volume import ReducedNewton
 
 COMM = MPI.COMM_WORLD
-RATES, AT_REST = (SlipRateCoulomb(ExponentialDecay(*mu, 2.0)) for mu in ((0.5, 0.3), (0.2, 0.1)))
+AT_REST = SlipRateCoulomb(ExponentialDecay(0.2, 0.1, 2.0))
 
 
 def checked(
@@ -45,7 +45,9 @@ def checked(
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("law", [*ROUGH_ON_ONE_SIDE, RATES], ids=["coulomb", "tresca", "slip rate"])
+@pytest.mark.parametrize(
+    "law", [*ROUGH_ON_ONE_SIDE, WEAKENING], ids=["coulomb", "tresca", "slip rate"]
+)
 def test_a_tipped_block(law: Any) -> None:
     """Open, sticking and slipping points in the same step, mu up to 1.2 on one side."""
     _, counts = checked(tipped(COMM, law, simplices=True, angle=0.3), BOX_DT, 15)
