@@ -6,8 +6,10 @@ An example is ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``.
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, get_args, get_origin
 
 if not __package__:  # run as a folder of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[1])
@@ -17,6 +19,7 @@ from meshes.disk import DiskMesh
 from meshes.raft import RaftMesh
 from vi_contact import meshes as room
 from vi_contact.core.errors import InputError
+from vi_contact.core.quantities import Quantity, quantities
 from vi_contact.meshes.gmsh_session import write
 
 NAMED = {name: getattr(room, name) for name in room.__all__ if name.endswith("Mesh")}
@@ -37,22 +40,35 @@ def parser() -> argparse.ArgumentParser:
         one = commands.add_parser(
             shape, help=first, description=mesh.__doc__, argument_default=argparse.SUPPRESS
         )
+        numbers = quantities(mesh)
         for field in fields(mesh):
-            option = f"--{field.name.replace('_', '-')}"
-            kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
-            if kind == "bool":
-                one.add_argument(option, action="store_true")
-            elif kind.startswith(("float", "tuple")):
-                one.add_argument(
-                    option,
-                    type=int if "int" in kind else float,
-                    required=field.default is MISSING,
-                    nargs="+" if kind.startswith("tuple") else None,
-                )
+            if field.name in numbers:
+                add_option(one, field, numbers[field.name])
         one.add_argument(
             "-o", "--output", default=f"{shape}.msh", help=f"file to write (default: {shape}.msh)"
         )
     return top
+
+
+def add_option(command: argparse.ArgumentParser, field: Field[Any], asked: Quantity) -> None:
+    """Add the option of one field of a shape: a switch, a number, or several numbers."""
+    option = f"--{field.name.replace('_', '-')}"
+    # an option that may be left out is a number or None
+    kind = asked.kind
+    if isinstance(kind, UnionType):
+        kind = next(member for member in get_args(kind) if member is not NoneType)
+    several = get_origin(kind) is tuple
+    number = get_args(kind)[0] if several else kind
+    if number is bool:
+        command.add_argument(option, action="store_true")
+    elif number in (float, int):
+        command.add_argument(
+            option,
+            type=number,
+            required=field.default is MISSING,
+            nargs="+" if several else None,
+            help=f"[{asked.symbol}]" if asked.symbol else None,
+        )
 
 
 def main(words: Sequence[str]) -> None:

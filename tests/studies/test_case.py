@@ -445,7 +445,7 @@ def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
         (
             'type = "Inelastic"',
             'type = "Newton"\ne = 2.0',
-            "[impact] restitution coefficient e is 2.0",
+            "[impact] Newton: restitution coefficient e is 2.0",
         ),
         ("frequency = 14.0", "frequency = 0.0", "[excitation[1]] Harmonic: frequency is 0.0"),
     ],

@@ -86,7 +86,7 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     [
         (("AtRest", "Okabe"), "unknown type 'Okabe'"),
         (("nu = 0.25\npart", "mu = 0.25\npart"), "unknown key 'mu'"),
-        (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give one from 0 to 0.5"),
+        (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75; give one from 0 to 0.5"),
         (("AtRest", "mine.checks:Own"), "accepts built-in classes only"),
     ],
 )

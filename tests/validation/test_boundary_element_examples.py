@@ -232,7 +232,7 @@ def test_tennis_ball():
     round-off; momentum is the slope of the mean displacement; the plane's work is the energy;
     friction lowers speed and energy, slightly."""
     problem = disk_problem(
-        40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=88, radius=0.5
+        40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=102, radius=0.5
     )
     mesh, speed, energy = problem.operator.mesh, {}, {}
     contact = disk_contact(problem, Push(height=0.1, rise=4.0))

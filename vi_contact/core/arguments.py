@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache, wraps
 from inspect import Parameter, Signature, isclass, signature
-from numbers import Integral, Real
+from numbers import Integral, Number, Real
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -270,6 +270,7 @@ def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
 _SIMPLE: dict[Any, Callable[[Any], bool]] = {
     float: _is_number,
     int: _is_whole,
+    complex: lambda value: isinstance(value, Number) and not isinstance(value, bool),
     bool: lambda value: isinstance(value, bool | np.bool_),
     np.ndarray: _are_numbers,
 }
