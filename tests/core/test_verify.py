@@ -12,12 +12,11 @@ from bar import before_impact, bouncing, period_three, run, thrown
 from chain import chain_problem
 from shaken import changes, shaken
 
-from vi_contact.core import verify
-from vi_contact.core.algebra import EffectiveMatrix, SerialComm, SerialMatrix
-from vi_contact.core.compiled import library
+from vi_contact.core.algebra import EffectiveMatrix, SerialMatrix
+from vi_contact.core.ledger import energies, energy_balance
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, StepProblem, StepResult
-from vi_contact.core.verify import energies, energy_balance, kkt_residual
+from vi_contact.core.verify import kkt_residual, kkt_residuals
 from vi_contact.laws.impact import ComponentReset, Elastic, ImpulseUpdate, Inelastic, Newton
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
@@ -267,63 +266,35 @@ def test_ledger_finds_a_wrong_step():
     assert defect == pytest.approx(-du.sum(), rel=1e-9)
 
 
-def test_compiled_sizes_are_those_of_numpy(monkeypatch):
-    """Digit by digit: of one step and of several, with springs, held conditions, friction, and
-    NaN."""
-    if library(SerialComm()) is None:
-        pytest.skip("needs a compiler and CHOLMOD")
+def test_certificates_of_several_steps_are_those_of_each():
+    """Digit by digit: rows of a matrix, with springs, held conditions, and NaN."""
     step, result = pressed()
     A = EffectiveMatrix(
         step.A.matrix, step.A.algebra, image=lambda x: np.ascontiguousarray((step.A.matrix @ x.T).T)
     )
-    step = replace(step, A=A)
     rng, m, n = np.random.default_rng(3), 2, len(result.x)
     odd = replace(step.surface, bilateral=np.array([True, False]), compliance=np.array([0.0, 1e-3]))
-    for surface in (step.surface, odd, replace(odd, tangents=np.array([[3], [-1]]))):
-        x, r_n, r_t = rng.normal(size=(4, n)), rng.normal(size=(4, m)), rng.normal(size=(4, m, 1))
-        rows = replace(result, x=x, r_n=r_n, active=rng.random((4, m)) < 0.5, r_t=r_t)
-        rows = rows if surface.tangents.size else replace(rows, r_t=None)
-        rows.x[3, 1] = np.nan
+    for surface in (step.surface, odd):
+        x, r_n = rng.normal(size=(4, n)), rng.normal(size=(4, m))
+        x[3, 1] = np.nan
+        answers = replace(result, x=x, r_n=r_n, active=rng.random((4, m)) < 0.5, r_t=None)
         many = replace(
-            step, surface=surface, b=rng.normal(size=(4, n)), guess=-0.5 * x, active=rows.active
+            step,
+            A=A,
+            surface=surface,
+            b=rng.normal(size=(4, n)),
+            guess=-0.5 * x,
+            active=answers.active,
+            slip0=None,
         )
-        single = replace(many, b=many.b[1], guess=many.guess[1], active=rows.active[1])
-        own = replace(
-            rows,
-            x=x[1],
-            r_n=r_n[1],
-            active=rows.active[1],
-            r_t=None if rows.r_t is None else r_t[1],
-        )
-        compiled = verify._sizes(many, rows), verify._sizes(single, own)
-        monkeypatch.setattr(verify, "already", lambda: None)
-        assert compiled == (verify._sizes(many, rows), verify._sizes(single, own))
-        monkeypatch.undo()
-        assert (
-            verify.already() is not None
-            and compiled[1] == compiled[0][1:2]
-            and np.inf in compiled[0][3]
-        )
-        assert np.isfinite(compiled[0][:3]).all() and min(compiled[0][0][:6]) > 0.0
-
-
-@pytest.mark.skipif(library(SerialComm()) is None, reason="no compiler here")
-@pytest.mark.parametrize(
-    "worse",
-    [
-        lambda result: replace(result, active=result.active.astype(int)),
-        lambda result: replace(result, x=result.x.astype(np.float32)),
-        lambda result: replace(result, x=np.repeat(result.x, 2)[::2]),
-    ],
-)
-def test_what_solvers_of_others_give_is_read_as_what_it_is(worse):
-    """Whole numbers for a set, single precision, every second number: the certificate is that of
-    the numpy way."""
-    step, result = pressed()
-    asked = worse(result)
-    for first in (True, False):  # of its shape, or after others
-        if first:
-            step.A.desk.clear()
-        found = kkt_residual(step, asked)
-        sizes = verify._sizes_in_numpy(step, asked, step.A.image(asked.x))
-        assert found == verify._judged(step, asked, sizes.tolist()[0])
+        singles = [
+            kkt_residual(
+                replace(many, b=many.b[row], guess=many.guess[row], active=many.active[row]),
+                replace(answers, x=x[row], r_n=r_n[row], active=answers.active[row]),
+            )
+            for row in range(4)
+        ]
+        rows = (many, answers)  # without friction none is asked for its own
+        together = kkt_residuals(many, answers, lambda row, rows=rows: rows)
+        assert [repr(one) for one in together] == [repr(one) for one in singles]
+        assert np.isinf(together[3].worst) and 0.0 < together[0].worst < np.inf

@@ -22,7 +22,7 @@ import vi_contact as vc
 from demos.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem, soil
 from vi_contact.core.errors import InputError
-from vi_contact.core.verify import energy_balance
+from vi_contact.core.ledger import energy_balance
 from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.fem import Forms, compat
 from vi_contact.fem.output.fields import XDMF, VonMises

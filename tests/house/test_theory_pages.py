@@ -25,7 +25,7 @@ from pictures import is_drawn
 import vi_contact as vc
 from vi_contact import solvers
 from vi_contact.core import kkt_residual
-from vi_contact.core.verify import energies
+from vi_contact.core.ledger import energies
 
 pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.serial

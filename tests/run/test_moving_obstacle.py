@@ -13,9 +13,9 @@ from fem_problems import block
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.ledger import energy_balance
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.verify import energy_balance
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce

@@ -20,10 +20,10 @@ from shaken import changes, shaken
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.core.ledger import energies, energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, State
-from vi_contact.core.verify import energies, energy_balance
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed

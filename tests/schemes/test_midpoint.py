@@ -12,7 +12,7 @@ from oscillator import SHAKEN, observed_order
 from shaken import shaken
 
 from vi_contact.core.errors import InputError
-from vi_contact.core.verify import energies, energy_balance
+from vi_contact.core.ledger import energies, energy_balance
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed

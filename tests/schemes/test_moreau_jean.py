@@ -14,9 +14,9 @@ from oscillator import FAR, amplification, observed_order
 from scheme_checks import check_positive_homogeneity, check_restart_from_bare_states
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.ledger import energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
-from vi_contact.core.verify import energy_balance
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed

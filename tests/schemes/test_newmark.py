@@ -14,8 +14,8 @@ from oscillator import observed_order
 from shaken import changes, shaken
 
 from vi_contact.core.errors import InputError
+from vi_contact.core.ledger import energy_balance
 from vi_contact.core.state_checks import initial_state
-from vi_contact.core.verify import energy_balance
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.time_steps import Schedule

@@ -12,9 +12,9 @@ from bar import bar, before_impact, bouncing, energy, period_three, run, thrown
 from oscillator import last_state, observed_order, oscillators
 from shaken import shaken
 
+from vi_contact.core.ledger import energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
-from vi_contact.core.verify import energy_balance
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.trapezoidal import Trapezoidal

@@ -9,10 +9,10 @@ import numpy as np
 from bar import before_impact, energy, run
 
 from vi_contact.core.algebra import total
+from vi_contact.core.ledger import energies, energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, State
-from vi_contact.core.verify import energies, energy_balance
 
 
 @dataclass(frozen=True)

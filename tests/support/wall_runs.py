@@ -11,9 +11,9 @@ from mpi4py import MPI
 
 from demos.problems.wall import Wall, WallModel, build
 from vi_contact.core.algebra import Array, Mask
+from vi_contact.core.ledger import energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.core.verify import energy_balance
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -13,7 +13,7 @@ from two_bodies import momenta
 
 import vi_contact as vc
 from vi_contact.core.algebra import Array, largest, max_abs
-from vi_contact.core.verify import energies, energy_balance
+from vi_contact.core.ledger import energies, energy_balance
 
 COMM = MPI.COMM_WORLD
 BENT = 0.2  # [1/m]: curvature of the curved faces

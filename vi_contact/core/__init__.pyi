@@ -4,6 +4,7 @@ from .errors import Interrupted as Interrupted
 from .errors import OutOfTime as OutOfTime
 from .errors import StepFailure as StepFailure
 from .errors import ViContactError as ViContactError
+from .ledger import energy_balance as energy_balance
 from .obstacles import AnalyticGap as AnalyticGap
 from .obstacles import HalfSpace as HalfSpace
 from .obstacles import Obstacle as Obstacle
@@ -26,5 +27,4 @@ from .surfaces import ContactSurface as ContactSurface
 from .system import Companion as Companion
 from .system import Load as Load
 from .system import SemiDiscreteSystem as SemiDiscreteSystem
-from .verify import energy_balance as energy_balance
 from .verify import kkt_residual as kkt_residual

@@ -206,7 +206,6 @@ class EffectiveMatrix:
         self.space, self.inertia = space, inertia
         self.image = matrix.__matmul__ if image is None else image
         self._last: tuple[Indices, Any] | None = None
-        self.desk: dict[Any, tuple[list[Any], list[Any]]] = {}  # where small vectors are read
 
     def contact_last(self, last: Indices) -> Any:
         """Return the factor with these unknowns last (see ``Algebra``).

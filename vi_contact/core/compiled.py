@@ -51,11 +51,6 @@ def cholmod(comm: Comm) -> Any:
     return _alike(comm, _factoriser)
 
 
-def already() -> Any:
-    """Return the functions of ``loops.c`` where somebody has asked for them before, else None."""
-    return _loops() if _loops.cache_info().currsize else None
-
-
 def _alike(comm: Comm, found: Callable[[], Any]) -> Any:
     if comm.rank == 0:
         found()

@@ -1,4 +1,4 @@
-/* Substitute with the columns of a factor, multiply matrices with several vectors, judge a step, sweep over small problems with
+/* Substitute with the columns of a factor, multiply matrices with several vectors, sweep over small problems with
    friction, and exchange active sets: compiled once for every user, see compiled.py. Nothing here needs a library but libm. */
 #include <math.h>
 #include <stdint.h>
@@ -245,48 +245,7 @@ FASTEST double relax(int m, int d, const float *G, const float *H, const float *
     return largest;
 }
 
-/* The largest sizes in the definitions of the certificate, ten for each of k steps, a row of n unknowns and m conditions
-   each: of A x - b + B'r, b, A x, x and the guess; of r_n, of the gaps of closed conditions and the r_n of the others; and of
-   negative gaps and r_n. As whole numbers doubles are in the order of their sizes, and NaN is above infinity: it becomes
-   that. `compliance` and `held` are NULL where all is rigid and unilateral, r_t without friction; room: n numbers. */
-#define UP(top, value) { const double of = value; int64_t size; memcpy(&size, &of, 8); size &= INT64_MAX; top = size > top ? size : top; }
-#define BELOW(value) ((value) >= 0.0 ? 0.0 : (value))
-
-FASTEST void largest(int k, int n, int m, int along, const double *Ax, const double *b, const double *x, const double *guess,
-                     const double *bound, const double *r_n, const double *r_t, const char *active, double scale,
-                     const int64_t *owned, const int64_t *tangents, const double *compliance, const char *held,
-                     double *restrict room, double *out) {
-    const double infinity = HUGE_VAL;
-    for (; k > 0; k--, Ax += n, b += n, x += n, guess += n, r_n += m, active += m, out += 10) {
-        int64_t top[10] = {0}, first = 0, second = 0, third = 0, fourth = 0;
-        for (int j = 0; j < n; j++) {
-            room[j] = Ax[j] - b[j];
-            UP(first, b[j]) UP(second, Ax[j]) UP(third, x[j]) UP(fourth, guess[j])
-        }
-        top[1] = first; top[2] = second; top[3] = third; top[4] = fourth;
-        for (int j = 0; j < m; j++) {
-            const int fixed = held && held[j], closed = active[j] || fixed;
-            double gap = bound[j] - x[owned[j]];
-            if (compliance) gap += compliance[j] * r_n[j] / scale;
-            room[owned[j]] += r_n[j];
-            UP(top[5], r_n[j])
-            if (closed) UP(top[6], gap) else UP(top[7], r_n[j])
-            if (!fixed) { UP(top[8], BELOW(gap)) UP(top[9], BELOW(r_n[j])) }
-        }
-        if (r_t) {
-            for (int j = 0; j < m * along; j++)
-                if (tangents[j] >= 0) room[tangents[j]] += r_t[j];
-            r_t += m * along;
-        }
-        first = 0;
-        for (int j = 0; j < n; j++) UP(first, room[j])
-        top[0] = first;
-        for (int c = 0; c < 10; c++) {
-            memcpy(out + c, top + c, 8);
-            out[c] = out[c] <= infinity ? out[c] : infinity;
-        }
-    }
-}
+#define BELOW(value) ((value) >= 0.0 ? 0.0 : (value)) /* the negative part */
 
 /* The first exchanges of the active-set method for k small problems 0 <= r, q + G r >= 0 with one G of m rows: see
    active_set.py, which has the same for one of them, and goes on where changes[] says -1. `limit` times |r|_max is the

@@ -22,7 +22,6 @@ from .arguments import checked
 from .census import Census
 from .checks import function, shown
 from .collective import users
-from .contact_last import at
 from .errors import InputError
 from .products import frozen
 from .quantities import Positive, Unit
@@ -170,19 +169,6 @@ class ContactSurface:
     def plain(self) -> bool:
         """Say whether all conditions of this rank are rigid and unilateral."""
         return bool(self.rigid.all() and not self.bilateral.any())
-
-    @cached_property
-    def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
-        """Return (m, d - 1), where compiled functions find the arrays, and the arrays.
-
-        The place of an array is None where all is plain.
-        """
-        kept = (
-            np.ascontiguousarray(self.owned, np.int64),
-            np.ascontiguousarray(self.tangents, np.int64),
-            *((None, None) if self.plain else (self.compliance + 0.0, self.bilateral.copy())),
-        )
-        return self.tangents.shape, [None if one is None else at(one) for one in kept], kept
 
     def everywhere(self, values: NDArray[Any]) -> Any:
         """Return (total, …) the values (m, …) of all conditions, by their numbers.

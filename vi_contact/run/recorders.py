@@ -18,11 +18,11 @@ from ..core.algebra import Array, Indices, Mask, total
 from ..core.arguments import check_fields
 from ..core.checks import array, column_name, flag, instance
 from ..core.errors import InputError, StepFailure
+from ..core.ledger import Energies, energies, energy_balance
 from ..core.problem import ContactProblem
 from ..core.quantities import Unit
 from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import ContactSurface
-from ..core.verify import Energies, energies, energy_balance
 from .files.table import WORDS
 
 _COLUMNS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.algebra import Array, lowest, max_abs, total
 from ..core.certificate import Certificate
-from ..core.verify import ROUNDED
+from ..core.verify import ROUNDING
 from .forms import Problem
 
 DIAGONAL = 1e-8  # of the largest: smaller entries of the Jacobian's diagonal count as this
@@ -64,7 +64,7 @@ class Judged:
         balance = max_abs(self.F - self.push[0] + self.push[1])
         away = max(max_abs(below[at_lower]), max_abs(above[at_upper]))
         behind, wrong = (max(map(lowest, pair)) for pair in ((below, above), self.push))
-        carried = max(b_max, Ax_max, ROUNDED * most * x_max, most * least) or 1.0
+        carried = max(b_max, Ax_max, ROUNDING * most * x_max, most * least) or 1.0
         scale = np.array([carried, x_ref, r_ref, x_ref])
         worst = problem.comm.max(np.array([balance, behind, wrong, away])) / scale
         known = not self.broken and not left

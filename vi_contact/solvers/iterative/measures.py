@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.algebra import Array, Comm, max_abs
 from ...core.step import StepProblem
-from ...core.verify import ROUNDED
+from ...core.verify import ROUNDING
 from .contact import Contact
 
 # of the tolerance: estimates may be wrong, and the carried residual is not the one formed afresh
@@ -53,7 +53,7 @@ class Measured:
         )
         b, Ax, size, guess, reaction = self._comm.max(np.where(np.isnan(local), np.inf, local))
         whole = self._largest * size
-        force = max(b, Ax, ROUNDED * whole)
+        force = max(b, Ax, ROUNDING * whole)
         return Measures(force, max(b, reaction), max(size, guess), ROUND_OFF * max(whole, force))
 
 
