@@ -48,11 +48,11 @@ import vi_contact as vc  # noqa: E402
 from demos.problems import channel  # noqa: E402
 from demos.problems.wall import Wall, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
-from vi_contact.core import contact_last  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
-from vi_contact.core.compiled import cholmod  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.fem.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
+from vi_contact.kernels import contact_last  # noqa: E402
+from vi_contact.kernels.compiler import addresses, load_cholmod  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 
@@ -147,14 +147,14 @@ class Cholmod:
         mine = contact_last.SHORT_COLUMNS
         contact_last.SHORT_COLUMNS = 0.0
         self.factor = contact_last.ContactLast(
-            cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64)
+            load_cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64)
         )
         contact_last.SHORT_COLUMNS = mine
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Return A⁻¹ b."""
         x = b.copy()
-        self.factor._library.substitute(self.factor._factor, 0, 1, contact_last.at(x))  # CHOLMOD_A
+        self.factor._library.substitute(self.factor._factor, 0, 1, *addresses(x))  # CHOLMOD_A
         return x
 
 

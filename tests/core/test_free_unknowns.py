@@ -18,10 +18,10 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact.core import sizes
 from vi_contact.core.algebra import EffectiveMatrix, total
-from vi_contact.core.condensation import condense
 from vi_contact.core.errors import StepFailure
 from vi_contact.core.free_unknowns import solve_free
 from vi_contact.core.state_checks import initial_state
+from vi_contact.kernels.condensation import condense
 from vi_contact.laws import impact
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import Redistributed

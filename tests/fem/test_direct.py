@@ -17,11 +17,12 @@ from petsc4py import PETSc
 
 import vi_contact as vc
 from vi_contact import fem, meshes
-from vi_contact.core import compiled, packages
+from vi_contact.core import packages
 from vi_contact.core.errors import InputError
 from vi_contact.fem import direct
 from vi_contact.fem.petsc_algebra import PREFIX, PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from vi_contact.fem.petsc_rows import aij_of
+from vi_contact.kernels import compiler
 from vi_contact.solvers import ReducedNewton, SemismoothNewton, TaoTron
 from vi_contact.solvers.volume.failures import raised
 from vi_contact.solvers.volume.options import direct as direct_of_volume
@@ -37,7 +38,7 @@ def without(monkeypatch: Any, *missing: str) -> None:
     monkeypatch.setattr(
         packages, "petsc_has", lambda package: package not in gone and EVERY(package)
     )
-    compiled._without_cholmod.cache_clear()
+    compiler._without_cholmod.cache_clear()
 
 
 def falling_block(d: int, friction: bool) -> vc.ContactProblem:

@@ -15,7 +15,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.problems.wall import Wall, build
 from vi_contact import fem
-from vi_contact.core import contact_last
+from vi_contact.kernels import contact_last
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.run.together import Group
 

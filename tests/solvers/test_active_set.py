@@ -18,7 +18,7 @@ pytestmark = pytest.mark.serial
 def route(request, monkeypatch):
     """Solve by compiled exchanges, where there is a compiler, and without."""
     if request.param == "numpy":
-        monkeypatch.setattr(active_set, "library", lambda comm: None)
+        monkeypatch.setattr(active_set, "load_loops", lambda comm: None)
     return request.param
 
 
@@ -115,7 +115,7 @@ def test_iterations_count_changes_of_the_set_and_history_the_rows():
 
 def test_the_same_set_is_not_factored_twice(monkeypatch):
     """Prepared once, marching with an unchanged set: triangular solves only."""
-    monkeypatch.setattr(active_set, "library", lambda comm: None)
+    monkeypatch.setattr(active_set, "load_loops", lambda comm: None)
     calls, original = [], active_set.cholesky
     monkeypatch.setattr(active_set, "cholesky", lambda G: calls.append(G.shape[0]) or original(G))
     rng = np.random.default_rng(9)
@@ -189,7 +189,7 @@ def test_both_routes_make_the_same_exchanges(monkeypatch):
     for problem in [*easy, hard]:
         monkeypatch.undo()
         compiled = ActiveSet().prepare(problem.G, problem.bilateral).solve(problem.q)
-        monkeypatch.setattr(active_set, "library", lambda comm: None)
+        monkeypatch.setattr(active_set, "load_loops", lambda comm: None)
         other = ActiveSet().prepare(problem.G, problem.bilateral).solve(problem.q)
         assert compiled.history == other.history and compiled.iterations == other.iterations
         assert np.abs(compiled.r - other.r).max() <= 1e-13 * np.abs(other.r).max()

@@ -17,10 +17,10 @@ from fem_problems import BOX_DT, max_over_ranks, shaken_wall, thrown_box
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.core.compiled import cholmod
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import empty_surface
+from vi_contact.kernels.compiler import load_cholmod
 from vi_contact.run.march import march
 from vi_contact.solvers import automatic
 
@@ -75,7 +75,7 @@ def test_friction_and_ranks_make_it_iterative_sooner(monkeypatch: pytest.MonkeyP
         vc.Iterative(),
     ]
     monkeypatch.setattr(automatic, "IN_SPACE", 100)
-    alone = COMM.size == 1 and cholmod(surface.comm) is not None
+    alone = COMM.size == 1 and load_cholmod(surface.comm) is not None
     assert rule.route(K, surface, False) == (vc.Condensed() if alone else vc.Iterative())
     monkeypatch.setattr(automatic, "cholmod", lambda comm: None)
     assert rule.route(K, surface, False) == vc.Iterative()

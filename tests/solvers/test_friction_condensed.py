@@ -12,11 +12,11 @@ from column import column
 from small_steps import small
 
 from vi_contact.core.algebra import SerialComm
-from vi_contact.core.compiled import library
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
 from vi_contact.core.step import Report
 from vi_contact.core.surfaces import ContactSurface
+from vi_contact.kernels.compiler import load_loops
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import march
@@ -148,7 +148,7 @@ def test_newton_that_wanders_is_led_back() -> None:
 def test_sweeps_leave_little_to_newton(monkeypatch: pytest.MonkeyPatch, d: int) -> None:
     """Compiled sweeps find the states in the plane, and in space the answer, of more nodes than a
     group of theirs has; the answer is that of Newton's method alone."""
-    if library(SerialComm()) is None:
+    if load_loops(SerialComm()) is None:
         pytest.skip("nothing is compiled here")
     for seed in range(4):
         G, q, bilateral = small(seed, 100, d)
@@ -156,7 +156,7 @@ def test_sweeps_leave_little_to_newton(monkeypatch: pytest.MonkeyPatch, d: int) 
         found = FrictionNewton().prepare(G, bilateral).solve(*given)
         assert found.iterations <= (2 if d == 2 else 1)
         with monkeypatch.context() as patched:
-            patched.setattr(newton, "library", lambda comm: None)
+            patched.setattr(newton, "load_loops", lambda comm: None)
             alone = FrictionNewton().prepare(G, bilateral).solve(*given)
         np.testing.assert_allclose(found.r, alone.r, rtol=0.0, atol=1e-9 * np.abs(alone.r).max())
         assert np.array_equal(found.active, alone.active) and np.array_equal(

@@ -12,8 +12,8 @@ import pytest
 from small_steps import small
 
 from vi_contact.core.algebra import Array, Mask, SerialComm
-from vi_contact.core.compiled import library
 from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.kernels.compiler import load_loops
 from vi_contact.solvers.friction import linear as friction_linear
 from vi_contact.solvers.friction import newton as friction_newton
 from vi_contact.solvers.friction.extrapolation import Anderson, Plain
@@ -207,15 +207,15 @@ def test_newton_without_a_compiler_is_the_same(d: int, monkeypatch: Any) -> None
     spent, none, some = [], np.zeros(12), np.full(12, 0.1)
     for seed in range(10):
         (G, q, bilateral), results = small(500 + seed, 12, d), []
-        for found in (friction_newton.library, lambda comm: None):
+        for found in (friction_newton.load_loops, lambda comm: None):
             with monkeypatch.context() as patch:
-                patch.setattr(friction_newton, "library", found)
+                patch.setattr(friction_newton, "load_loops", found)
                 prepared = FrictionNewton().prepare(G, bilateral)
             results.append(prepared.solve(q, some if seed % 2 else none, np.full(12, 0.4)))
         assert energy_norm(results[1].r - results[0].r, G) <= 1e-12 * energy_norm(results[0].r, G)
         assert np.array_equal(results[0].stick, results[1].stick) and results[0].residual <= 1e-13
         spent.append([result.iterations for result in results])
-    assert library(SerialComm()) is None or np.sum(spent, axis=0)[0] < np.sum(spent, axis=0)[1]
+    assert load_loops(SerialComm()) is None or np.sum(spent, axis=0)[0] < np.sum(spent, axis=0)[1]
 
 
 @pytest.mark.parametrize(("d", "held"), [(2, 0.0), (2, 0.2), (2, 1e9), (3, 1e9)])
@@ -230,7 +230,7 @@ def test_places_that_are_left_solve_the_problem_too(d: int, held: float, monkeyp
         return rests[-1]
 
     monkeypatch.setattr(friction_linear.Factored, "_rest", counted)
-    monkeypatch.setattr(friction_newton, "library", lambda comm: None)
+    monkeypatch.setattr(friction_newton, "load_loops", lambda comm: None)
     for seed in range(8):
         (G, q, bilateral), results = small(700 + seed, 12, d), []
         q[:, 0] = -np.abs(np.where(np.isinf(q[:, 0]), 1.0, q[:, 0]))

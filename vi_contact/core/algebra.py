@@ -172,7 +172,7 @@ class Algebra(Protocol):
         """Return a factor of A."""
 
     def contact_last(self, A: Matrix, last: Indices) -> Any:
-        """Return a factor with these unknowns last, a ``core.contact_last.ContactLast``.
+        """Return a factor with these unknowns last, a ``kernels.contact_last.ContactLast``.
 
         The unknowns are numbered over all ranks and the same on every rank. The answer is None
         where ``factor`` serves better or there is none. Collective.

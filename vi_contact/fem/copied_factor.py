@@ -10,8 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array, Indices, SerialComm, largest
-from ..core.compiled import cholmod, library
-from ..core.contact_last import AT_ONCE, ContactLast, at
+from ..kernels.compiler import addresses, load_cholmod, load_loops
+from ..kernels.contact_last import AT_ONCE, ContactLast
 from .petsc_rows import rows_of
 
 
@@ -21,7 +21,7 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
     It is None without CHOLMOD, and where it cannot: not positive definite, which PETSc says better,
     or too large.
     """
-    functions = cholmod(comm)
+    functions = load_cholmod(comm)
     if functions is None:
         return None
     rows, made = rows_of(mat), None
@@ -46,15 +46,16 @@ def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
 
     It reads the matrix once for eight of them.
     """
-    functions, A, n = library(SerialComm()), rows_of(matrix.mat), matrix.rows
+    functions, A, n = load_loops(SerialComm()), rows_of(matrix.mat), matrix.rows
     if functions is None or A.indices.dtype != np.int32:
         return lambda x: np.stack([matrix @ row for row in x])
     kept = A.indptr, A.indices, A.data, np.empty(AT_ONCE * n)
-    *before, room = map(at, kept)
+    *before, room = addresses(*kept)
 
     def product(x: Array, _: Any = kept) -> Array:  # which holds what lies there
         x, made = np.ascontiguousarray(x), np.empty(x.shape)
-        functions.product_many(len(x), n, *before, at(x), room, at(made))
+        b, out = addresses(x, made)
+        functions.product_many(len(x), n, *before, b, room, out)
         return made
 
     return product

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
-from ..core.contact_last import ContactLast
+from ..kernels.contact_last import ContactLast
 from .communicators import MpiComm, give_back
 from .copied_factor import contact_last, product_of_rows
 from .direct import by_mumps, failure, finite, ordering, own_serves

@@ -27,7 +27,6 @@ import scipy.sparse as sp
 from ..core.algebra import Array, EffectiveMatrix, Indices, largest, max_abs, total
 from ..core.arguments import check_fields
 from ..core.checks import function
-from ..core.condensation import condense
 from ..core.corners import with_open_faces
 from ..core.free_unknowns import solve_free
 from ..core.protocols import Impact
@@ -35,6 +34,7 @@ from ..core.quantities import RATIO, Between
 from ..core.sizes import small
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
+from ..kernels.condensation import condense
 
 BELOW = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
 STORED = 20  # entries a row of M⁻¹Bᵀ: half a substitution reads more in two dimensions
@@ -84,9 +84,9 @@ class ImpulseUpdate:
 
     The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it
     decays to round-off within thirty elements; else an impact costs half a substitution
-    (``core.condensation``). Large systems, from 50 000 unknowns in space and 300 000 in the plane,
-    are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to round-off
-    at every impact.
+    (``kernels.condensation``). Large systems, from 50 000 unknowns in space and 300 000 in the
+    plane, are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to
+    round-off at every impact.
     """
 
     def __call__(

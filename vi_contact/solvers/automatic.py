@@ -16,11 +16,11 @@ from typing import Any
 
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
 from ..core.checks import provides
-from ..core.compiled import cholmod
 from ..core.problem import ContactProblem
 from ..core.sizes import small
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
+from ..kernels.compiler import load_cholmod
 from .condensed import Condensed
 
 log = logging.getLogger(__name__)
@@ -74,7 +74,7 @@ class Automatic:
         if isinstance(matrix, SerialMatrix):
             return self.condensed
         dimension, comm = surface.points.shape[1], surface.comm
-        alone = comm.size == 1 and cholmod(comm) is not None
+        alone = comm.size == 1 and load_cholmod(comm) is not None
         large = dimension == 3 and total(comm, matrix.rows) >= (
             ALONE_IN_SPACE if alone else IN_SPACE
         )

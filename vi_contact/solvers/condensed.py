@@ -13,8 +13,8 @@ With the one factorisation of A and the unit vectors E of the normal unknowns:
     x = A⁻¹ (b - E r)
 
 A step costs one forward and one backward substitution and the small problem, whatever the number of
-contact changes: ``core.condensation``. With friction the tangential unknowns of the contact points
-are kept too: ``friction.condensed``.
+contact changes: ``kernels.condensation``. With friction the tangential unknowns of the contact
+points are kept too: ``friction.condensed``.
 """
 
 from collections.abc import Callable
@@ -26,13 +26,13 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.checks import instance, provides
-from ..core.condensation import Condensation, Last, condense
 from ..core.problem import ContactProblem
 from ..core.products import frozen
 from ..core.sizes import refuse_dense
 from ..core.stages import stage
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
+from ..kernels.condensation import Condensation, Last, condense
 from .certified import check_laws
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton

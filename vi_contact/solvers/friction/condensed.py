@@ -3,7 +3,7 @@
 With the unit vectors E of the normal and F of the tangential unknowns, x_free = A⁻¹b and D = [E F]:
 
     G = DᵀA⁻¹D (+ compliance/scale on the normal diagonal)
-        node by node: r_n, then r_t: ``core.condensation``
+        node by node: r_n, then r_t: ``kernels.condensation``
     q_n = bound - Eᵀx_free,   q_t = slip0 - Fᵀx_free
         gap, and minus the slip, without reactions
     the small problem of ``problem`` gives r;   x = A⁻¹(b - E r_n - F r_t)
@@ -20,11 +20,11 @@ import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.collective import limit_of, slope_of
-from ...core.condensation import Condensation
 from ...core.errors import ViContactError
 from ...core.products import frozen
 from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
+from ...kernels.condensation import Condensation
 from .problem import FrictionMethod, FrictionResult
 from .slip_rate import RateIteration
 

@@ -24,7 +24,6 @@ usual cycles of slip to and fro. Where Newton cycles all the same, Gauss-Seidel 
 lead to a better start.
 """
 
-from ctypes import c_double
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -32,8 +31,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.algebra import Array, Mask, SerialComm
-from ...core.compiled import library
-from ...core.contact_last import at
+from ...kernels.compiler import load_loops
+from ...kernels.friction_sweeps import FrictionSweeps
 from .linear import Factored, LinearProblems, States
 from .nsgs import sweeper
 from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
@@ -67,16 +66,16 @@ class FrictionNewton(Settings):
         """
         delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
         # its sweeps read half of G
-        compiled = library(SerialComm()) if delassus.symmetric else None
-        if compiled and delassus.count:
+        loops = load_loops(SerialComm()) if delassus.symmetric else None
+        if loops and delassus.count:
             delassus.short  # noqa: B018  a part of set-up
-        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, compiled, {}))
+        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, loops, {}))
 
-    def _loop(self, compiled: Any, kept: Kept, step: ScaledProblem, r: Array) -> Iterated:
+    def _loop(self, loops: Any, kept: Kept, step: ScaledProblem, r: Array) -> Iterated:
         history: list[float] = []
         swept, w = 0, None
-        if compiled and step.unit > 0.0:
-            r, w, left = relaxed(compiled, step, r)
+        if loops and step.unit > 0.0:
+            r, w, left = sweep_in_stages(loops, step, r)
             history.append(left / step.unit)
             if step.delassus.dimension > 2 and left <= step.rounding(r):
                 return r, 1, history
@@ -119,29 +118,25 @@ class FrictionNewton(Settings):
         return best, smallest <= self.tolerance * step.unit
 
 
-def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array, float]:
+def sweep_in_stages(loops: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array, float]:
     """Return r, w = q + G r and the residual after compiled sweeps.
 
     In 2D, where they are a start only, w is as the sweeps left it.
     """
-    of, r, w = step.delassus, np.array(r, order="C"), np.array(step.w(r), order="C")
-    room = np.empty(r.size + len(r), dtype=np.float32)
-    given = (*of.short, step.cohesion, step.slope, of.bilateral, r, w, room)
-    places = [None if array is None else at(array) for array in given]
-    left, before = np.inf, np.inf
-    for _ in range(STAGES[of.dimension]):
-        least = 0.5 * step.rounding(r) if of.dimension > 2 else 0.0
-        compiled.relax(
-            of.count,
-            of.dimension,
-            *places[:-3],
-            SWEEPS[of.dimension],
-            c_double(least),
-            *places[-3:],
-        )
-        if of.dimension > 2:
-            w[:] = step.w(r)
-        left, before = step.residual(r, w), left
-        if left <= step.rounding(r) or not left <= FALL * before:
+    delassus = step.delassus
+    in_space = delassus.dimension > 2
+    G, H, blocks = delassus.short
+    sweeps = FrictionSweeps(
+        loops, G, H, blocks, step.cohesion, step.slope, delassus.bilateral, r, step.w(r)
+    )
+    left = np.inf
+    for _ in range(STAGES[delassus.dimension]):
+        before = left
+        least = 0.5 * step.rounding(sweeps.r) if in_space else 0.0
+        sweeps.sweep(SWEEPS[delassus.dimension], least)
+        if in_space:  # w follows r in single precision, which is not enough to judge by
+            sweeps.w[:] = step.w(sweeps.r)
+        left = step.residual(sweeps.r, sweeps.w)
+        if left <= step.rounding(sweeps.r) or not left <= FALL * before:
             break
-    return r, w, left
+    return sweeps.r, sweeps.w, left

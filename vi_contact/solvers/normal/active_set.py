@@ -17,20 +17,19 @@ such set can return: it ends, in practice after about as many changes as there a
 single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
 """
 
-from ctypes import c_double
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
 import numpy as np
 from scipy.linalg import lapack
 
-from ...core.algebra import Array, Indices, Mask, SerialComm, lowest
+from ...core.algebra import Array, Mask, SerialComm, lowest
 from ...core.arguments import check_fields
-from ...core.compiled import library
-from ...core.contact_last import at
 from ...core.errors import ViContactError
 from ...core.quantities import Positive
+from ...kernels.compiler import load_loops
+from ...kernels.exchanges import Exchanges
 from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
@@ -72,19 +71,34 @@ class PreparedSets(PreparedLCP):
     """
 
     @cached_property
-    def _compiled(self) -> "Exchanges | None":
-        functions = library(SerialComm()) if self.scaled.bilateral.size <= FEW else None
-        return None if functions is None else Exchanges(functions, self)
+    def _exchanges(self) -> Exchanges | None:
+        """Return the compiled exchanges; None where rows are many, or there is no compiler."""
+        scaled, method = self.scaled, cast(ActiveSet, self.method)
+        loops = load_loops(SerialComm()) if scaled.bilateral.size <= FEW else None
+        if loops is None:
+            return None
+        return Exchanges(
+            loops,
+            scaled.matrix,
+            scaled.scale,
+            scaled.bilateral,
+            rounding=4.0 * EPS * scaled.norm,
+            tolerance=method.tolerance,
+            most=min(PATIENCE, method.max_iterations),
+        )
 
     def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
-        known = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
-        if known and self._compiled is not None:
-            r, active, residual, changes, moved = self._compiled(
-                q, q < 0.0 if guess is None else guess > 0
-            )
-            if (count := int(changes[0])) >= 0:
-                history = tuple(moved[0, :count].tolist())
-                return LCPResult(r[0], active[0], count, float(residual[0]), self.method, history)
+        fits = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
+        if fits and self._exchanges is not None:
+            closed = q < 0.0 if guess is None else guess > 0
+            answer = self._exchanges.solve(q, closed)
+            count = int(answer.changes[0])
+            if count >= 0:
+                history = tuple(answer.moved[0, :count].tolist())
+                residual = float(answer.residual[0])
+                return LCPResult(
+                    answer.r[0], answer.active[0], count, residual, self.method, history
+                )
         return super()._solved(q, guess)
 
     def solve_many(
@@ -94,74 +108,24 @@ class PreparedSets(PreparedLCP):
 
         The errors are what those raise that have no answer.
         """
-        none = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), None, np.full(len(q), -1), None
-        r, active, _, changes, _ = none if self._compiled is None else self._compiled(q, guess)
-        counts, failed = changes.tolist(), dict[int, ViContactError]()
+        if self._exchanges is None:
+            r, active, changes = np.zeros(q.shape), np.zeros(q.shape, bool), np.full(len(q), -1)
+        else:
+            r, active, _, changes, _ = self._exchanges.solve(q, guess)
+
+        # What the exchanges left without an answer is solved row by row.
+        iterations = changes.tolist()
+        failed: dict[int, ViContactError] = {}
         for row in np.flatnonzero(changes < 0).tolist():
             try:
-                found = super()._solved(q[row], guess[row])
-                r[row], active[row], counts[row] = found.r, found.active, found.iterations
+                result = super()._solved(q[row], guess[row])
             except ViContactError as error:
                 failed[row] = error
-        return r, active, counts, failed
-
-
-class Exchanges:
-    """Make the first exchanges of several problems of one G, compiled.
-
-    They are those of ``_Sets``, which has the others.
-    """
-
-    def __init__(self, library: Any, prepared: PreparedLCP) -> None:
-        self._library, self._prepared, self._rows = library, prepared, 0
-
-    def _made(self, k: int) -> None:
-        """Make room for k problems."""
-        scaled, method = self._prepared.scaled, cast(ActiveSet, self._prepared.method)
-        m, most = scaled.bilateral.size, min(PATIENCE, method.max_iterations)
-        self._rows, self._q, self._guess = k, np.empty((k, m)), np.empty((k, m), dtype=bool)
-        sets = (
-            np.full((k, m), 2, np.uint8),
-            np.empty((k, m, m)),
-            np.empty(3 * m),
-            np.empty(m, np.int32),
-        )
-        self._found: Any = (
-            np.empty((k, m)),
-            np.empty((k, m), dtype=bool),
-            np.empty(k),
-            np.empty(k, np.int32),
-            np.empty((k, most), np.int32),
-        )
-        self._kept = (
-            scaled.matrix,
-            scaled.scale,
-            scaled.bilateral,
-            self._q,
-            self._guess,
-            *sets,
-            *self._found,
-        )
-        self._arguments = (
-            m,
-            most,
-            c_double(4.0 * EPS * scaled.norm),
-            c_double(method.tolerance),
-            *map(at, self._kept),
-        )
-
-    def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
-        """Return r, active, residual, iterations (-1: not solved) and rows that each moved.
-
-        q and guess are (k, m) or (m,).
-        """
-        k = len(q) if q.ndim == 2 else 1
-        if k > self._rows:
-            self._made(k)
-        self._q[:k], self._guess[:k] = q, guess
-        self._library.exchanges(k, *self._arguments)
-        r, active, *others = (one[:k] for one in self._found)
-        return r.copy(), active.copy(), *others
+            else:
+                r[row] = result.r
+                active[row] = result.active
+                iterations[row] = result.iterations
+        return r, active, iterations, failed
 
 
 class _Sets:

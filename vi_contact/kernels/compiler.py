@@ -3,7 +3,7 @@
 They are kept in the user's cache, as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder
 vi_contact.
 
-``loops.c`` needs a C compiler only. ``contact_last.c`` needs CHOLMOD too, and takes none but the
+The loops (``LOOPS``) need a C compiler only. ``factor.c`` needs CHOLMOD too, and takes none but the
 one that PETSc has brought into the process: another one beside it would share names with it, and
 with the METIS and the BLAS of PETSc, so that functions of one call those of the other. Compiling
 against the header beside that CHOLMOD makes any version do.
@@ -23,27 +23,30 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
-from . import packages
-from .algebra import Comm, largest
+from numpy.typing import NDArray
+
+from ..core import packages
+from ..core.algebra import Comm, largest
 
 log = logging.getLogger(__name__)
-LOOPS = Path(__file__).with_name("loops.c")
-CONTACT_LAST = Path(__file__).with_name("contact_last.c")
+HERE = Path(__file__).parent
+LOOPS = (HERE / "substitution.c", HERE / "friction_sweeps.c", HERE / "exchanges.c")
+FACTOR = HERE / "factor.c"
 MAPS = Path("/proc/self/maps")  # of Linux: the files of all libraries of this process
 OF_LOOPS = ("forward", "backward", "forward_many", "backward_many")
 OF_CHOLMOD = ("order", "factorise", "columns", "release", "substitute")
 
 
-def library(comm: Comm) -> Any:
-    """Return the functions of ``loops.c``, or None, the same on all ranks.
+def load_loops(comm: Comm) -> Any:
+    """Return the functions of ``LOOPS``, or None, the same on all ranks.
 
     The first rank compiles them. Collective.
     """
     return _alike(comm, _loops)
 
 
-def cholmod(comm: Comm) -> Any:
-    """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD.
+def load_cholmod(comm: Comm) -> Any:
+    """Return what ``ContactLast`` needs, of ``substitution.c`` and of ``factor.c``.
 
     It is None where PETSc has no CHOLMOD or nothing can be compiled, and the same on all ranks. The
     first rank compiles it. Collective.
@@ -66,7 +69,7 @@ def _loops() -> Any:
     Without one, a line in the log says so once.
     """
     try:
-        found = ctypes.CDLL(str(compiled(LOOPS, [])))
+        found = ctypes.CDLL(str(compile_library(LOOPS, [])))
     except (OSError, RuntimeError, subprocess.SubprocessError) as problem:
         # RuntimeError: nobody's home is known
         log.info(
@@ -95,7 +98,7 @@ def _with_cholmod(file: Path) -> Any:
     if loops is None:
         return _without_cholmod("there is no C compiler that works")
     try:
-        made = compiled(CONTACT_LAST, [f"-I{_header(file)}"], file)
+        made = compile_library([FACTOR], [f"-I{_header(file)}"], file)
         found = ctypes.CDLL(str(made))
         if not found.header_fits():
             raise OSError(f"the header in {_header(file)} is of another version than {file}")
@@ -155,31 +158,55 @@ def _header(file: Path) -> Path:
     raise OSError(f"there is no header cholmod.h beside {file}")
 
 
-def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
+def compile_library(sources: Sequence[Path], options: Sequence[str], *libraries: Path) -> Path:
     """Return the file of the compiled functions, made unless one that can be loaded is there.
 
     Safe in any number of processes: each compiles aside, and the last one to end replaces the file
     as a whole.
 
-    ``libraries``: files to link with, which are in the process already; a changed one is another
-    result.
+    Args:
+        sources: C files of one folder, which become one library.
+        options: options of the compiler.
+        libraries: files to link with, which are in the process already; a changed one is another
+            result.
+
+    Raises:
+        OSError, RuntimeError, subprocess.SubprocessError: there is no compiler, no cache or no home
+            folder, or the sources do not compile.
     """
     command = [*shlex.split(os.environ.get("CC") or "cc"), "-O3", "-shared", "-fPIC", *options]
+
+    # The name of the file says all that it was made of.
+    headers = sorted(sources[0].parent.glob("*.h"))
+    texts = [file.read_text(encoding="utf-8") for file in (*sources, *headers)]
     stamps = [(str(one), one.stat().st_size, one.stat().st_mtime_ns) for one in libraries]
-    text = f"{source.read_text(encoding='utf-8')}{command}{stamps}{platform.machine()}"
-    key = sha256(text.encode()).hexdigest()[:16]
+    made_of = f"{texts}{command}{stamps}{platform.machine()}"
+    key = sha256(made_of.encode()).hexdigest()[:16]
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "vi_contact"
-    file = folder / f"{source.stem}-{key}.so"
+    file = folder / f"{sources[0].stem}-{key}.so"
+
     try:
         ctypes.CDLL(str(file))
     except OSError:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder) as aside:
             made = Path(aside) / file.name
-            command += [str(source), "-o", str(made), *map(str, libraries), "-lm"]
+            command += [*map(str, sources), "-o", str(made), *map(str, libraries), "-lm"]
             subprocess.run(command, check=True, capture_output=True, text=True)
             made.replace(file)
     return file
+
+
+def addresses(*arrays: NDArray[Any] | None) -> list[ctypes.c_void_p | None]:
+    """Return where arrays lie in memory; None for None.
+
+    Whoever asks holds the arrays for as long as a compiled function uses their addresses.
+    ``array.ctypes`` takes several times as long to tell.
+    """
+    return [
+        None if array is None else ctypes.c_void_p(array.__array_interface__["data"][0])
+        for array in arrays
+    ]
 
 
 def _said(problem: Exception) -> str:

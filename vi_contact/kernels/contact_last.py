@@ -21,7 +21,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import blas
 
-from .algebra import Array, Indices
+from ..core.algebra import Array, Indices
+from .compiler import addresses
 
 FORWARD, BACKWARD = 4, 5  # CHOLMOD_L and CHOLMOD_Lt of cholmod.h
 FEW_ROWS = 5_000  # below, minimum degree fills as little as METIS, in a quarter of the time
@@ -31,12 +32,15 @@ SHORT_COLUMNS = 120.0
 
 
 class ContactLast:
-    """Hold the factor of a symmetric positive definite matrix.
+    """Hold the factor of a symmetric positive definite matrix, with some unknowns in its last rows.
 
-    The unknowns ``last`` are in the last rows of L.
+    Vectors of c are in the order in which ``last`` names the unknowns. Every rank may hold a copy
+    of the factor.
 
-    Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the
-    owned rows. Vectors of c are in the order of ``last``. ``corner``: L_cc, lower triangular.
+    Attributes:
+        rows: number of unknowns of all ranks.
+        corner: L_cc, lower triangular (m, m).
+        bytes: memory of the factor.
     """
 
     def __init__(
@@ -48,38 +52,55 @@ class ContactLast:
         whole: Callable[[Array], Array] | None = None,
         mine: slice = slice(None),
     ) -> None:
-        """Factorise; ArithmeticError when A is not positive definite, or too large for 32 bits."""
+        """Factorise.
+
+        Args:
+            library: the compiled functions (``compiler.load_cholmod``).
+            A: the whole matrix (rows, rows).
+            last: (m,), the unknowns c.
+            whole: gathers a vector of owned entries on every rank; None on one rank.
+            mine: the rows that this rank owns.
+
+        Raises:
+            ArithmeticError: A is not positive definite, or too large for 32 bits.
+        """
+        A = _with_short_indices(A)
         self._library, self._whole, self._mine = library, whole, mine
-        self.rows, A = A.shape[0], _readable(A)
+        self.rows = A.shape[0]
         self._inner = inner = self.rows - len(last)
         self._order = _order(library, A, np.asarray(last))
         factor = _factorise(library, A, self._order)
-        self._y, self._many = np.zeros(self.rows), np.zeros(0)
-        self._c = self._y[inner:]
+        self._y = np.zeros(self.rows)
+        self._c = self._y[inner:]  # a view: y_c, or x_c between the substitutions
+        self._many = np.zeros(0)
         self.corner: Array = np.zeros((len(last), len(last)), order="F")
         entries = library.columns(factor, inner, None, None, None, None)
         self._columns: tuple[NDArray[Any], ...] = ()
         if entries <= SHORT_COLUMNS * max(inner, 1):
-            starts, rows, values = (
-                np.empty(inner + 1, np.int64),
-                np.empty(entries, np.int32),
-                np.empty(entries),
-            )
-            library.columns(factor, inner, at(starts), at(rows), at(values), at(self.corner))
+            self._copy_columns(factor, entries)
             library.release(factor)
-            self._columns = starts, rows, values
-            self._arguments = (inner, at(starts), at(rows), at(values), at(self._y))
         else:
-            library.columns(factor, inner, None, None, None, at(self.corner))
+            library.columns(factor, inner, None, None, None, *addresses(self.corner))
             self._factor = factor
             weakref.finalize(self, library.release, factor)
         self.bytes = 12.0 * entries + 8.0 * self.corner.size
+
+    def _copy_columns(self, factor: Any, entries: int) -> None:
+        """Copy L column by column: without the zeros that supernodes store."""
+        starts = np.empty(self._inner + 1, np.int64)
+        rows = np.empty(entries, np.int32)
+        values = np.empty(entries)
+        to = addresses(starts, rows, values, self.corner)
+        self._library.columns(factor, self._inner, *to)
+        self._columns = starts, rows, values
+        self._arguments = (self._inner, *addresses(starts, rows, values, self._y))
 
     def forward(self, b: Array) -> Array:
         """Return y_c of the load b; y_i is kept for ``backward``. Collective."""
         if b.ndim == 2:
             return self._forward_many(b)
-        (b if self._whole is None else self._whole(b)).take(self._order, out=self._y, mode="clip")
+        load = b if self._whole is None else self._whole(b)
+        load.take(self._order, out=self._y, mode="clip")
         if self._columns:
             self._library.forward(*self._arguments)
             return self.reduced(self._c)
@@ -97,6 +118,7 @@ class ContactLast:
             self._c[:] = x_c
             self._library.backward(*self._arguments)
         else:
+            # CHOLMOD substitutes with all of Lᵀ: given L_ccᵀ x_c it finds x_c, up to rounding.
             self._c[:] = blas.dtrmv(self.corner, x_c, lower=1, trans=1) if len(x_c) else x_c
             self._substitute(BACKWARD)
             self._c[:] = x_c
@@ -111,13 +133,13 @@ class ContactLast:
     def free(self, y_c: Array) -> Array:
         """Return x_c = L_cc⁻ᵀ y_c."""
         if y_c.ndim == 2:
-            return _by_corner(blas.dtrsm, self.corner, y_c, trans=1)
+            return _multiply_rows(blas.dtrsm, self.corner, y_c, trans=1)
         return np.asarray(blas.dtrsv(self.corner, y_c, lower=1, trans=1)) if len(y_c) else y_c
 
     def reduced(self, r_c: Array) -> Array:
         """Return L_cc⁻¹ r_c, by which a force on the contact unknowns changes y_c."""
         if r_c.ndim == 2:
-            return _by_corner(blas.dtrsm, self.corner, r_c)
+            return _multiply_rows(blas.dtrsm, self.corner, r_c)
         return np.asarray(blas.dtrsv(self.corner, r_c, lower=1)) if len(r_c) else r_c.copy()
 
     def solve(self, b: Array) -> Array:
@@ -125,12 +147,14 @@ class ContactLast:
         return self.backward(self.free(self.forward(b)))
 
     def _substitute(self, system: int, y: Array | None = None) -> None:
+        """Substitute by supernodes, forward or backward, in place."""
         y = self._y if y is None else y
-        if self._library.substitute(self._factor, system, y.size // self.rows, at(y)):
+        (place,) = addresses(y)
+        if self._library.substitute(self._factor, system, y.size // self.rows, place):
             raise MemoryError("CHOLMOD has no memory left for a substitution")
 
     def _forward_many(self, b: Array) -> Array:
-        """y_c (k, m) of loads (k, rows), on one rank."""
+        """Return y_c (k, m) of loads (k, rows), on one rank."""
         if not self._columns:
             self._many = np.take(b, self._order, axis=1)
             self._substitute(FORWARD, self._many)
@@ -138,65 +162,65 @@ class ContactLast:
         room = self.rows * AT_ONCE * (1 + len(b) // AT_ONCE)
         if self._many.size != room:
             self._many = np.empty(room)
-            self._constant = (self.rows, *self._arguments[:-1], at(self._order))
-        y_c, b = np.empty((len(b), len(self._c))), np.ascontiguousarray(b)
-        self._library.forward_many(len(b), *self._constant, at(b), at(self._many), at(y_c))
+            self._constant = (self.rows, *self._arguments[:-1], *addresses(self._order))
+        b = np.ascontiguousarray(b)
+        y_c = np.empty((len(b), len(self._c)))
+        self._library.forward_many(len(b), *self._constant, *addresses(b, self._many, y_c))
         return self.reduced(y_c)
 
     def _backward_many(self, x_c: Array) -> Array:
-        x, x_c = np.empty((len(x_c), self.rows)), np.ascontiguousarray(x_c)
+        """Return x (k, rows) with contact unknowns x_c (k, m), on one rank."""
+        x_c = np.ascontiguousarray(x_c)
+        x = np.empty((len(x_c), self.rows))
         if self._columns:
-            self._library.backward_many(len(x), *self._constant, at(x_c), at(self._many), at(x))
+            self._library.backward_many(len(x), *self._constant, *addresses(x_c, self._many, x))
             return x
-        self._many[:, self._inner :] = _by_corner(blas.dtrmm, self.corner, x_c, trans=1)
+        self._many[:, self._inner :] = _multiply_rows(blas.dtrmm, self.corner, x_c, trans=1)
         self._substitute(BACKWARD, self._many)
         self._many[:, self._inner :] = x_c
         x[:, self._order] = self._many
         return x
 
 
-def _by_corner(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Array:
+def _multiply_rows(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Array:
     """Return what a routine of BLAS makes of the triangle and of every row."""
-    return (
-        np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T)
-        if rows.size
-        else rows.copy()
-    )
+    if not rows.size:
+        return rows.copy()
+    return np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T)
 
 
 def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
-    """Return the rows of A in the order of elimination."""
-    inner = np.ones(A.shape[0], dtype=bool)
-    inner[last] = False
-    rows, dissect = np.flatnonzero(inner), len(inner) > FEW_ROWS
-    among, found = np.full(len(inner), -1, dtype=np.int32), np.empty(len(rows), dtype=np.int32)
-    among[rows] = np.arange(len(rows))
-    for way in (dissect, False):  # a CHOLMOD without METIS has minimum degree
-        if not library.order(len(inner), at(A.indptr), at(A.indices), at(among), way, at(found)):
-            return np.concatenate([rows[found], last]).astype(np.int32)
+    """Return the rows of A in the order of elimination: those of little fill, then ``last``."""
+    is_inner = np.ones(A.shape[0], dtype=bool)
+    is_inner[last] = False
+    inner = np.flatnonzero(is_inner)
+    number = np.full(len(is_inner), -1, dtype=np.int32)  # among the inner rows
+    number[inner] = np.arange(len(inner))
+    order = np.empty(len(inner), dtype=np.int32)
+    arrays = addresses(A.indptr, A.indices, number)
+    dissect = len(is_inner) > FEW_ROWS
+    for by_metis in (dissect, False):  # a CHOLMOD without METIS has minimum degree
+        if not library.order(len(is_inner), *arrays, by_metis, *addresses(order)):
+            return np.concatenate([inner[order], last]).astype(np.int32)
     raise ArithmeticError("CHOLMOD cannot order the matrix")
 
 
 def _factorise(library: Any, A: sp.csr_matrix, order: NDArray[np.int32]) -> Any:
-    made = ctypes.c_void_p()
-    arrays = (at(one) for one in (A.indptr, A.indices, A.data, order))
-    if not np.isfinite(A.data).all() or library.factorise(len(order), *arrays, ctypes.byref(made)):
+    """Return the factor, an object of the library."""
+    factor = ctypes.c_void_p()
+    arrays = addresses(A.indptr, A.indices, A.data, order)
+    is_finite = np.isfinite(A.data).all()
+    if not is_finite or library.factorise(len(order), *arrays, ctypes.byref(factor)):
         raise ArithmeticError("CHOLMOD cannot factorise the matrix")
-    return made
+    return factor
 
 
-def _readable(A: sp.csr_matrix) -> sp.csr_matrix:
+def _with_short_indices(A: sp.csr_matrix) -> sp.csr_matrix:
     """Return a symmetric matrix with the sorted 32 bit indices that CHOLMOD reads."""
     if A.nnz > np.iinfo(np.int32).max:
         raise ArithmeticError("the matrix has too many entries for 32 bits")
-    indices = A.indices.astype(np.int32, copy=False), A.indptr.astype(np.int32, copy=False)
-    made = sp.csr_matrix((A.data.astype(float, copy=False), *indices), shape=A.shape)
-    return made if made.has_sorted_indices else made.sorted_indices()
-
-
-def at(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return where an array lies in memory.
-
-    ``array.ctypes`` takes several times as long to tell.
-    """
-    return ctypes.c_void_p(array.__array_interface__["data"][0])
+    values = A.data.astype(float, copy=False)
+    indices = A.indices.astype(np.int32, copy=False)
+    starts = A.indptr.astype(np.int32, copy=False)
+    short = sp.csr_matrix((values, indices, starts), shape=A.shape)
+    return short if short.has_sorted_indices else short.sorted_indices()

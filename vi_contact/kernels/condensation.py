@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from .algebra import Array, EffectiveMatrix, Indices, Mask
+from ..core.algebra import Array, EffectiveMatrix, Indices, Mask
+from ..core.surfaces import ContactSurface
 from .contact_last import ContactLast
-from .surfaces import ContactSurface
 
 
 def condense(

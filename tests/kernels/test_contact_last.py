@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from vi_contact.core import compiled, contact_last, packages
+from vi_contact.core import packages
 from vi_contact.core.algebra import Array, SerialComm
-from vi_contact.core.compiled import cholmod, library
-from vi_contact.core.contact_last import ContactLast
+from vi_contact.kernels import compiler, contact_last
+from vi_contact.kernels.compiler import load_cholmod, load_loops
+from vi_contact.kernels.contact_last import ContactLast
 
 pytest.importorskip("petsc4py.PETSc")  # whose CHOLMOD is taken
 pytestmark = pytest.mark.serial
@@ -68,7 +69,7 @@ def test_parts_beside_dense_algebra(name: str, short: float, monkeypatch: Any) -
         np.random.default_rng(0).normal(size=A.shape[0]),
     )
     i = np.setdiff1d(np.arange(len(b)), c)
-    factor, inverse = ContactLast(cholmod(SerialComm()), A, c), np.linalg.inv(dense)
+    factor, inverse = ContactLast(load_cholmod(SerialComm()), A, c), np.linalg.inv(dense)
     limit = 50.0 * EPS * np.linalg.cond(dense)
     schur = dense[np.ix_(c, c)] - dense[np.ix_(c, i)] @ np.linalg.solve(
         dense[np.ix_(i, i)], dense[np.ix_(i, c)]
@@ -97,7 +98,7 @@ def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:
         A = grid(4, 4).tolil()
         A[5, 5] = wrong
         with pytest.raises(ArithmeticError):
-            ContactLast(cholmod(SerialComm()), sp.csr_matrix(A), np.array([3]))
+            ContactLast(load_cholmod(SerialComm()), sp.csr_matrix(A), np.array([3]))
 
 
 @pytest.fixture
@@ -111,7 +112,7 @@ def cold(tmp_path: Path, monkeypatch: Any) -> Any:
 
 def forget() -> None:
     """Ask for compiled functions anew."""
-    for one in (compiled._loops, compiled._with_cholmod, compiled._without_cholmod):
+    for one in (compiler._loops, compiler._with_cholmod, compiler._without_cholmod):
         one.cache_clear()
 
 
@@ -135,7 +136,7 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
 ) -> None:
     """Whatever is missing is told, and the loops that need no CHOLMOD go on where there is a
     compiler."""
-    monkeypatch.setattr(compiled, "LOOPS", small)
+    monkeypatch.setattr(compiler, "LOOPS", [small])
     caplog.set_level(logging.INFO)
     maps, said = tmp_path / "maps", ""
     line = "7f00-7f01 r-xp 00000000 08:01 12 {}\n"
@@ -147,7 +148,7 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
         said = "there is no C compiler that works"
     elif how == "no header":
         monkeypatch.setattr(
-            compiled, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
+            compiler, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
         )
         said = "there is no header cholmod.h beside /nowhere/lib/libcholmod.so.3"
     elif how == "no CHOLMOD":
@@ -163,18 +164,18 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
             + (how == "two") * line.format("/b/libcholmod-1.so.4")
             + "7f02-7f03 r-xp 0 08:01 0\n"
         )
-        monkeypatch.setattr(compiled, "MAPS", maps)
+        monkeypatch.setattr(compiler, "MAPS", maps)
         said = (
             "there are 2 files of CHOLMOD in this process"
             if how == "two"
             else "there are 0 files of CHOLMOD"
         )
-    assert cholmod(SerialComm()) is None and cholmod(SerialComm()) is None
+    assert load_cholmod(SerialComm()) is None and load_cholmod(SerialComm()) is None
     told = [record.getMessage() for record in caplog.records]
     assert (
         [one for one in told if one.startswith(NEEDS)] == [one for one in told if said in one] != []
     )
-    assert (library(SerialComm()) is None) == (how in ("no compiler", "no cache"))
+    assert (load_loops(SerialComm()) is None) == (how in ("no compiler", "no cache"))
     slow = sum(record.getMessage().startswith(SLOW) for record in caplog.records)
     assert slow == (how in ("no compiler", "no cache"))
     assert len(caplog.records) == 1 + slow
@@ -184,8 +185,9 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
 def test_the_loops_need_no_library_of_the_machine() -> None:
     """What every process loads names no CHOLMOD, and brings none."""
     script = (
-        "from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import "
-        "cholmod, library; print(library(SerialComm()) is not None, cholmod(SerialComm()), "
+        "from vi_contact.core.algebra import SerialComm; from vi_contact.kernels.compiler import "
+        "load_cholmod, load_loops; "
+        "print(load_loops(SerialComm()) is not None, load_cholmod(SerialComm()), "
         "'cholmod' in open('/proc/self/maps').read())"
     )
     told = subprocess.run(
@@ -200,24 +202,24 @@ def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
     """Structures change between versions: the compiled file itself compares."""
     if not packages.petsc_has("cholmod"):
         pytest.skip("PETSc has no CHOLMOD here")
-    header = compiled._header(compiled.cholmod_of_petsc()) / "cholmod.h"
+    header = compiler._header(compiler.cholmod_of_petsc()) / "cholmod.h"
     other = tmp_path / "cholmod.h"
     other.write_text(
         f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n'
     )
-    monkeypatch.setattr(compiled, "_header", lambda file: tmp_path)
-    monkeypatch.setattr(compiled, "LOOPS", small)
+    monkeypatch.setattr(compiler, "_header", lambda file: tmp_path)
+    monkeypatch.setattr(compiler, "LOOPS", [small])
     forget()
-    assert cholmod(SerialComm()) is None
+    assert load_cholmod(SerialComm()) is None
 
 
 def test_a_file_that_cannot_be_loaded_is_made_again(small: Path) -> None:
     """As after a change of CHOLMOD."""
-    file = compiled.compiled(small, [])
+    file = compiler.compile_library([small], [])
     file.write_bytes(b"not a library")
     os.utime(file, (0, 0))
     assert (
-        compiled.compiled(small, []) == file
+        compiler.compile_library([small], []) == file
         and file.stat().st_size > 1000
         and file.stat().st_mtime > 0
     )
@@ -225,17 +227,17 @@ def test_a_file_that_cannot_be_loaded_is_made_again(small: Path) -> None:
 
 def test_another_library_is_another_file(small: Path, tmp_path: Path) -> None:
     """What was compiled beside a library is not taken beside another one at the same place."""
-    beside = compiled.compiled(small, [])
-    first = compiled.compiled(small, [], beside)
+    beside = compiler.compile_library([small], [])
+    first = compiler.compile_library([small], [], beside)
     os.utime(beside, (1, 1))
-    assert len({beside, first, compiled.compiled(small, [], beside)}) == 3
+    assert len({beside, first, compiler.compile_library([small], [], beside)}) == 3
 
 
 def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> None:
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
     script = (
-        "import pathlib; from vi_contact.core import compiled; source = "
-        f"pathlib.Path({str(small)!r}); print(compiled.compiled(source, []))"
+        "import pathlib; from vi_contact.kernels import compiler; source = "
+        f"pathlib.Path({str(small)!r}); print(compiler.compile_library([source], []))"
     )
     runs = [
         subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
