@@ -56,7 +56,7 @@ SHAPES = {
 def test_points_of_thin_bodies(name):
     """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the
     greatest entry."""
-    for t in (0.0063, 0.125, 2.5):
+    for t in (0.0063, 0.125, 0.375, 2.5):
         found, exact = in_time(SHAPES[name], t), in_time(SHAPES[name], t, MANY)
         for kind in ("single", "double", "hyper"):
             size = np.abs(getattr(exact, kind)).max()

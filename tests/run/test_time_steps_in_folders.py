@@ -67,9 +67,7 @@ PLANS = [
 @pytest.mark.slow
 @serial
 @pytest.mark.parametrize(
-    "scheme, plan",
-    [*zip((HALF, NEWMARK, DISSIPATIVE), PLANS, strict=True)],
-    ids=repr,
+    "scheme, plan", [*zip((HALF, NEWMARK, DISSIPATIVE), PLANS, strict=True)], ids=repr
 )
 def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: Any):
     """From checkpoints here and there, also right after halved steps: state and files of the

@@ -48,7 +48,7 @@ def test_alpha_zero_is_newmark() -> None:
 def test_V92_mass_at_the_contact() -> None:
     """V1.3, four bounces at Courant number one: no gain on consistent mass; two with a dt that
     resolves the highest frequency (Courant number 0.1): the energy multiplies. On redistributed
-    mass neither, there one of them (V9.4)."""
+    mass no gain in four bounces at one, nor in one bounce at 0.1 (V9.4)."""
     for mass, elements, courant, t_end, low, high in (
         (ConsistentMass(), 100, 1.0, 12, 0.94, 0.96),
         (Redistributed(), 100, 1.0, 12, 0.95, 0.965),

@@ -89,7 +89,7 @@ def test_V92_no_energy_from_contact_on_either_mass(courant: float, ends: float, 
 
 
 def test_V92_falling_bar_with_a_small_step() -> None:
-    """V1.2 on consistent mass at Courant number 0.1, where Newmark reaches 37 E0: energy is never
+    """V1.2 on consistent mass at Courant number 0.1, where Newmark reaches 11 E0: energy is never
     exceeded."""
     problem = bouncing(50, mass=ConsistentMass())
     energies = [

@@ -115,17 +115,19 @@ def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 1
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("scheme", "fine", "error", "gain"),
-    [(MIDPOINT, 2e-3, 3e-4, 48.0), (vc.MoreauJean(), 4e-3, 0.03, 3.0)],
+    ("scheme", "fine", "t_end", "error", "gain"),
+    [(MIDPOINT, 2e-3, 4.0, 3e-4, 12.0), (vc.MoreauJean(), 4e-3, 2.3, 0.03, 3.0)],
     ids=["displacements", "velocities"],
 )
-def test_stick_slip_on_a_belt(scheme: Any, fine: float, error: float, gain: float) -> None:
-    """Rides on the belt to 0.06 m, slips back, is caught and rides on, as the differential equation
-    says. Order 2 where the rate is that of the mean reaction, with an eighth of the step; order 1,
-    with a quarter, with the impulses of Moreau and Jean."""
+def test_stick_slip_on_a_belt(
+    scheme: Any, fine: float, t_end: float, error: float, gain: float
+) -> None:
+    """Rides on the belt to 0.06 m, slips back, is caught: two cycles and a half of the differential
+    equation. Order 2 where the rate is that of the mean reaction; order 1, in the first cycle, with
+    the impulses of Moreau and Jean."""
     errors = []
-    for dt in (1.6e-2, fine):
-        run = reports(belted(DECAY, lambda t: started(t, 0.05)), dt, 2.3, scheme=scheme)
+    for dt in (4.0 * fine, fine):
+        run = reports(belted(DECAY, lambda t: started(t, 0.05)), dt, t_end, scheme=scheme)
         x, t = np.array([r.new.u[0] for r in run]), np.array([r.new.t for r in run])
         assert max(r.certificate.worst for r in run) <= 1e-11
         errors.append(np.abs(x - stick_slip(0.05, t)).max() / 0.06)
@@ -154,12 +156,12 @@ def test_oscillator_slides_to_rest() -> None:
         x = float(way.y[0, -1])
         turns.append(x)
     run = reports(
-        rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.132
+        rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.15
     )
     u = np.array([r.new.u[0] for r in run])
     peaks = u[1:-1][(np.diff(u)[:-1] * np.diff(u)[1:] <= 0.0) & (np.diff(u)[:-1] != 0.0)]
     assert len(turns) >= 3 and peaks == pytest.approx(turns, rel=0.0, abs=2e-4 * 0.45e-3)
-    assert u[-1] == u[-20] == peaks[-1]
+    assert u[-1] == u[-80] == peaks[-1]
 
 
 @pytest.mark.slow

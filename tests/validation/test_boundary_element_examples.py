@@ -160,7 +160,7 @@ def test_forces_are_collected_on_the_nodes_of_the_boundary_elements():
 
 def test_the_unsymmetric_form_at_twenty_elements():
     """B16: impulses within 0.2 % and energies within 1.5 % of those of the symmetric form, up to t
-    = 2: measured 0.03 and 0.25 %."""
+    = 2: measured 0.03 and 0.06 %."""
     given, steps = square(), 40
     operator = PoincareSteklov(given.operator.blocks, UNIT.rho, symmetric=False)
     other = replace(given, operator=operator, forces=given.forces[:steps])

@@ -92,18 +92,18 @@ def test_creation_of_energy_is_told() -> None:
 
 @pytest.mark.serial
 def test_schemes_agree_when_dt_is_fine() -> None:
-    """Case b, 1¼ periods with an eighth of the seed's dt.
-
-    The extreme displacement of the top within 3 % (0.5 found).
-    """
+    """Case b, 2½ periods with an eighth of the seed's dt: the extreme displacement of the top
+    within 10 % (6 found), that of the first half within 3 % (0.5)."""
     model = wall()
     found = {
-        name: run(model, "b", name, refined=8, steps=50, record=[Probe(model.probes())])
-        .history["u_x_12"]
-        .min()
+        name: run(model, "b", name, refined=8, steps=100, record=[Probe(model.probes())]).history[
+            "u_x_12"
+        ]
         for name in ("zwt", "trapezoidal", "hht", "contact-stabilised", "generalised-alpha")
     }
-    assert max(found.values()) == pytest.approx(min(found.values()), rel=0.03), found
+    for steps, bound in ((100, 0.1), (50, 0.03)):
+        lowest = [top[: 8 * steps + 1].min() for top in found.values()]
+        assert max(lowest) == pytest.approx(min(lowest), rel=bound), (steps, lowest)
 
 
 def test_the_default_needs_no_names() -> None:
