@@ -35,10 +35,10 @@ LONG = 64  # members of a list, from which on it is seen as an array
 LOCAL = ("indices", "mesh")  # of groups of cells and facets: each rank has its own
 # what ``users`` kept in each of the frames that this process is in
 _OPEN: list[list[ViContactError]] = []
+_NO_FRAME = nullcontext()  # of one rank, in every step
 
 
-@contextmanager
-def together(comm: Comm) -> Iterator[None]:
+def together(comm: Comm) -> AbstractContextManager[None]:
     """Open a frame at whose end errors are raised on all ranks.
 
     These are what ``users`` keeps in it, and what this rank raises. Collective.
@@ -48,9 +48,12 @@ def together(comm: Comm) -> Iterator[None]:
     within the frame between collective calls, and not by a function that ``users`` calls, may still
     leave the others waiting: give it a frame of its own.
     """
-    if comm.size == 1:
-        yield
-        return
+    return _NO_FRAME if comm.size == 1 else _frame(comm)
+
+
+@contextmanager
+def _frame(comm: Comm) -> Iterator[None]:
+    """Open the frame of ``together`` on several ranks."""
     kept: list[ViContactError] = []
     broken: Exception | None = None
     _OPEN.append(kept)
@@ -69,7 +72,9 @@ def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
 
     These may raise anywhere.
     """
-    return nullcontext() if type(value).__module__.startswith("vi_contact.") else together(comm)
+    if comm.size == 1 or type(value).__module__.startswith("vi_contact."):
+        return _NO_FRAME
+    return together(comm)
 
 
 def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> Exception:

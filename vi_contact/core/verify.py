@@ -4,7 +4,9 @@
 numpy alone computes, so that the file can be checked by eye.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from .step import StepProblem, StepResult
 # How far rounding may show in A x, relative to the largest entry of A times that of x; and how
 # much smaller than the displacements of a step a slip may be that friction is judged by.
 ROUNDING = 1e-5
+FEW = 5_000  # numbers in an array, up to which copies cost less than calls
 
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
@@ -84,16 +87,20 @@ def _sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
     reactions = surface.reaction_load(result.r_n, result.x.shape[-1], result.r_t)
     unbalanced = image - step.b + reactions
 
-    # Signorini: no overlap and no tension. A bilateral condition may pull, and its gap is zero.
-    gap = (
-        step.bound - surface.normal_values(result.x) + surface.compliance * result.r_n / step.scale
-    )
-    overlap = np.where(surface.bilateral, 0.0, np.minimum(gap, 0.0))
-    tension = np.where(surface.bilateral, 0.0, np.minimum(result.r_n, 0.0))
+    # Signorini: no overlap and no tension. Where springs carry, the gap grows with the force. A
+    # bilateral condition may pull, and its gap is zero.
+    gap = step.bound - surface.normal_values(result.x)
+    overlap = np.minimum(gap, 0.0)
+    tension = np.minimum(result.r_n, 0.0)
+    closed = result.active
+    if not surface.plain:
+        gap = gap + surface.compliance * result.r_n / step.scale
+        overlap = np.where(surface.bilateral, 0.0, np.minimum(gap, 0.0))
+        tension = np.where(surface.bilateral, 0.0, tension)
+        closed = closed | surface.bilateral
 
     # Complementarity, with the set that the impact law will see: no gap where it says closed, and
     # no force where it says open.
-    closed = result.active | surface.bilateral
     apart = np.where(closed, gap, 0.0)
     loose = np.where(closed, 0.0, result.r_n)
 
@@ -109,7 +116,8 @@ def _sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
         guess=step.guess,
         r_n=result.r_n,
     )
-    return [_Sizes(*sizes) for sizes in np.atleast_2d(_largest(surface.comm, arrays).T).tolist()]
+    largest = _largest(surface.comm, arrays)
+    return [_Sizes(*sizes) for sizes in (largest if result.x.ndim == 2 else [largest])]
 
 
 def _certificate(step: StepProblem, result: StepResult, sizes: _Sizes) -> Certificate:
@@ -154,22 +162,36 @@ def _friction(
     # A step slides a small part of the way, and rubs with a small part of the inertia.
     beyond_most, missing_most, limit_most, r_t_most, slip_most = _largest(
         surface.comm, (beyond, missing, limit, r_t_size, slip_size)
-    ).tolist()
+    )
     tangential_force = max(limit_most, r_t_most, ROUNDING**2 * force)
     way = max(slip_most, ROUNDING * length)
     return _over(beyond_most, tangential_force), _over(missing_most, tangential_force * way)
 
 
-def _largest(comm: Comm, arrays: tuple[NDArray[Any], ...]) -> NDArray[Any]:
+def _largest(comm: Comm, arrays: Sequence[NDArray[Any]]) -> list[Any]:
     """Return max |a| along the last axis of each array, over all ranks by one reduction.
 
-    Infinity stands for NaN, which no reduction keeps.
+    Infinity stands for NaN, which no reduction keeps. Of arrays with a row for each of several
+    steps it is a list for each step.
     """
-    sizes = np.array(
-        [np.maximum(a.max(axis=-1, initial=0.0), -a.min(axis=-1, initial=0.0)) for a in arrays]
-    )
-    sizes[np.isnan(sizes)] = np.inf
-    return sizes if comm.size == 1 else np.asarray(comm.max(sizes))
+    lengths = tuple([array.shape[-1] for array in arrays])
+    if arrays[0].size <= FEW and 0 not in lengths:
+        # Small steps cost what calls of numpy cost: one for all arrays, side by side.
+        joined = np.abs(np.concatenate(arrays, axis=-1))
+        sizes = np.maximum.reduceat(joined, _starts(lengths), axis=-1)
+    else:
+        # Large ones cost the memory that is read and written: no copy.
+        highest = [array.max(axis=-1, initial=0.0) for array in arrays]
+        lowest = [array.min(axis=-1, initial=0.0) for array in arrays]
+        sizes = np.maximum(highest, np.negative(lowest)).T
+    sizes = np.fmin(sizes, np.inf)  # which leaves numbers, and infinity for NaN
+    return (sizes if comm.size == 1 else comm.max(sizes)).tolist()
+
+
+@cache
+def _starts(lengths: tuple[int, ...]) -> list[int]:
+    """Return where arrays of these lengths begin when they lie side by side."""
+    return list(accumulate(lengths[:-1], initial=0))
 
 
 def _over(value: float, reference: float) -> float:
