@@ -13,9 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from ..core.algebra import total
 from ..core.certificate import Certificate
 from ..core.checks import instance, shown, whole
 from ..core.collective import agree
@@ -30,7 +27,7 @@ from .judged import Judged
 from .linear_steps import is_symmetric
 from .minimum import minimise
 from .model import Model
-from .newton import Found, solve_in_parts
+from .newton import Ended, solve_in_parts
 
 log = logging.getLogger(__name__)
 
@@ -48,17 +45,23 @@ NEWTON_STEPS, DESCENT_STEPS = 50, 500  # at most, unless told otherwise
 
 @dataclass(frozen=True)
 class Result:
-    """Hold the answer of ``solve``: u, the Function that was given, and what is known of it.
+    """Hold the answer of ``solve``, and what is known of it.
 
-    ``lambda_lower``, ``lambda_upper``: Functions of the multipliers, forces at points in the unit
-    of F >= 0. With F the vector of F(u; phi_i), F = lambda_lower - lambda_upper where bcs prescribe
-    nothing, and zero off the bounds. ``active``: how many unknowns are on their lower and upper
-    bounds, those where the multiplier is above zero. ``certificate``: relative residuals
-    (``core.certificate``): equilibrium of inactive unknowns, distance of active ones from their
-    bound (complementarity), signs of distances (penetration) and of multipliers (tension).
-    ``iterations``, ``inner``: steps, and iterations of ``method`` in them, of conjugate gradients
-    for an energy. ``reason``: why it ended, and whether u is a local minimum. ``seconds``: of this
-    rank's processor.
+    Attributes:
+        u: the Function that was given.
+        lambda_lower, lambda_upper: Functions of the multipliers, forces at points in the unit of
+            F >= 0. With F the vector of F(u; phi_i), F = lambda_lower - lambda_upper where bcs
+            prescribe nothing, and zero off the bounds.
+        active: how many unknowns are on their lower and upper bounds: where the multiplier is above
+            zero.
+        certificate: relative residuals (``core.certificate``): equilibrium of inactive unknowns,
+            distance of active ones from their bound (complementarity), signs of distances
+            (penetration) and of multipliers (tension).
+        iterations: steps of Newton's method, or downhill.
+        inner: iterations of ``method`` in them, of conjugate gradients for an energy.
+        method: the name of the method that solved the last linear problem.
+        reason: why it ended, and whether u is a local minimum.
+        seconds: of this rank's processor, for "setup" and "solve".
     """
 
     u: Any
@@ -90,95 +93,112 @@ def solve(
 ) -> Result:
     """Solve F(u; v - u) >= 0 for all v between bounds, or minimise an energy between them.
 
-    The minimum is a local one. u holds the first guess, and the answer.
-
-    ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v).
-    ``energy``: in its place a functional Pi(u), whose derivative is F; F need not be monotone then.
-    The answer satisfies the same conditions, and no direction of negative curvature is found there.
-    ``lower``, ``upper``: Functions on the space of u, Constants, numbers, one or one for each
-    component, or None. ``bcs``: dirichletbc on that space or its components; what they change in u
-    goes into it with the first step. ``J``: the Jacobian, else the derivative of F. ``method``:
-    TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes the first two where
-    J is symmetric, the last two elsewhere. ``petsc_options``: for it, and of an energy for the
-    preconditioner of conjugate gradients, e.g. {"pc_type": "hypre"}; under ``prefix`` on the
-    command line.
-
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which
-    for degrees above one is not everywhere. InputError for forms, bounds and bcs that do not fit;
-    StepFailure when the certificate stays above ``tolerance`` after ``iterations`` steps (None: 50,
-    and 500 of an energy), with the best u so far kept. Collective.
+    for degrees above one is not everywhere. Collective.
+
+    Args:
+        form: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v).
+        u: the Function to solve for; it holds the first guess, and then the answer.
+        energy: in the place of the form a functional Pi(u), whose derivative is F; F need not be
+            monotone then. The answer satisfies the same conditions, is a local minimum, and no
+            direction of negative curvature is found there.
+        lower: bounds from below: a Function on the space of u, a Constant, numbers, one or one for
+            each component, or None.
+        upper: bounds from above, as ``lower``.
+        bcs: dirichletbc on that space or its components; what they change in u goes into it with
+            the first step.
+        J: the Jacobian, else the derivative of F.
+        method: TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes the
+            first two where J is symmetric, the last two elsewhere.
+        petsc_options: for the method, and of an energy for the preconditioner of conjugate
+            gradients, e.g. {"pc_type": "hypre"}.
+        prefix: of these options on the command line.
+        tolerance: the largest residual of the certificate.
+        iterations: steps, at most; None: 50, and 500 of an energy.
+
+    Returns:
+        The answer, with multipliers and certificate.
+
+    Raises:
+        InputError: forms, bounds or bcs do not fit.
+        StepFailure: the certificate stays above the tolerance; u keeps the best values so far.
     """
     start = time.process_time()
-    most = NEWTON_STEPS if energy is None else DESCENT_STEPS
-    limit = whole("vi.solve", "iterations", most if iterations is None else iterations, least=1)
+    limit = NEWTON_STEPS if energy is None else DESCENT_STEPS
+    if iterations is not None:
+        limit = whole("vi.solve", "iterations", iterations, least=1)
     refuse_complex("vi.solve")
+    refuse_unknowns(u)
+    refuse_choices(form, energy, J, method)
+    choices = {
+        "lower": given_alike(lower),
+        "upper": given_alike(upper),
+        "J": J is None,
+        "energy": energy is None,
+        "method": method,
+        "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs,
+        "petsc_options": petsc_options,
+        "prefix": prefix,
+        "tolerance": tolerance,
+        "iterations": iterations,
+    }
+    agree(MpiComm(kept(u.function_space.mesh.comm)), "vi.solve", choices)
+    options = {} if petsc_options is None else petsc_options
+    settings = Volume(method or TaoTron(), options, prefix, tolerance)
+
+    problem = Problem(form, u, bcs, J, energy)
+    low, high = problem.bounds(lower, upper)
+    ready = time.process_time()
+    layers = OptionLayers(prefix, preconditioner(problem.comm.size), settings.petsc_options)
+    is_hill = False
+    try:
+        if energy is None:
+            methods = () if method is None else (method,)
+            ended = solve_in_parts(problem, low, high, settings, methods, limit)
+            if ended.failure or ended.doubted:
+                is_hill = curves_down(ended, layers)
+        else:
+            ended = minimise(problem, low, high, tolerance, limit, layers)
+    finally:
+        problem.close()
+
+    best = ended.best
+    steps = "Newton steps" if energy is None else "steps downhill"
+    reason = f"the certificate is {best.certificate.worst:.1e} after {ended.steps} {steps}"
+    if ended.failure:
+        cause = NEGATIVE if is_hill else ended.failure
+        raise failed(problem, ended, f"vi.solve: {reason}, above {tolerance:g}: {cause}")
+    problem.put(best.x)
+    if is_hill:
+        reason += f", {HILL}"
+        if problem.comm.rank == 0:
+            log.warning("vi.solve: %s", HILL)
+    if energy is not None:
+        reason += ", at a local minimum: no direction of negative curvature is found"
+    on_lower, on_upper = (problem.count(multiplier != 0.0) for multiplier in best.push)
+    lambda_lower, lambda_upper = (problem.spread(multiplier) for multiplier in best.push)
+    return Result(
+        u=u,
+        lambda_lower=lambda_lower,
+        lambda_upper=lambda_upper,
+        active=(on_lower, on_upper),
+        certificate=best.certificate,
+        iterations=ended.steps,
+        inner=ended.inner,
+        method=ended.method,
+        reason=reason,
+        seconds={"setup": ready - start, "solve": time.process_time() - ready},
+    )
+
+
+def refuse_unknowns(u: Any) -> None:
+    """Raise InputError unless u is a Function whose unknowns are values of one field at points."""
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
         raise refused(
             "the unknowns of u are not values of one field at points: take Lagrange or DG0, not "
             "mixed"
         )
-    refuse_choices(form, energy, J, method)
-    agree(
-        MpiComm(kept(u.function_space.mesh.comm)),
-        "vi.solve",
-        {
-            "lower": given_alike(lower),
-            "upper": given_alike(upper),
-            "J": J is None,
-            "energy": energy is None,
-            "method": method,
-            "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs,
-            "petsc_options": petsc_options,
-            "prefix": prefix,
-            "tolerance": tolerance,
-            "iterations": iterations,
-        },
-    )
-    settings = Volume(
-        method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance
-    )
-
-    problem = Problem(form, u, bcs, J, energy)
-    low, high = problem.bounds(lower, upper)
-    ready = time.process_time()
-    methods = () if method is None else (method,)
-    layers = OptionLayers(prefix, preconditioner(problem.comm.size), settings.petsc_options)
-    try:
-        if energy is None:
-            found = solve_in_parts(problem, low, high, settings, methods, limit)
-            hill = (found.failure or found.doubted) and curves_down(found, layers)
-        else:
-            found, hill = minimise(problem, low, high, tolerance, limit, layers), False
-    finally:
-        problem.close()
-
-    best, steps = found.best, "Newton steps" if energy is None else "steps downhill"
-    reason = f"the certificate is {best.certificate.worst:.1e} after {found.steps} {steps}"
-    if found.failure:
-        why = NEGATIVE if hill else found.failure
-        raise failed(problem, found, f"vi.solve: {reason}, above {tolerance:g}: {why}")
-    problem.put(best.x)
-    if hill:
-        reason += f", {HILL}"
-        if problem.comm.rank == 0:
-            log.warning("vi.solve: %s", HILL)
-    if energy is not None:
-        reason += ", at a local minimum: no direction of negative curvature is found"
-    active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
-    pushes, seconds = [problem.spread(one) for one in best.push], time.process_time() - ready
-    return Result(
-        u,
-        pushes[0],
-        pushes[1],
-        (active[0], active[1]),
-        best.certificate,
-        found.steps,
-        found.inner,
-        found.method,
-        reason,
-        {"setup": ready - start, "solve": seconds},
-    )
 
 
 def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
@@ -209,12 +229,12 @@ def preconditioner(ranks: int) -> Mapping[str, object | None]:
     return {"pc_type": "icc"} if ranks == 1 else {"pc_type": "bjacobi", "sub_pc_type": "icc"}
 
 
-def curves_down(found: Found, layers: OptionLayers) -> bool:
+def curves_down(ended: Ended, layers: OptionLayers) -> bool:
     """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u.
 
     Collective.
     """
-    best = found.best
+    best = ended.best
     problem = best.problem
     if best.broken or problem.constant:
         return False
@@ -229,13 +249,13 @@ def curves_down(found: Found, layers: OptionLayers) -> bool:
     return negative
 
 
-def failed(problem: Problem, found: Found, sentence: str) -> StepFailure:
+def failed(problem: Problem, ended: Ended, sentence: str) -> StepFailure:
     """Write the best values into u and return the error. Collective.
 
     It is the first guess where conditions were never met.
     """
-    if found.best.left:
+    if ended.best.left:
         problem.put_back()
         return StepFailure(f"{sentence} (u holds the first guess)")
-    problem.put(found.best.x)
+    problem.put(ended.best.x)
     return StepFailure(f"{sentence} (u holds the best iterate)")

@@ -15,7 +15,7 @@ from ..solvers.volume.options import OptionLayers
 from .forms import Problem
 from .judged import Judged
 from .model import Model
-from .newton import Found, begin
+from .newton import Ended, begin
 
 ACCEPTED = 1e-4  # the part of the promised decrease that a step must bring
 POOR, GOOD = 0.25, 0.75  # parts of it below which the radius shrinks and above which it grows
@@ -34,13 +34,13 @@ NO_DESCENT = (
 
 def minimise(
     problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
-) -> Found:
+) -> Ended:
     """Return where the descent ends: at a point that is found, or with a failure.
 
     Such a point has a certificate below the tolerance, and no direction of negative curvature is
     found there. ``layers``: options of the preconditioner. Collective.
     """
-    found = Found(begin(problem, lower, upper), method="trust region")
+    found = Ended(begin(problem, lower, upper), method="trust region")
     while found.best.left and not found.failure:
         carry_conditions(found, layers)
     if not found.failure:
@@ -48,7 +48,7 @@ def minimise(
     return found
 
 
-def carry_conditions(found: Found, layers: OptionLayers) -> None:
+def carry_conditions(found: Ended, layers: OptionLayers) -> None:
     """Take one step that carries Dirichlet conditions and bounds into the body.
 
     It goes as far as the energy is a number.
@@ -81,7 +81,7 @@ def carry_conditions(found: Found, layers: OptionLayers) -> None:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # energies that have no minimum
-def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) -> None:
+def descend(found: Ended, tolerance: float, limit: int, layers: OptionLayers) -> None:
     """Go down from the best point until it is a local minimum. Collective."""
     point = found.best
     energy = point.problem.energy()
@@ -92,7 +92,7 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
 
 
 def _follow(
-    found: Found, energy: float, tolerance: float, limit: int, layers: OptionLayers
+    found: Ended, energy: float, tolerance: float, limit: int, layers: OptionLayers
 ) -> None:
     """Take steps with a trust region from the best point, whose energy is given. Collective."""
     point = found.best

@@ -44,7 +44,7 @@ UNHELD = (
 
 
 @dataclass
-class Found:
+class Ended:
     """Hold where a method stopped.
 
     This is the best u, whether all conditions were met from the start, how many steps it took, with
@@ -91,7 +91,7 @@ def solve_in_parts(
     limit: int,
     *,
     carry: bool = True,
-) -> Found:
+) -> Ended:
     """Return where Newton's method ends.
 
     Where it fails as Dirichlet conditions change the first guess too much at once, they change it
@@ -130,13 +130,13 @@ def newton(
     limit: int,
     *,
     carry: bool = True,
-) -> Found:
+) -> Ended:
     """Return where Newton's method ends: below the tolerance of the settings, or with a failure.
 
     Collective.
     """
     point = begin(problem, lower, upper, carry=carry)
-    found = Found(point, at_once=point.left == 0.0)
+    found = Ended(point, at_once=point.left == 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
     limit = min(limit, REFINEMENTS) if problem.constant else limit
     while found.best.certificate.worst > settings.tolerance:
@@ -157,7 +157,7 @@ def newton(
     return found
 
 
-def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
+def take_step(found: Ended, point: Judged, steps: LinearSteps) -> float | None:
     """Take one step from a point, in u, and return what is then left.
 
     It goes towards the answer of the linear problem between the bounds or, where this one is not
@@ -177,7 +177,7 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
     return None
 
 
-def linear_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
+def linear_step(found: Ended, point: Judged, steps: LinearSteps) -> float | None:
     """Go towards the answer of the linear problem between the bounds; None if that fails.
 
     Collective.
@@ -194,7 +194,7 @@ def linear_step(found: Found, point: Judged, steps: LinearSteps) -> float | None
     return advance(point, x)
 
 
-def reduced(found: Found, point: Judged, steps: LinearSteps) -> float | None:
+def reduced(found: Ended, point: Judged, steps: LinearSteps) -> float | None:
     """Take a reduced step; None if that fails. Collective."""
     found.failure = NO_STEP
     try:
