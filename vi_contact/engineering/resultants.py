@@ -31,10 +31,8 @@ pressure_low and pressure_high are r_n / weight at its two ends, of the heel and
 base.
 """
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Annotated, Any
 
 import numpy as np
@@ -227,8 +225,34 @@ def _ratio(one: Array, other: Array) -> Array:
     return np.divide(one, other, out=np.full(one.shape, np.nan), where=other != 0.0)
 
 
-# unit, meaning
-_MEANING = tomllib.loads(files(__package__).joinpath("resultants.toml").read_text(encoding="utf-8"))
+# Quantity -> (unit, meaning).
+_MEANING: Columns = {
+    "uplift": ("-", "uplift ratio 1 - L_contact/L"),
+    "opening": ("m", "largest gap"),
+    "slip": ("m", "largest tangential displacement on the support"),
+    "force": ("N", "contact force on the body"),
+    "N": ("N", "normal force -F·n, compression positive"),
+    "T": ("N", "tangential force F·t on the body"),
+    "M": ("N m", "moment on the body about the centre, anticlockwise positive"),
+    "e": ("m", "eccentricity M/N; nan without normal force"),
+    "height": ("m", "height of the thrust above the centre; nan while open"),
+    "theta": (
+        "rad",
+        (
+            "rocking angle, anticlockwise positive; nan where the points of the part do not "
+            "determine it"
+        ),
+    ),
+    "settlement": ("m", "mean displacement towards the support"),
+    "level": (
+        "-",
+        ("height of the thrust above the lowest point over the height of the part; nan while open"),
+    ),
+    "sliding": ("m", "mean tangential displacement on the support; in space its size"),
+    "margin": ("-", "share of the friction that is left, 1 - |T|/limit; nan while open"),
+    "pressure_low": ("Pa", "contact pressure at the end where the longest coordinate is least"),
+    "pressure_high": ("Pa", "contact pressure at the end where the longest coordinate is largest"),
+}
 
 
 @dataclass

@@ -5,11 +5,9 @@ those of rank 0. Displacements and velocities are those of the equations: relati
 when an excitation shakes the body.
 """
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -23,16 +21,47 @@ from ..core.quantities import Unit
 from ..core.step import AXES, Columns, Report, Row, State
 from ..core.surfaces import ContactSurface
 from ..core.verify import Energies, energies, energy_balance
-from .files.table import WORDS
 
-_COLUMNS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
+_STEPS_COLUMNS: Columns = {
+    "t": ("s", "time at the end of the step"),
+    "k": ("-", "number of the step"),
+    "iterations": ("-", "iterations of the solver in this step"),
+    "certificate": ("-", "worst dimensionless residual of the inequality problem of this step"),
+    "escalated": ("-", "1 when the step needed another solver than the first, else 0"),
+    "a_g_{axis}": ("m/s²", "ground acceleration along {axis} at time t"),
+}
+_CONTACT_COLUMNS: Columns = {
+    "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
+    "contact_active": ("-", "number of closed contact points"),
+    "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
+    "contact_force_{axis}": ("N", "contact force on the body along {axis}, -Σ r_n n_{axis}"),
+    "contact_{axis}": ("m", "{axis} of the point of action, Σ r_n {axis} / Σ r_n; nan while open"),
+    "contact_min_gap": ("m", "smallest gap; nan without contact points"),
+    "contact_max_pressure": ("Pa", "largest contact pressure; nan without contact points"),
+    "pressure": ("Pa", "contact pressure r_n / weight of every contact point"),
+    "gap": ("m", "gap of every contact point"),
+    "active": ("-", "whether the contact point is closed"),
+}
+_FRICTION_COLUMNS: Columns = {
+    "friction_force_{axis}": ("N", "friction force on the body along {axis}"),
+    "contact_max_slip": (
+        "m",
+        "largest tangential displacement on the support; nan without contact points",
+    ),
+    "traction_t": (
+        "Pa",
+        "tangential reaction r_t / weight of every contact point, in its nodal tangents",
+    ),
+    "slip": ("m", "tangential displacement of every contact point, in its nodal tangents"),
+}
 
 
-def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
-    """Columns of a table of recorders.toml, for these axes."""
+def _named(columns: Columns, axes: str) -> Columns:
+    """Return the columns with {axis} in their names and meanings filled in for each of the axes."""
     return {
         name.format(axis=one): (unit, meaning.format(axis=one))
-        for name, (unit, meaning) in words.items()
+        for name, (unit, meaning) in columns.items()
         for one in (axes if "{axis}" in name else "-")
     }
 
@@ -62,7 +91,7 @@ class Steps:
 
     def columns(self) -> Columns:
         """Name t, k, iterations, certificate, escalated, a_g_x, and so on."""
-        return _named(_COLUMNS["steps"], self._axes)
+        return _named(_STEPS_COLUMNS, self._axes)
 
     def _row(
         self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False
@@ -102,7 +131,15 @@ class Energy:
     """
 
     _COLUMNS: ClassVar[Columns] = {
-        name: ("J", meaning) for name, meaning in WORDS["columns"].items()
+        "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
+        "energy_strain": ("J", "strain energy ½ uᵀKu"),
+        "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
+        "loss_damping": ("J", "work of viscous damping since the start"),
+        "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
+        "loss_friction": ("J", "work of friction since the start"),
+        "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
+        "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
+        "energy_defect": ("J", "what the ledger cannot explain since the start"),
     }
     _SUMS = tuple(_COLUMNS)[2:]
 
@@ -222,9 +259,9 @@ class Contact:
 
         Call ``start`` first.
         """
-        every = _named(
-            _COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes
-        )
+        every = _named(_CONTACT_COLUMNS, self._axes)
+        if self._frictional:
+            every = {**every, **_named(_FRICTION_COLUMNS, self._axes)}
         return {
             name: about for name, about in every.items() if self.arrays or name not in self._ARRAYS
         }

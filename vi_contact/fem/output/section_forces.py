@@ -3,11 +3,9 @@
 The cuts go along element sides or through elements.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -30,8 +28,32 @@ from .nodal_work import Loads, NodalWork, Rigid, check_actions, rigid_motions
 # 90°
 ON_LINE = 1e-6
 UNCOVERED = 1e-3  # of the length of a cut in the plane: what the elements on it may miss
-# unit, meaning
-_QUANTITIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# Resultants of a cut: quantity -> (unit, meaning).
+_IN_THE_PLANE: Columns = {
+    "N": ("N", "normal force, tension positive"),
+    "V": ("N", "shear force, on the part right of the cut along it"),
+    "M": ("N m", "bending moment, positive with tension at the end of the cut"),
+}
+_IN_SPACE: Columns = {
+    "N": ("N", "normal force, tension positive"),
+    "V_2": ("N", "shear force along the first side of the cut, on the part behind it"),
+    "V_3": ("N", "shear force along the second side of the cut, on the part behind it"),
+    "M_t": ("N m", "twisting moment about the normal of the cut, on the part behind it"),
+    "M_2": (
+        "N m",
+        (
+            "bending moment about the first side of the cut, positive with tension towards the "
+            "second"
+        ),
+    ),
+    "M_3": (
+        "N m",
+        (
+            "bending moment about the second side of the cut, negative with tension towards "
+            "the first"
+        ),
+    ),
+}
 
 
 @dataclass
@@ -116,9 +138,7 @@ class SectionForces:
         return {
             f"{quantity}_{label}": (unit, f"{text}, section {label}")
             for label, ends in self.cuts.items()
-            for quantity, (unit, text) in _QUANTITIES[
-                "plane" if len(ends) == 2 else "space"
-            ].items()
+            for quantity, (unit, text) in (_IN_THE_PLANE if len(ends) == 2 else _IN_SPACE).items()
         }
 
     def start(
