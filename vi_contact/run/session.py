@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
+from math import isfinite
 from signal import Signals
 from timeit import repeat
 from typing import Any, TypeVar
@@ -19,7 +20,7 @@ import numpy as np
 from ..core.algebra import Comm, largest
 from ..core.checks import on_all
 from ..core.collective import together, users
-from ..core.errors import InputError, Interrupted, OutOfTime
+from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
 from ..core.stages import done
 from ..core.step import Recorder, Report, Row, State, StepResult
 from ..engineering.damping import NOT_COMPUTED, damping_in_words
@@ -31,7 +32,6 @@ from .files.writer import Writer
 from .march import March
 from .memory import in_words, memory
 from .method import Method
-from .recorders import refuse_overflow
 from .request import RunRequest
 from .sampling import sampling_warning
 from .solution import Solution, energy_warning
@@ -262,7 +262,7 @@ class Session:
                 call: Callable[[], Row] = partial(recorder.row, report)
                 row.update(users(name, call, nothing, as_it_is=True))
             self.table.check(row)
-            refuse_overflow(row)
+            _refuse_overflow(row)
         writer.append(row)
         self.last = report
 
@@ -374,6 +374,21 @@ class Session:
 
         # the first is slower
         return float(np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:]))
+
+
+def _refuse_overflow(row: Row) -> None:
+    """Raise StepFailure for a number beyond those of the machine.
+
+    It is infinite, or NaN in the energy ledger.
+    """
+    for name, value in row.items():
+        if not isinstance(value, float) or isfinite(value):
+            continue
+        if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
+            raise StepFailure(
+                f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, too large for the "
+                "machine: check the sizes and units of loads, motions and initial data"
+            )
 
 
 def _locked(value: T) -> T:

@@ -25,7 +25,8 @@ from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
 from .method import Method, checked_method, with_defaults
-from .recorders import Contact, Energy, Steps
+from .recorders import Contact, Energy
+from .recorders.steps import Steps
 from .request import CrossCheck, RunRequest
 from .session import Session
 from .solution import Solution
