@@ -5,8 +5,8 @@ from ...core.step import Columns
 
 def along_axes(columns: Columns, axes: str) -> Columns:
     """Return the columns with {axis} in their names and meanings filled in for each of the axes."""
-    return {
-        name.format(axis=one): (unit, meaning.format(axis=one))
-        for name, (unit, meaning) in columns.items()
-        for one in (axes if "{axis}" in name else "-")
-    }
+    named = {}
+    for name, (unit, meaning) in columns.items():
+        for axis in axes if "{axis}" in name else "-":  # once where the name has no axis
+            named[name.format(axis=axis)] = (unit, meaning.format(axis=axis))
+    return named

@@ -40,16 +40,14 @@ _FRICTION_COLUMNS: Columns = {
 }
 
 
-def told_pressures(surface: ContactSurface) -> Mask | None:
+def mask_of_covered(surface: ContactSurface) -> Mask | None:
     """Return the conditions (m,) of this rank whose pressure counts among the largest.
 
-    It is None for all of them.
-
-    Where all on all ranks are ``uncovered`` all count. Collective.
+    It is None where all count: where none is ``uncovered``, or all on all ranks are. Collective.
     """
-    uncovered = (
-        np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
-    )
+    uncovered = surface.uncovered
+    if uncovered is None:
+        uncovered = np.zeros(surface.count, dtype=bool)
     left_out = total(surface.comm, np.count_nonzero(uncovered))
     return ~uncovered if 0 < left_out < surface.total else None
 
@@ -87,21 +85,23 @@ class Contact:
 
         Call ``start`` first.
         """
-        every = along_axes(_CONTACT_COLUMNS, self._axes)
+        columns = along_axes(_CONTACT_COLUMNS, self._axes)
         if self._frictional:
-            every = {**every, **along_axes(_FRICTION_COLUMNS, self._axes)}
-        return {
-            name: about for name, about in every.items() if self.arrays or name not in self._ARRAYS
-        }
+            columns = {**columns, **along_axes(_FRICTION_COLUMNS, self._axes)}
+        if self.arrays:
+            return columns
+        return {name: about for name, about in columns.items() if name not in self._ARRAYS}
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Return the row of the initial contact: of a gravity stage, or open."""
-        surface, self._problem, self._frictional = problem.surface, problem, problem.frictional
+        surface = problem.surface
+        self._problem = problem
+        self._frictional = problem.frictional
         self._axes = AXES[: surface.points.shape[1]]
         self._weight = total(surface.comm, surface.weights.sum())
-        self._told = told_pressures(surface)
+        self._covered = mask_of_covered(surface)
         self._numbers = [name for name in self.columns() if name not in self._ARRAYS]
         return self._row(state)
 
@@ -110,74 +110,94 @@ class Contact:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        surface, d, r_n = self._problem.surface, len(self._axes), state.r_n
-        gap, added = surface.gap(state.t) - surface.normal_values(state.u), np.add.reduce
-        gap = gap if surface.plain else gap + surface.compliance * r_n
-        pressure, rubbing = r_n / surface.weights, self._rubbing(state) if self._frictional else ()
+        """Return the row of a state. Collective."""
+        surface, r_n = self._problem.surface, state.r_n
+        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        if not surface.plain:
+            gap = gap + surface.compliance * r_n
+        pressure = r_n / surface.weights
+        rubbing = self._rubbing(state) if self._frictional else ()
+
+        # Sums over the conditions of this rank, then of all ranks in one message.
         sums = [
-            float(added(surface.weights[state.active])),
+            float(np.add.reduce(surface.weights[state.active])),
             float(np.count_nonzero(state.active)),
-            float(added(r_n)),
+            float(np.add.reduce(r_n)),
             *(r_n @ surface.normals).tolist(),
             *(r_n @ surface.points).tolist(),
         ]
-        sums = sums if surface.comm.size == 1 else surface.comm.sum(np.array(sums)).tolist()
+        if surface.comm.size > 1:
+            sums = surface.comm.sum(np.array(sums)).tolist()
         closed, count, resultant, *vectors = sums
-        # not -one: no negative zeros
-        force, place = ([0.0 - one for one in vectors[:d]], vectors[d:])
+        pull, moment = vectors[: len(self._axes)], vectors[len(self._axes) :]
+
+        # Largest values; moving obstacles also watch what lies between the points.
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
-        depth = max([depth, *(-one.smallest(state.t) for one in surface.watched)])
+        depth = max([depth, *(-watched.smallest(state.t) for watched in surface.watched)])
+
         values = [
             1.0 - closed / self._weight if self._weight else 1.0,
             int(count),
             resultant,
-            *force,
-            *[one / resultant if resultant else np.nan for one in place],
+            *[0.0 - component for component in pull],  # not -component: no negative zeros
+            *[component / resultant if resultant else np.nan for component in moment],
             -depth,
             highest,
         ]
-        values += [*self._friction_force(state), *farthest] if self._frictional else []
+        if self._frictional:
+            values += [*self._friction_force(state), *farthest]
         row: dict[str, Any] = dict(zip(self._numbers, values, strict=True))
         if self.arrays:
-            row.update(
-                zip(self._ARRAYS, self._whole(pressure, gap, state.active, *rubbing), strict=False)
-            )
+            arrays = self._gather(pressure, gap, state.active, *rubbing)
+            row.update(zip(self._ARRAYS, arrays, strict=False))  # without friction there are three
         return row
 
-    def _whole(self, *each: Any) -> Sequence[Any]:
-        """Return the arrays of all conditions on rank 0, by one message of each rank."""
+    def _gather(self, *arrays: Any) -> Sequence[Any]:
+        """Return the arrays of all conditions on rank 0, by one message of each rank.
+
+        They come as columns of one table: pressure, gap, active, and with friction the components
+        of traction and slip.
+        """
         if self._problem.surface.comm.size == 1:
-            return each
-        found = self._problem.surface.on_first(np.column_stack(each))
-        rubbing = np.hsplit(found[:, 3:], 2) if self._frictional else ()
-        return [part.copy() for part in (found[:, 0], found[:, 1], found[:, 2] > 0.0, *rubbing)]
+            return arrays
+        table = self._problem.surface.on_first(np.column_stack(arrays))
+        pressure, gap, active = table[:, 0], table[:, 1], table[:, 2] > 0.0
+        rubbing = np.hsplit(table[:, 3:], 2) if self._frictional else ()
+        return [array.copy() for array in (pressure, gap, active, *rubbing)]
 
     def _largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
-        """Return the largest depth, pressure and slip of all conditions; nan without any."""
-        if not self._problem.surface.total:
+        """Return the largest depth, pressure and slip of all conditions; nan without any.
+
+        Args:
+            gap: of the conditions of this rank (m,) [m].
+            pressure: the same (m,) [Pa].
+            slip: one array (m, d - 1) [m] with friction, none without.
+        """
+        surface = self._problem.surface
+        if not surface.total:
             return [np.nan] * (2 + len(slip))
-        some = len(gap) > 0
-        told = pressure if self._told is None else pressure[self._told]
+        covered = pressure if self._covered is None else pressure[self._covered]
         tops = [
-            -gap.item(gap.argmin()) if some else -np.inf,
-            told.item(told.argmax()) if len(told) else -np.inf,
+            -gap.item(gap.argmin()) if len(gap) else -np.inf,
+            covered.item(covered.argmax()) if len(covered) else -np.inf,
         ]
-        tops += [float(np.linalg.norm(one, axis=1).max()) if some else -np.inf for one in slip]
-        return (
-            tops
-            if self._problem.surface.comm.size == 1
-            else self._problem.surface.comm.max(np.array(tops)).tolist()
-        )
+        for vectors in slip:
+            tops.append(float(np.linalg.norm(vectors, axis=1).max()) if len(gap) else -np.inf)
+        if surface.comm.size == 1:
+            return tops
+        largest: list[float] = surface.comm.max(np.array(tops)).tolist()
+        return largest
 
     def _rubbing(self, state: State) -> tuple[Array, Array]:
-        """Tangential tractions and slips (m, d - 1)."""
+        """Return tangential tractions [Pa] and slips [m], (m, d - 1) each."""
         surface = self._problem.surface
         slip = surface.slip(state.u, state.t)
-        return (
-            np.zeros_like(slip) if state.r_t is None else state.r_t / surface.weights[:, None]
-        ), slip
+        if state.r_t is None:
+            return np.zeros_like(slip), slip
+        return state.r_t / surface.weights[:, None], slip
 
     def _friction_force(self, state: State) -> list[float]:
+        """Return the components [N] of the friction force on the body, -Σ r_t t. Collective."""
         surface, system = self._problem.surface, self._problem.system
         load = surface.reaction_load(np.zeros(surface.count), system.rows, state.r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))

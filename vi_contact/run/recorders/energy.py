@@ -13,16 +13,19 @@ from ...core.verify import Energies, energies, energy_balance
 class Energy:
     """Record the energy ledger of the run in joules. Works and losses are sums since the start.
 
-        W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic -
-        defect E = ½ vᵀMv + ½ uᵀKu of the free unknowns, with initial strains ½ vᵀMv + ½ uᵀKu -
-        f_0·u + ½ ∫ eps_0 : C eps_0
+        W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic
+                         - defect
 
-    with f_0·u = ∫ C eps_0 : eps(u), so that E is ½ ∫ (eps - eps_0) : C (eps - eps_0) if supports
-    are at zero. Rates of initial strains do work too. E has no energy that moved supports store by
-    themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is
-    the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the summed work
-    of the residual of the equation of motion; ``summary.json`` has its size over the largest energy
-    or work. Each step costs three products, and damping and impacts cost one more each.
+        E = ½ vᵀMv + ½ uᵀKu   of the free unknowns, and with initial strains
+        E = ½ vᵀMv + ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0
+
+    with f_0·u = ∫ C eps_0 : eps(u), so that the latter is ½ ∫ (eps - eps_0) : C (eps - eps_0) if
+    supports are at zero. Rates of initial strains do work too. E has no energy that moved supports
+    store by themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign.
+    W_input is the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the
+    summed work of the residual of the equation of motion; ``summary.json`` has its size over the
+    largest energy or work. Each step costs three products, and damping and impacts cost one more
+    each.
     """
 
     _COLUMNS: ClassVar[Columns] = {
@@ -50,11 +53,11 @@ class Energy:
         Works and losses are zero, or those of the run that is continued.
         """
         self._problem = problem
-        self._now, self._stored = (
-            energies(problem.equations, state.u, state.v),
-            self._of_strains(state),
-        )
-        self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._SUMS}
+        self._now = energies(problem.equations, state.u, state.v)
+        self._stored = self._stored_by_strains(state)
+        self._sums = dict.fromkeys(self._SUMS, 0.0)
+        if resumed is not None:
+            self._sums = {term: float(resumed[term]) for term in self._SUMS}
         return self._row()
 
     def _row(self) -> Row:
@@ -64,41 +67,39 @@ class Energy:
             **self._sums,
         }
 
-    def _of_strains(self, state: State) -> float:
+    def _stored_by_strains(self, state: State) -> float:
         """Return what initial strains add to ½ uᵀKu [J]."""
         initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
-        return (
-            0.0
-            if initial is None
-            else float(initial.energy(self._problem.cartesian(state.u), state.t))
-        )
+        if initial is None:
+            return 0.0
+        return float(initial.energy(self._problem.cartesian(state.u), state.t))
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
         system, new = self._problem.equations, report.new
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
-        with np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
+        with np.errstate(over="ignore", invalid="ignore"):  # the session refuses overflow
+            # The step without its impact: from the energies before it to those of v⁻.
             free = energies(system, new.u, report.v_minus)
             step = energy_balance(
                 self._problem, report.old, end, report.balance, before=self._now, after=free
             )
+            # The impact law changes velocities, and so the kinetic energy alone.
             self._now = free
-            if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
+            if new.v is not report.v_minus:
                 momentum = system.product("M", new.v)
                 kinetic = 0.5 * system.algebra.dot(new.v, momentum)
                 self._now = Energies(momentum, free.elastic, kinetic, free.strain)
-        impact, before, self._stored = (
-            free.kinetic - self._now.kinetic,
-            self._stored,
-            self._of_strains(new),
-        )
-        work = step.input + (self._stored - before)
+
+        # Rates of initial strains do the work by which the energy they store has grown.
+        before = self._stored
+        self._stored = self._stored_by_strains(new)
         losses = (
-            work,
+            step.input + (self._stored - before),
             step.damping,
             step.contact,
             step.friction,
-            impact,
+            free.kinetic - self._now.kinetic,
             step.algorithmic,
             step.defect,
         )

@@ -37,7 +37,8 @@ class LargestStrain:
             raise InputError(
                 "LargestStrain does not know the strains before the checkpoint: run from the start"
             )
-        self._problem, self._space = problem, space_of("LargestStrain", problem.system)
+        self._problem = problem
+        self._space = space_of("LargestStrain", problem.system)
         if self._space.dimension == 1:
             raise InputError("LargestStrain: a body on a line has no shear strain; leave it out")
         self._strains = CellStrains(self._space)
@@ -54,6 +55,7 @@ class LargestStrain:
         return self._space.expand(self._problem.cartesian(state.u), state.t).ravel()
 
     def _row(self, state: State) -> Row:
+        """Take a state into the largest values, and return the largest of all cells."""
         d = self._space.dimension
         eps = self._strains.mean(self._nodal(state) - self._begin)
         # dev(eps):dev(eps) = eps:eps - tr(eps)²/d, which round-off may leave just below zero

@@ -67,27 +67,33 @@ class Probe:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Find the nodes."""
-        self._problem, dimension = problem, problem.system.space.dimension
+        self._problem = problem
+        dimension = problem.system.space.dimension
         points = np.array(list(self.points.values()), dtype=float)
         if points.shape[1] != dimension:
             raise InputError(f"a probe point has {points.shape[1]} coordinates: give {dimension}")
-        self._nodes = self._found(problem, points)
+        self._nodes = self._find_nodes(problem, points)
         return self._row(
             state, lambda: np.tile(problem.ground_acceleration(state.t), (len(points), 1))
         )
 
-    def _found(self, problem: ContactProblem, points: Array) -> Indices:
+    def _find_nodes(self, problem: ContactProblem, points: Array) -> Indices:
+        """Return the nodes (p,) nearest to points (p, d) [m]."""
         return problem.system.space.find_nodes(points)
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
-        old, new, ground = report.old.t, report.new.t, self._problem.ground_acceleration
-        return self._row(
-            report.new,
-            lambda: self._sample(report.balance.a, new, 2) + 0.5 * (ground(old) + ground(new)),
-        )
+
+        def acceleration() -> Array:
+            ground = self._problem.ground_acceleration
+            t_old, t_new = report.old.t, report.new.t
+            mean = 0.5 * (ground(t_old) + ground(t_new))
+            return self._sample(report.balance.a, t_new, 2) + mean
+
+        return self._row(report.new, acceleration)
 
     def _row(self, state: State, acceleration: Callable[[], Array]) -> Row:
+        """Return the row of a state; ``acceleration`` (p, d) [m/s²] is called if it is recorded."""
         values = [self._sample(state.u, state.t, 0)]
         if self.velocity:
             values.append(self._sample(state.v, state.t, 1))
@@ -96,6 +102,13 @@ class Probe:
         return dict(zip(self.columns(), np.concatenate(values, axis=None).tolist(), strict=True))
 
     def _sample(self, x: Array, t: float, derivative: int) -> Array:
+        """Return values (p, d) at the nodes.
+
+        Args:
+            x: displacements, velocities or accelerations (n,) in the basis of the nodal frames.
+            t: the time [s], at which prescribed components are known.
+            derivative: 0, 1 or 2, which of them x is.
+        """
         return self._problem.system.space.sample(
             self._problem.cartesian(x), self._nodes, t, derivative
         )

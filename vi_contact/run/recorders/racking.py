@@ -44,27 +44,28 @@ class Racking:
 
     def columns(self) -> Columns:
         """Name the columns racking_<label>, rotation_<label>."""
-        found = {}
+        columns = {}
         for label in self.frames:
-            found[f"racking_{label}"] = ("rad", f"racking du_x/dy + du_y/dx of frame {label}")
-            found[f"rotation_{label}"] = (
-                "rad",
-                f"rotation of frame {label}, anticlockwise positive",
-            )
-        return found
+            shear = f"racking du_x/dy + du_y/dx of frame {label}"
+            columns[f"racking_{label}"] = ("rad", shear)
+            turn = f"rotation of frame {label}, anticlockwise positive"
+            columns[f"rotation_{label}"] = ("rad", turn)
+        return columns
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Find the nodes."""
-        self._problem, space = problem, problem.system.space
+        self._problem = problem
+        space = problem.system.space
         if space.dimension != 2:
             raise InputError(
                 f"Racking is for plane bodies and this one has {space.dimension} dimensions: leave "
                 "it out"
             )
         self._nodes = {
-            k: space.find_nodes(np.asarray(corners, float)) for k, corners in self.frames.items()
+            label: space.find_nodes(np.asarray(corners, float))
+            for label, corners in self.frames.items()
         }
         return self._row(state)
 
@@ -73,10 +74,12 @@ class Racking:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        found = {}
+        """Return racking and rotation of all frames in a state."""
+        row = {}
         u = self._problem.cartesian(state.u)
         for label, nodes in self._nodes.items():
             values = self._problem.system.space.sample(u, nodes, state.t)
             shear, turn = racking(self.frames[label], values)
-            found[f"racking_{label}"], found[f"rotation_{label}"] = float(shear), float(turn)
-        return found
+            row[f"racking_{label}"] = float(shear)
+            row[f"rotation_{label}"] = float(turn)
+        return row

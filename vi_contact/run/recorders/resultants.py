@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ...core.algebra import from_each, largest
+from ...core.algebra import Mask, from_each, largest
 from ...core.checks import array, column_name, optional, provides
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
@@ -43,6 +43,12 @@ _MEANING: Columns = {
     "pressure_low": ("Pa", "contact pressure at the end where the longest coordinate is least"),
     "pressure_high": ("Pa", "contact pressure at the end where the longest coordinate is largest"),
 }
+# What the normal displacements of a part tell of its motion, by dimension.
+_MOTIONS: Mapping[int, Sequence[str]] = {
+    1: (),
+    2: ("theta", "settlement"),
+    3: (*(f"theta_{axis}" for axis in AXES), "settlement"),
+}
 
 
 @dataclass
@@ -56,15 +62,15 @@ class Resultants:
     ``sliding`` less the first.
 
     Args:
-        name: names the columns; that of the group ``part`` when left out. centre: (d,) the point of
-            reference, of a footing the middle of its base, of a wall a point at the level from
-            which ``height`` counts [m]; the middle of the part at the level of its lowest point
-            when None.
-        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces
-            too: a node belongs wholly, with all its force and weight, to each part that it is in;
-            where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both
-            are None.
+        name: names the columns; that of the group ``part`` when left out.
+        centre: the point of reference (d,) [m], of a footing the middle of its base, of a wall a
+            point at the level from which ``height`` counts; the middle of the part at the level of
+            its lowest point when None.
+        where: points (m, d) [m], normals (m, d) -> boolean mask (m,) of the part.
         normal: direction of N towards the support; the part's mean contact direction when None.
+        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces
+            too: a node belongs wholly, with all its force and weight, to each part that it is in.
+            The whole surface when ``part`` and ``where`` are None.
 
     Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on
     a held support. InputError for both part and where, and for a part of no contact points.
@@ -77,8 +83,9 @@ class Resultants:
     part: Any = None
 
     def __post_init__(self) -> None:
-        own = self.name if isinstance(self.name, str) else column_name("part name", self.name)
-        self.name = own or getattr(self.part, "name", "")
+        if not isinstance(self.name, str):
+            column_name("part name", self.name)
+        self.name = self.name or getattr(self.part, "name", "")
         column_name("part name", self.name)
         check_part(self.name, self.centre, self.where, self.normal)
         if self.part is not None and self.where is not None:
@@ -90,15 +97,16 @@ class Resultants:
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
-        found = {}
+        columns = {}
         for quantity in self._quantities:
-            kind, _, axis = ("", "", "") if quantity in _MEANING else quantity.partition("_")
-            unit, text = _MEANING[kind or quantity]
-            found[f"{quantity}_{self.name}"] = (
-                unit,
-                f"{text}{f' along {axis}' if axis else ''}, part {self.name}",
-            )
-        return found
+            kind, axis = quantity, ""
+            if quantity not in _MEANING:  # a component, such as force_x
+                kind, _, axis = quantity.partition("_")
+            unit, text = _MEANING[kind]
+            if axis:
+                text = f"{text} along {axis}"
+            columns[f"{quantity}_{self.name}"] = (unit, f"{text}, part {self.name}")
+        return columns
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
@@ -107,85 +115,92 @@ class Resultants:
 
         Collective.
         """
-        self._surface, self._problem = problem.surface, problem
+        self._problem = problem
+        self._surface = problem.surface
         whole = problem.surface.whole()
-        where = self.where if self.part is None else self._chosen(whole)
+        where = self.where if self.part is None else self._where(whole)
         self._part = Part(self.name, whole, self.centre, where, self.normal, problem.surface.slots)
         return self._row(state)
 
-    def _chosen(self, whole: ContactSurface) -> Where:
-        """Return what picks the part out of all conditions.
+    def _where(self, whole: ContactSurface) -> Where:
+        """Return what picks the conditions of ``part`` out of all. Collective."""
+        chosen = self._in_group(whole) if hasattr(self.part, "indices") else self._in_box(whole)
+        return lambda points, normals: chosen
 
-        Collective.
-        """
-        if hasattr(self.part, "indices"):
-            space: Any = self._problem.system.space
-            provides(
-                f"part '{self.name}'",
-                "the system's space",
-                space,
-                ("facet_blocks",),
-                "use one of fem.assemble",
+    def _in_box(self, whole: ContactSurface) -> Mask:
+        """Return which of all conditions (m,) are in the box ``part``, its faces included."""
+        low, high = np.sort(np.asarray(self.part, dtype=float), axis=0)
+        slack = DETERMINED * np.ptp(whole.points, axis=0).max()
+        inside = (whole.points >= low - slack) & (whole.points <= high + slack)
+        return np.asarray(np.all(inside, axis=1))
+
+    def _in_group(self, whole: ContactSurface) -> Mask:
+        """Return which of all conditions (m,) are in the boundary group ``part``. Collective."""
+        space: Any = self._problem.system.space
+        comm = self._surface.comm
+        owner = f"part '{self.name}'"
+        remedy = "use one of fem.assemble"
+        provides(owner, "the system's space", space, ("facet_blocks",), remedy)
+        nodes = from_each(comm, space.nodes[space.facet_blocks(self.part.indices)])
+        chosen = np.isin(whole.nodes, np.concatenate(nodes))  # type: ignore[arg-type]
+
+        # A group that only touches the contact at an edge is a mistake: it has to have a facet all
+        # of whose corners are contact nodes, or clamped ones.
+        clamped = from_each(comm, space.nodes[space.held.all(axis=1)])
+        contact = np.concatenate([whole.nodes, *clamped])
+        touching = np.isin(space.corners_of_facets(self.part.indices), contact)
+        if not largest(comm, touching.all(axis=1).any()):
+            raise InputError(
+                f"{owner}: its group has no whole facet in contact: give a group of the contact, "
+                "or a box"
             )
-            own = space.nodes[space.facet_blocks(self.part.indices)]
-            found = np.isin(whole.nodes, np.concatenate(from_each(self._surface.comm, own)))  # type: ignore[arg-type]
-            clamped = from_each(self._surface.comm, space.nodes[space.held.all(axis=1)])
-            touching = np.isin(
-                space.corners_of_facets(self.part.indices), np.concatenate([whole.nodes, *clamped])
-            )
-            if not largest(self._surface.comm, touching.all(axis=1).any()):
-                raise InputError(
-                    f"part '{self.name}': its group has no whole facet in contact: give a group of "
-                    "the contact, or a box"
-                )
-            alone = found.copy()
-            for rows in whole.corners:
-                alone[rows] = False
-            mean = whole.weights[alone] @ whole.normals[alone]
-            for rows in whole.corners:  # of a corner the face that is in the group
-                found[rows] &= np.arange(len(rows)) == np.argmax(whole.normals[rows] @ mean)
-        else:
-            low, high = np.sort(np.asarray(self.part, dtype=float), axis=0)
-            slack = DETERMINED * np.ptp(whole.points, axis=0).max()
-            found = np.all((whole.points >= low - slack) & (whole.points <= high + slack), axis=1)
-        return lambda points, normals: found
+
+        # A node at a corner has a condition for each face: the one counts whose direction is
+        # nearest to the mean of the conditions of the group that are not at corners.
+        alone = chosen.copy()
+        for rows in whole.corners:
+            alone[rows] = False
+        mean = whole.weights[alone] @ whole.normals[alone]
+        for rows in whole.corners:
+            nearest = np.argmax(whole.normals[rows] @ mean)
+            chosen[rows] &= np.arange(len(rows)) == nearest
+        return chosen
 
     def row(self, report: Report) -> Row:
         """Return the values of a step."""
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        """Return sums and maxima of this rank's conditions, then of all ranks."""
+        """Return the row of a state. Collective."""
         surface, part, r_n, d = self._surface, self._part, state.r_n, self._part.dimension
-        u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
+        u_n = surface.normal_values(state.u)
+        slip = surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
-        sums = part.sums(
-            r_n[None], None if state.r_t is None else state.r_t[None], state.active[None]
-        )
-        limit = self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()
+
+        # What adds up over the conditions: of this rank, then of all ranks in one message.
+        r_t = None if state.r_t is None else state.r_t[None]
+        forces = part.sums(r_n[None], r_t, state.active[None])[0]
+        motion = u_n[part.mask] @ part.fit
+        ends = r_n[part.mask] @ part.ends
         slid = np.einsum("k,kdc,kc->d", part.weights, part.tangents, slip[part.mask]) / part.whole
-        more = [u_n[part.mask] @ part.fit, r_n[part.mask] @ part.ends, slid, [limit]]
-        whole = surface.comm.sum(np.concatenate([sums[0], *more]))
-        sums, motion, (low, high), slid, (limit,) = np.split(
-            whole, np.cumsum([len(sums[0]), *map(len, more[:-1])])
-        )
+        limit = [self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()]
+        sums = [forces, motion, ends, slid, limit]
+        everywhere = surface.comm.sum(np.concatenate(sums))
+        borders = np.cumsum([len(values) for values in sums[:-1]])
+        forces, motion, (low, high), slid, (limit,) = np.split(everywhere, borders)
+
+        # Largest values, then the quantities that sums and largest values make.
         tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
-        names = ([], ["theta", "settlement"], [*(f"theta_{axis}" for axis in AXES), "settlement"])[
-            d - 1
-        ]
-        found = {
-            quantity: float(values[0])
-            for quantity, values in part.quantities(sums[None], tops[None]).items()
-        }
-        found |= dict(zip(names, motion.tolist(), strict=False))
-        along = slid @ [-part.normal[1], part.normal[0]] if d == 2 else np.linalg.norm(slid)
-        found |= {
-            "level": (found["height"] - part.lowest) / part.tall if part.tall else np.nan,
-            "sliding": float(along),
-            "pressure_low": float(low),
-            "pressure_high": float(high),
-        }
+        quantities = part.quantities(forces[None], tops[None])
+        row = {quantity: float(values[0]) for quantity, values in quantities.items()}
+        row |= dict(zip(_MOTIONS[d], motion.tolist(), strict=False))
+        across = [-part.normal[1], part.normal[0]] if d == 2 else None  # T points along it
+        sliding = np.linalg.norm(slid) if across is None else slid @ across
+        row["level"] = (row["height"] - part.lowest) / part.tall if part.tall else np.nan
+        row["sliding"] = float(sliding)
+        row["pressure_low"] = float(low)
+        row["pressure_high"] = float(high)
         if self._problem.frictional:
-            found["margin"] = float(1.0 - abs(found["T"]) / limit) if limit > 0.0 else np.nan
-        self._quantities = list(found)
-        return {f"{quantity}_{self.name}": value for quantity, value in found.items()}
+            row["margin"] = float(1.0 - abs(row["T"]) / limit) if limit > 0.0 else np.nan
+        self._quantities = list(row)
+        return {f"{quantity}_{self.name}": value for quantity, value in row.items()}

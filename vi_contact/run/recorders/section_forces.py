@@ -125,11 +125,12 @@ class SectionForces:
 
         In space they are N, V_2, V_3, M_t, M_2, M_3.
         """
-        return {
-            f"{quantity}_{label}": (unit, f"{text}, section {label}")
-            for label, ends in self.cuts.items()
-            for quantity, (unit, text) in (_IN_THE_PLANE if len(ends) == 2 else _IN_SPACE).items()
-        }
+        columns = {}
+        for label, ends in self.cuts.items():
+            quantities = _IN_THE_PLANE if len(ends) == 2 else _IN_SPACE
+            for quantity, (unit, text) in quantities.items():
+                columns[f"{quantity}_{label}"] = (unit, f"{text}, section {label}")
+        return columns
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
@@ -139,14 +140,15 @@ class SectionForces:
         Collective.
         """
         work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
-        found = [find_cut(work.space, *item, self.cells) for item in self.cuts.items()]
-        work.take([part for part, _ in found])
-        self._turn = block_diag(np.zeros((0, 0)), *(turn for _, turn in found))
-        return self._named(work.at_rest(state))
+        cuts = [find_cut(work.space, label, ends, self.cells) for label, ends in self.cuts.items()]
+        work.take([moved for moved, _ in cuts])
+        self._turn = block_diag(np.zeros((0, 0)), *(turn for _, turn in cuts))
+        return self._row(work.at_rest(state))
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
-        return self._named(self._work.of_step(report))
+        return self._row(self._work.of_step(report))
 
-    def _named(self, values: Array) -> Row:
+    def _row(self, values: Array) -> Row:
+        """Return the work of rigid motions on the cuts, turned into their axes, as a row."""
         return dict(zip(self.columns(), (self._turn @ values).tolist(), strict=True))

@@ -32,6 +32,14 @@ class Steps:
     def _row(
         self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False
     ) -> Row:
+        """Return the row of a state.
+
+        Args:
+            state: at the end of the step.
+            iterations: of the solver in this step.
+            certificate: the worst residual of the step, without unit.
+            escalated: whether another solver than the first was needed.
+        """
         ground = self._problem.ground_acceleration(state.t).tolist()
         values = (state.t, state.k, int(iterations), certificate, int(escalated), *ground)
         return dict(zip(self._names, values, strict=True))
@@ -40,7 +48,8 @@ class Steps:
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
         """Return the initial row: no iterations and no certificate were needed, so zeros."""
-        self._problem, self._axes = problem, AXES[: problem.system.influence.shape[1]]
+        self._problem = problem
+        self._axes = AXES[: problem.system.influence.shape[1]]
         self._names = tuple(self.columns())
         return self._row(state)
 
