@@ -38,7 +38,7 @@ import vi_contact as vc
 from demos.pictures import raft as pictures
 from demos.pictures.histories import plot_certificate, plot_energy
 from meshes.raft import RaftMesh
-from vi_contact import engineering, fem, ground_motion, soil
+from vi_contact import fem, ground_motion, soil
 from vi_contact.cli import status_of
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.faces import plot_faces
@@ -168,7 +168,7 @@ def recorders() -> tuple[Any, ...]:
 
     That is energies, contact, forces and rotation of the raft, and histories of points.
     """
-    raft = engineering.Resultants("raft", (0.0, 0.0, 0.0))
+    raft = vc.Resultants("raft", (0.0, 0.0, 0.0))
     return vc.Energy(), vc.Contact(), raft, vc.Probe(POINTS, velocity=True, acceleration=True)
 
 

@@ -97,7 +97,7 @@ def at_once(
     system = fem.assemble(mesh, BAR, clamped=tags["left"], loads=fem.InitialStrain(strain))
     wall = core.HalfSpace(point=(LENGTH * (1.0 + strain),), normal=(-1.0,))
     problem = core.ContactProblem(system, fem.contact_surface(system, tags["right"], obstacle=wall))
-    record = (vc.Energy(), vc.Contact(), fem.Reactions("support", tags["left"], (0.0,)))
+    record = (vc.Energy(), vc.Contact(), vc.Reactions("support", tags["left"], (0.0,)))
     h = vc.simulate(
         problem,
         scheme=vc.Midpoint(),

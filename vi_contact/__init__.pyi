@@ -52,8 +52,13 @@ from .run import Contact as Contact
 from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy
 from .run import HalvedAtImpact as HalvedAtImpact
+from .run import LargestStrain as LargestStrain
 from .run import Probe as Probe
+from .run import Racking as Racking
+from .run import Reactions as Reactions
+from .run import Resultants as Resultants
 from .run import Schedule as Schedule
+from .run import SectionForces as SectionForces
 from .run import Solution as Solution
 from .run import cross_check as cross_check
 from .run import march as march

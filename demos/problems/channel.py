@@ -174,12 +174,12 @@ class SoilProbe(Probe):
     InputError for a point that is not at the interface.
     """
 
-    def _found(self, problem: ContactProblem, points: Array) -> Indices:
+    def _find_nodes(self, problem: ContactProblem, points: Array) -> Indices:
         """Return the numbers of the nodes of side 2 that face those of side 1.
 
         They are the nearest where divisions differ.
         """
-        nodes = super()._found(problem, points).tolist()
+        nodes = super()._find_nodes(problem, points).tolist()
         surface = problem.surface
         faced: dict[int, int] = {}
         for part in surface.parts if isinstance(surface, FemSurface) else ():

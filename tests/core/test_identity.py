@@ -189,7 +189,7 @@ def test_outputs_say_when_the_matrices_are_not_of_their_materials(
     problem = vc.ContactProblem(system, surface)
     stiffer = replace(system, K=system.algebra.combine([(2.0, system.K)]))
     state = next(vc.march(problem, dt=DT, steps=1))[0]
-    record = [fem.Reactions("base", tags["bottom"], (0.0, 0.0), gravity=(0.0, 1.0))]
+    record = [vc.Reactions("base", tags["bottom"], (0.0, 0.0), gravity=(0.0, 1.0))]
     leaning = geometric_stiffness(problem, state)
     words = "K of the system is not the one that fem.assemble made"
     for one, told in ((system, 0), (leaning, 0), (vc.with_weight(system), 0), (stiffer, 1)):

@@ -3,6 +3,8 @@ the new word."""
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import pytest
 
 import vi_contact
@@ -20,6 +22,16 @@ def test_an_old_name_gives_the_new_thing_and_a_warning(monkeypatch: pytest.Monke
     ):
         law = vi_contact.Bounce
     assert law is vi_contact.Elastic
+
+
+@pytest.mark.parametrize(
+    ("room", "name"), [(room, name) for room, names in renamed.NAMES.items() for name in names]
+)
+def test_every_old_name_leads_to_a_new_one(room: str, name: str) -> None:
+    pytest.importorskip("dolfinx")
+    with pytest.warns(DeprecationWarning, match=f"'{room}.{name}' is now vi_contact.{name}: "):
+        old = getattr(import_module(room), name)
+    assert old is getattr(vi_contact, name)
 
 
 def test_a_name_that_never_was_is_no_name(monkeypatch: pytest.MonkeyPatch) -> None:

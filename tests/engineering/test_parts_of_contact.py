@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import engineering, fem
+from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.studies import read_case
@@ -38,7 +38,7 @@ def box_of_soil(comm: Any) -> tuple[Any, Any, Any]:
 
 
 def row(problem: Any, state: Any, *parts: Any, **named: Any) -> dict[str, Any]:
-    return dict(engineering.Resultants(*parts, **named).start(problem, state))
+    return dict(vc.Resultants(*parts, **named).start(problem, state))
 
 
 @pytest.mark.two_ranks
@@ -121,7 +121,7 @@ def test_a_block_slides_until_its_speed_is_gone(comm: Any) -> None:
     speed = 0.5
     thrown = fem.assemble(mesh, stiff, initial_velocity=(speed, 0.0))
     start = rest.with_velocity(vc.ContactProblem(thrown, surface_of(thrown, tags)).equations.v0)
-    foot = engineering.Resultants("foot", part=tags["bottom"])
+    foot = vc.Resultants("foot", part=tags["bottom"])
     run = vc.simulate(problem, dt=1e-3, t_end=0.2, state=start, record=[foot], progress=False)
     slid = run.history["sliding_foot"][-1] - run.history["sliding_foot"][0]
     assert abs(slid) == pytest.approx(speed**2 / (2.0 * 0.5 * G), rel=0.01)

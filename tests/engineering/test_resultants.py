@@ -151,7 +151,7 @@ def test_bad_parts_are_refused() -> None:
             {"t": rows["t"], "pressure": rows["pressure"]}, FOOTING, centre=(0.0, 0.0)
         )
     with pytest.raises(InputError, match="letters"):
-        engineering.Resultants("left toe", (0.0, 0.0))
+        vc.Resultants("left toe", (0.0, 0.0))
 
 
 def test_recorder_agrees_with_the_summary() -> None:
@@ -165,7 +165,7 @@ def test_recorder_agrees_with_the_summary() -> None:
         consistent=True,
     )
     right = {"where": lambda x, n: n[:, 0] > 0.0}
-    recorder = engineering.Resultants("right", (0.0,), **right)
+    recorder = vc.Resultants("right", (0.0,), **right)
     scheme = vc.ZienkiewiczWoodTaylor()
     solution = vc.simulate(
         problem, scheme=scheme, dt=5e-3, steps=200, record=[vc.Contact(), recorder], progress=False
@@ -191,9 +191,9 @@ def test_racking_ignores_rigid_motion() -> None:
     bent[2:, 0] = [0.004, 0.008]  # the mean of both walls: 1.5e-3
     assert racking(box, bent)[0] == pytest.approx(1.5e-3, rel=1e-12)
     with pytest.raises(InputError, match="four corners"):
-        engineering.Racking({"a": box[:3]})
+        vc.Racking({"a": box[:3]})
     with pytest.raises(InputError, match="one line"):
-        engineering.Racking({"a": [[0, 0], [1, 1], [2, 2], [3, 3]]})
+        vc.Racking({"a": [[0, 0], [1, 1], [2, 2], [3, 3]]})
 
 
 COLUMNS = {"t": ("s", "time"), "a": ("m", "a length"), "b": ("N", "a force"), "c": ("m", "nothing")}
@@ -383,4 +383,4 @@ def test_racking_of_nothing_is_refused():
     with pytest.raises(
         InputError, match="Racking: frames is empty; give labels and four corners each"
     ):
-        engineering.Racking({})
+        vc.Racking({})

@@ -21,7 +21,7 @@ from reference_lcp import enumerate_lcp
 from two_bodies import SOFT, forces, relative
 
 import vi_contact as vc
-from vi_contact import engineering, fem
+from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
@@ -375,7 +375,7 @@ def test_a_block_wedged_in_a_notch(name):
     row = vc.Contact().start(problem, state)
     assert [row[f"contact_force_{axis}"] for axis in "xyz"[:d]] == pytest.approx(-weight, rel=1e-8)
     for face in range(d):
-        part = engineering.Resultants(
+        part = vc.Resultants(
             "face", np.zeros(d), where=lambda points, n, face=face: normals_of == face
         )
         assert part.start(problem, state)["N_face"] == pytest.approx(expected[face], rel=1e-8)

@@ -152,8 +152,8 @@ def test_section_forces_are_those_of_the_load() -> None:
     system, tags, load = cook(0.4999, 6, integration="selective")
     problem = linear(system)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    row = fem.SectionForces({"a": ((24.0, 22.0), (24.0, 52.0))}, loads=load).start(problem, state)
-    held = fem.Reactions("end", tags["left"], (0.0, 0.0), load).start(problem, state)
+    row = vc.SectionForces({"a": ((24.0, 22.0), (24.0, 52.0))}, loads=load).start(problem, state)
+    held = vc.Reactions("end", tags["left"], (0.0, 0.0), load).start(problem, state)
     assert abs(row["V_a"]) == pytest.approx(1.0, rel=1e-9)
     assert held["reaction_y_end"] == pytest.approx(-1.0, rel=1e-9)
 

@@ -15,6 +15,7 @@ from mesh_tools import refusal
 from mpi4py import MPI
 from own_meshes import OWN, at, own_mesh
 
+import vi_contact as vc
 from demos.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem
 from vi_contact.core.obstacles import HalfSpace
@@ -137,7 +138,7 @@ def test_contact_beside_them(cell):
             system, fem.contact_surface(system, face, obstacle=wall), excitation=shake
         )
         state = static_equilibrium(ContactProblem(system, problem.surface), tolerance=1e-9)
-        feet = fem.Reactions("base", base, centre=(0.0,) * d)
+        feet = vc.Reactions("base", base, centre=(0.0,) * d)
         run = simulate(
             problem,
             scheme=ZienkiewiczWoodTaylor(),

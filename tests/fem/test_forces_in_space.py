@@ -101,18 +101,18 @@ def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, t
         "top": (3.95, 0.0),
     }
     cuts = {name: level_cut(*place) @ Q.T for name, place in places.items()}
-    row = fem.SectionForces(cuts, loads=loads).start(problem, state)
+    row = vc.SectionForces(cuts, loads=loads).start(problem, state)
     for name, place in places.items():
         expected = above(*place)
         assert np.abs(six_of(row, name) - expected).max() < 1e-10 * np.abs(expected).max(), name
     back = {name: cuts[name][[0, 2, 1]] for name in ("foot", "inclined")}  # sides exchanged
-    turned = fem.SectionForces(back, loads=loads).start(problem, state)
+    turned = vc.SectionForces(back, loads=loads).start(problem, state)
     # the other way through: N and M_t stay, along the same axes the others change their signs
     for name in back:
         assert six_of(turned, name) == pytest.approx(
             six_of(row, name)[[0, 2, 1, 3, 5, 4]] * (1, -1, -1, 1, -1, -1)
         )
-    held = fem.Reactions("foot", tags["bottom"], tuple(Q @ (0.25, 0.0, 0.35)), loads).start(
+    held = vc.Reactions("foot", tags["bottom"], tuple(Q @ (0.25, 0.0, 0.35)), loads).start(
         problem, state
     )
     held_up = [[held[f"reaction_{kind}{axis}_foot"] for axis in "xyz"] for kind in ("", "M_")]
@@ -156,7 +156,7 @@ def test_uniform_stress_on_any_plane(comm: Any) -> None:
         "skew": (a, a + 2.0 * axes[1], a + 2.0 * axes[2]),
         "huge": a + 1e6 * np.array([-axes[1] - axes[2], axes[1] - axes[2], axes[2] - axes[1]]),
     }
-    row = fem.SectionForces(cuts, loads=loads).start(problem, state)
+    row = vc.SectionForces(cuts, loads=loads).start(problem, state)
     area = 1.0 * 1.2 / n[1]
     expected = np.concatenate([axes @ stress @ n * area, np.zeros(3)])
     assert np.abs(six_of(row, "skew") - expected).max() < 1e-10 * np.abs(expected).max()
@@ -177,8 +177,8 @@ def test_sections_carry_inertia(comm: Any) -> None:
     at the foot they are minus the reactions."""
     problem, tags = shaken_column(comm)
     heights = {"foot": 0.0} | {f"at_{k}": 1.0 + 0.2 * k for k in range(6)}
-    sections = fem.SectionForces({name: level_cut(y) for name, y in heights.items()})
-    held = fem.Reactions("foot", tags["bottom"], (0.25, 0.0, 0.35))
+    sections = vc.SectionForces({name: level_cut(y) for name, y in heights.items()})
+    held = vc.Reactions("foot", tags["bottom"], (0.25, 0.0, 0.35))
     solution = vc.simulate(
         problem, scheme=vc.Newmark(), dt=2e-3, steps=12, record=[sections, held], progress=False
     )
@@ -214,7 +214,7 @@ def test_one_leg_of_two(comm: Any) -> None:
         return np.array([(x, 0.9, 0.5), (x + width, 0.9, 0.5), (x, 0.9, 0.0)])
 
     cuts = {"left": rectangle(0.0, 0.5), "both": rectangle(-1.0, 4.5)}
-    row = fem.SectionForces(cuts, loads=loads).start(problem, state)
+    row = vc.SectionForces(cuts, loads=loads).start(problem, state)
     assert row["N_left"] == pytest.approx(-250.0, rel=1e-10)
     assert row["N_both"] == pytest.approx(-1000.0, rel=1e-10)
     # -∫ s_2 sigma
@@ -230,7 +230,7 @@ def test_one_leg_of_two(comm: Any) -> None:
         (((0.0, 1.0, 0.5), (0.5, 1.0, 0.5)), "2 points of 3 coordinates; give 2 ends"),
     ):
         with pytest.raises(InputError, match=text):
-            fem.SectionForces({"bad": corners}).start(problem, state)
+            vc.SectionForces({"bad": corners}).start(problem, state)
 
 
 # Reactions
@@ -246,7 +246,7 @@ def test_a_compliant_base_carries_all_momentum(comm: Any) -> None:
         fem.assemble(mesh, CONCRETE),
     )
     problem, centre = linear(system), np.array([1.0, 0.0, 0.5])
-    reactions = fem.Reactions("base", tags["bottom"], tuple(centre))
+    reactions = vc.Reactions("base", tags["bottom"], tuple(centre))
     assert not any(reactions.start(problem, initial_state(problem)).values())
     x = system.space.points
     rigid = [np.tile(e, (len(x), 1)) for e in np.eye(3)] + [
@@ -273,7 +273,7 @@ def test_a_compliant_base_carries_all_momentum(comm: Any) -> None:
         and size.min() > 1e-3 * size.max()
     )
     with pytest.raises(InputError, match="no dashpots"):
-        fem.Reactions("top", tags["top"], tuple(centre)).start(problem, initial_state(problem))
+        vc.Reactions("top", tags["top"], tuple(centre)).start(problem, initial_state(problem))
 
 
 def wave(t: float) -> Array:
@@ -340,14 +340,14 @@ def test_edges_and_corners_rub_as_their_nodes_do(comm: Any) -> None:
     state = pushed(problem)
     assert sorted({len(corner) for corner in seen(surface).corners}) == [2, 3]
     expected = of_nodes(problem, state, CENTRE)
-    row = engineering.Resultants("all", CENTRE).start(problem, state)
+    row = vc.Resultants("all", CENTRE).start(problem, state)
     assert force_and_moment(row, "all") == pytest.approx(expected, rel=1e-11)
     n = seen(surface).normals
     directions = [
         n[np.argmax(n @ Q @ way)] for way in ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
     ]
     parts = [
-        engineering.Resultants("face", CENTRE, where=lambda x, n, one=one: n @ one > 0.99)
+        vc.Resultants("face", CENTRE, where=lambda x, n, one=one: n @ one > 0.99)
         for one in directions
     ]
     added = sum(force_and_moment(part.start(problem, state), "face") for part in parts)
@@ -395,7 +395,7 @@ def test_action_is_reaction_between_faces_that_do_not_match(comm: Any, gap: floa
     )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
     state = pushed(problem)
-    found = force_and_moment(engineering.Resultants("pair", CENTRE).start(problem, state), "pair")
+    found = force_and_moment(vc.Resultants("pair", CENTRE).start(problem, state), "pair")
     one, two = (
         of_nodes(problem, state, CENTRE, list(turned.blocks).index(name))
         for name in ("upper", "lower")
@@ -428,7 +428,7 @@ def test_turn_and_settlement_of_a_footing(comm: Any) -> None:
         state = vc.static_equilibrium(
             problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
         )
-        rows.append(engineering.Resultants("base", (0.0, 0.0, 0.0)).start(problem, state))
+        rows.append(vc.Resultants("base", (0.0, 0.0, 0.0)).start(problem, state))
         assert rows[-1]["uplift_base"] == 0.0
 
     def vector(row: Any, kind: str) -> Array:

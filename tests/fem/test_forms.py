@@ -152,8 +152,8 @@ def test_outputs_of_own_isotropic_forms_are_those_of_the_material(comm: Any) -> 
         state = vc.static_equilibrium(problem)
         stresses.append(VonMises(system.space.forms)(system.space.expand(state.u, 0.0)))
         shaped = (
-            fem.Reactions("base", data["clamped"], (0.0, 0.0), loads=data["loads"]),
-            fem.SectionForces({"middle": ((0.0, 0.75), (2.0, 0.75))}, loads=data["loads"]),
+            vc.Reactions("base", data["clamped"], (0.0, 0.0), loads=data["loads"]),
+            vc.SectionForces({"middle": ((0.0, 0.75), (2.0, 0.75))}, loads=data["loads"]),
         )
         row = [value for one in shaped for value in one.start(problem, state).values()]
         stiffer = geometric_stiffness(problem, state)
@@ -375,7 +375,7 @@ def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
     )
     space = problem.system.space
     held = space.prescribed[0].facets
-    reactions = fem.Reactions("right", held, (0.0, 0.0), loads=push).start(problem, states[0])
+    reactions = vc.Reactions("right", held, (0.0, 0.0), loads=push).start(problem, states[0])
     whole = PetscMatrix(compat.assemble_matrix(compat.compile_form(space.forms.bilinear("K"))))
     force = whole @ space.expand(problem.cartesian(states[0].u), 0.0).ravel()
     force -= fem.assemble(space.mesh, CONCRETE, loads=push).load(0.0)
@@ -623,7 +623,7 @@ def test_outputs_that_need_a_material(comm: Any) -> None:
         fem.assemble(
             mesh, forms=forms, dashpots=soil.FreeField(side, base=(), material=CONCRETE), **low
         )
-    oblique = fem.SectionForces({"cut": ((0.0, 0.8), (2.0, 0.9))}, gravity=(0.0, -9.80665))
+    oblique = vc.SectionForces({"cut": ((0.0, 0.8), (2.0, 0.9))}, gravity=(0.0, -9.80665))
     for data in ({"forms": forms}, {"forms": replace(forms, mass=None)}, {}):
         problem = linear(
             with_weight(

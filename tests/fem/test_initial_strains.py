@@ -13,6 +13,7 @@ import ufl
 from fem_problems import CONCRETE, block, linear, max_over_ranks
 from mpi4py import MPI
 
+import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
@@ -240,7 +241,7 @@ def test_sudden_warming_sends_waves_of_its_stress():
     for solver, end in ((Condensed(), 2.9), (Volume(), 1.3)):
         problem = warmed_bar(n, gap)
         foot = fem.Facets.where("foot", problem.system.space.mesh, lambda x: x[0] < 1e-9)
-        held = fem.Reactions("support", foot, (0.0,))
+        held = vc.Reactions("support", foot, (0.0,))
         runs.append(
             simulate(
                 problem,
@@ -285,8 +286,8 @@ def test_histories_work_on_a_body_that_is_held():
     )
     cuts = {"on": ((1.0, 0.0), (1.0, 1.0)), "through": ((1.2, 0.0), (1.2, 1.0))}
     record = [
-        fem.SectionForces(cuts, loads=load),
-        fem.Reactions("left", tags["left"], (0.0, 0.0)),
+        vc.SectionForces(cuts, loads=load),
+        vc.Reactions("left", tags["left"], (0.0, 0.0)),
         Energy(),
     ]
     h = simulate(

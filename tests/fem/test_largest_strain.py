@@ -30,7 +30,7 @@ def followed(comm, d, strains, *, begin=None, **spec):
         u = problem.system.space.restrict(1e-3 * points @ gradient[:d, :d].T)
         return vc.State(0.0, 0, u, 0.0 * u, np.zeros(0), np.zeros(0, dtype=bool))
 
-    found = fem.LargestStrain()
+    found = vc.LargestStrain()
     found.start(problem, state(np.zeros((3, 3)) if begin is None else begin))
     for gradient in strains:
         row = found.row(SimpleNamespace(new=state(gradient)))
@@ -66,6 +66,6 @@ def test_what_it_refuses(comm):
         0.0, 0, problem.system.u0, problem.system.v0, np.zeros(0), np.zeros(0, dtype=bool)
     )
     with pytest.raises(InputError, match="on a line has no shear strain"):
-        fem.LargestStrain().start(problem, zero)
+        vc.LargestStrain().start(problem, zero)
     with pytest.raises(InputError, match="run from the start"):
-        fem.LargestStrain().start(problem, zero, {"largest_shear_strain": 1e-3})
+        vc.LargestStrain().start(problem, zero, {"largest_shear_strain": 1e-3})

@@ -15,6 +15,7 @@ from mesh_tools import refusal
 from mpi4py import MPI
 from own_meshes import OWN, at, own_mesh, tags_where
 
+import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
@@ -131,7 +132,7 @@ def test_runs_with_forms_are_runs_with_tractions(comm):
         problem = ContactProblem(
             system, fem.contact_surface(system, tags["bottom"], obstacle=ground, points=feet)
         )
-        side = fem.Reactions(
+        side = vc.Reactions(
             "left", tags["left"], centre=(0.0, 0.0), loads=[load, fem.BodyForce((0.0, -2e4))]
         )
         return simulate(
@@ -172,7 +173,7 @@ def test_reactions_know_the_form_as_it_was_assembled():
             problems.append(linear(fem.assemble(mesh, CONCRETE, clamped=base, loads=load)))
         for problem, load in zip(problems, loads, strict=True):
             state = static_equilibrium(problem)
-            row = fem.Reactions("base", base, centre=(0.0, 0.0), loads=load).start(problem, state)
+            row = vc.Reactions("base", base, centre=(0.0, 0.0), loads=load).start(problem, state)
             found.append([row["reaction_x_base"], row["reaction_y_base"]])
         assert np.array(found) == pytest.approx(np.array([[6e3, -3e3], [42e3, -21e3]]), rel=1e-10)
 
@@ -275,7 +276,7 @@ def test_what_is_refused():
     )
     form = fem.LinearForm(lambda v: one * v[0] * ufl.dx)
     system = fem.assemble(mesh, CONCRETE, loads=form)
-    cut = fem.SectionForces({"middle": ((1.0, 0.0), (1.0, 1.5))}, loads=form)
+    cut = vc.SectionForces({"middle": ((1.0, 0.0), (1.0, 1.5))}, loads=form)
     record = {"scheme": ZienkiewiczWoodTaylor(), "dt": 1e-4, "steps": 1, "progress": False}
     assert "LinearForm on the cells of a cut" in refusal(
         COMM, lambda: simulate(linear(system), record=[cut], **record)

@@ -66,7 +66,7 @@ def test_resultants_are_those_of_hydrostatics(
     problem = linear(system)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     centre = (0.0, 0.0) if depth is None else (0.0, 0.0, 0.5 * depth)
-    row = fem.Reactions("foot", tags["bottom"], centre, loads).start(problem, state)
+    row = vc.Reactions("foot", tags["bottom"], centre, loads).start(problem, state)
     across, down, turning = water_above(0.0, 0.0)
     up = 0.5 * GAMMA * LEVEL * BASE
     wide = depth or 1.0
@@ -83,7 +83,7 @@ def test_sections_through_elements_carry_the_water_above(comm: Any, simplices: b
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     y = 3.3
     left = SLOPE * y
-    row = fem.SectionForces({"a": ((left, y), (left + BASE, y))}, loads=loads).start(problem, state)
+    row = vc.SectionForces({"a": ((left, y), (left + BASE, y))}, loads=loads).start(problem, state)
     across, up, turning = water_above(y, left + 0.5 * BASE)
     found = [row[f"{name}_a"] for name in ("V", "N", "M")]
     assert found == pytest.approx([across, up, turning], abs=1e-9 * abs(turning))

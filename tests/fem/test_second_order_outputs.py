@@ -164,8 +164,8 @@ def test_reactions_and_sections_balance_the_loads() -> None:
     loads = (fem.Traction(tags["right"], (-3.0e3, 0.0)), fem.BodyForce((0.0, -2.4e4)))
     problem = linear(fem.assemble(mesh, CONCRETE, degree=2, clamped=tags["bottom"], loads=loads))
     state = vc.static_equilibrium(problem)
-    foot = fem.Reactions("foot", tags["bottom"], (0.25, 0.0), loads).start(problem, state)
-    cut = fem.SectionForces({"a": ((0.0, 1.5), (0.5, 1.5))}, loads=loads).start(problem, state)
+    foot = vc.Reactions("foot", tags["bottom"], (0.25, 0.0), loads).start(problem, state)
+    cut = vc.SectionForces({"a": ((0.0, 1.5), (0.5, 1.5))}, loads=loads).start(problem, state)
     assert foot["reaction_x_foot"] == pytest.approx(12.0e3, rel=1e-9)
     assert foot["reaction_y_foot"] == pytest.approx(2.4e4 * 2.0, rel=1e-9)
     assert foot["reaction_M_foot"] == pytest.approx(-3.0e3 * 4.0 * 2.0, rel=1e-9)
@@ -173,7 +173,7 @@ def test_reactions_and_sections_balance_the_loads() -> None:
     assert abs(cut["V_a"]) == pytest.approx(3.0e3 * 2.5, rel=1e-9)
     assert abs(cut["M_a"]) == pytest.approx(0.5 * 3.0e3 * 2.5**2, rel=1e-9)
     with pytest.raises(InputError, match="section 'a' cuts cells of degree 2"):
-        fem.SectionForces({"a": ((0.0, 1.6), (0.5, 1.6))}, loads=loads).start(problem, state)
+        vc.SectionForces({"a": ((0.0, 1.6), (0.5, 1.6))}, loads=loads).start(problem, state)
 
 
 def thrown(comm: Any, name: str) -> vc.ContactProblem:
@@ -304,12 +304,12 @@ def test_reactions_hold_what_contact_does_to_held_edges(curved: bool) -> None:
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.2))
     state = vc.static_equilibrium(problem, tolerance=1e-13)
     record: list[Any] = [
-        fem.Reactions("left", tags["left"], (0.0, 0.0, 0.0), loads=loads),
+        vc.Reactions("left", tags["left"], (0.0, 0.0, 0.0), loads=loads),
         vc.Contact(),
     ]
     if not curved:
         side = (0.0, 0.0, 0.0), (0.0, 1.5, 0.0), (0.0, 0.0, 1.2)
-        record.append(fem.SectionForces({"side": side}, loads=loads))
+        record.append(vc.SectionForces({"side": side}, loads=loads))
     history = vc.simulate(
         problem, dt=1e-3, steps=2, state=state, record=record, progress=False
     ).history
@@ -343,8 +343,8 @@ def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
         )
         state = vc.static_equilibrium(problem, tolerance=1e-13)
         pressed = COMM.allreduce(float(state.r_n.sum()))
-        below = fem.Reactions("lower", lower, (0.0, 0.0, 0.0), loads=load).start(problem, state)
-        above = fem.Reactions("upper", tags["upper_left"], (0.0, 0.0, 0.0), loads=load).start(
+        below = vc.Reactions("lower", lower, (0.0, 0.0, 0.0), loads=load).start(problem, state)
+        above = vc.Reactions("upper", tags["upper_left"], (0.0, 0.0, 0.0), loads=load).start(
             problem, state
         )
         assert pressed > 0.2 * total

@@ -11,7 +11,7 @@ from fem_problems import CONCRETE, block, linear
 
 import vi_contact as vc
 from demos.problems.channel import Channel, build
-from vi_contact import engineering, fem, solvers
+from vi_contact import fem, solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.state_checks import initial_state
@@ -54,7 +54,7 @@ def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> 
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     levels = {"foot": 0.0, "through": 1.3, "middle": 2.0, "close": 2.001, "high": 3.5}
     cuts = {name: ((0.0, y), (WIDTH, y)) for name, y in levels.items()}
-    row = fem.SectionForces(cuts | {"back": ((WIDTH, 2.0), (0.0, 2.0))}, loads=loads).start(
+    row = vc.SectionForces(cuts | {"back": ((WIDTH, 2.0), (0.0, 2.0))}, loads=loads).start(
         problem, state
     )
     for name, y in levels.items():
@@ -75,7 +75,7 @@ def test_a_section_through_what_is_pulled_along(comm: Any) -> None:
     pull = fem.TangentialTraction(tags["left"], tuple(3e3 * up + 7e3 * right))
     problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=pull))
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    row = fem.SectionForces({"a": (1.9 * up, 1.9 * up + WIDTH * right)}, loads=pull).start(
+    row = vc.SectionForces({"a": (1.9 * up, 1.9 * up + WIDTH * right)}, loads=pull).start(
         problem, state
     )
     force = 3e3 * (HEIGHT - 1.9)
@@ -89,13 +89,13 @@ def test_reactions_carry_all_loads(comm: Any, caplog: pytest.LogCaptureFixture) 
     included."""
     problem, tags, loads = cantilever(comm, False)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    row = fem.Reactions("foot", tags["bottom"], (0.5 * WIDTH, 0.0), loads).start(problem, state)
+    row = vc.Reactions("foot", tags["bottom"], (0.5 * WIDTH, 0.0), loads).start(problem, state)
     whole = above(0.0)
     assert row["reaction_x_foot"] == pytest.approx(-whole["V"], rel=1e-10)
     assert row["reaction_y_foot"] == pytest.approx(-whole["N"], rel=1e-10)
     assert row["reaction_M_foot"] == pytest.approx(-whole["M"], rel=1e-10)
     assert "give the loads" not in caplog.text
-    without = fem.Reactions("foot", tags["bottom"], (0.5 * WIDTH, 0.0)).start(problem, state)
+    without = vc.Reactions("foot", tags["bottom"], (0.5 * WIDTH, 0.0)).start(problem, state)
     assert ("give the loads of fem.assemble" in caplog.text) == (comm.rank == 0)
     share = WEIGHT[1] * 0.5 * 0.5 * WIDTH  # of the lowest row of elements, half its height
     assert without["reaction_y_foot"] == pytest.approx(-whole["N"] + share, rel=1e-10)
@@ -114,9 +114,9 @@ def test_weight_as_gravity(comm: Any) -> None:
     problem = linear(vc.with_weight(fem.assemble(mesh, parts, clamped=tags["bottom"])))
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     g = (0.0, -9.80665)
-    held = fem.Reactions("foot", tags["bottom"], (0.0, 0.0), gravity=g).start(problem, state)
+    held = vc.Reactions("foot", tags["bottom"], (0.0, 0.0), gravity=g).start(problem, state)
     cuts = {"joint": ((0.0, 2.0), (WIDTH, 2.0)), "low": ((0.0, 1.0), (WIDTH, 1.0))}
-    row = fem.SectionForces(cuts, cells=tags["block"], gravity=g).start(problem, state)
+    row = vc.SectionForces(cuts, cells=tags["block"], gravity=g).start(problem, state)
     column = 9.80665 * WIDTH
     assert held["reaction_y_foot"] == pytest.approx(column * 2.0 * (2400.0 + 7800.0), rel=1e-10)
     assert held["reaction_M_foot"] == pytest.approx(
@@ -148,7 +148,7 @@ def test_cuts_that_are_none_are_refused(comm: Any, reason: str) -> None:
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     for cut in CUTS[reason]:
         with pytest.raises(InputError, match=reason):
-            fem.SectionForces({"bad": cut}).start(problem, state)
+            vc.SectionForces({"bad": cut}).start(problem, state)
 
 
 @pytest.mark.serial
@@ -156,11 +156,11 @@ def test_what_cannot_be_measured_is_refused(comm: Any) -> None:
     problem, tags, _ = cantilever(comm, False)
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     with pytest.raises(InputError, match="nothing is prescribed"):
-        fem.Reactions("top", tags["top"], (0.0, HEIGHT)).start(problem, state)
+        vc.Reactions("top", tags["top"], (0.0, HEIGHT)).start(problem, state)
     with pytest.raises(InputError, match="3 coordinates"):
-        fem.Reactions("foot", tags["bottom"], (0.0, 0.0, 0.0)).start(problem, state)
+        vc.Reactions("foot", tags["bottom"], (0.0, 0.0, 0.0)).start(problem, state)
     with pytest.raises(InputError, match="letters"):
-        fem.Reactions("the foot", tags["bottom"], (0.0, 0.0))
+        vc.Reactions("the foot", tags["bottom"], (0.0, 0.0))
 
 
 SHAKE = vc.Harmonic(3.0, 9.0, direction=(1.0, 0.0))
@@ -181,9 +181,9 @@ def shaken(comm: Any, moving: bool) -> tuple[vc.ContactProblem, Any]:
 def histories(comm: Any, moving: bool) -> dict[str, Array]:
     problem, tags = shaken(comm, moving)
     record = [
-        fem.Reactions("foot", tags["bottom"], (1.0, 0.0)),
-        fem.SectionForces({"low": ((0.0, 1.0), (2.0, 1.0)), "foot": ((0.0, 0.0), (2.0, 0.0))}),
-        engineering.Racking({"wall": ((0.0, 0.0), (2.0, 0.0), (2.0, 6.0), (0.0, 6.0))}),
+        vc.Reactions("foot", tags["bottom"], (1.0, 0.0)),
+        vc.SectionForces({"low": ((0.0, 1.0), (2.0, 1.0)), "foot": ((0.0, 0.0), (2.0, 0.0))}),
+        vc.Racking({"wall": ((0.0, 0.0), (2.0, 0.0), (2.0, 6.0), (0.0, 6.0))}),
     ]
     solution = vc.simulate(
         problem, scheme=SCHEME, dt=DT, steps=STEPS, record=record, progress=False
@@ -221,7 +221,7 @@ def test_reactions_move_all_masses(comm: Any) -> None:
         excitation=SHAKE,
         mass=vc.ConsistentMass(),
     )
-    reactions = fem.Reactions("foot", tags["bottom"], (1.0, 0.0), weight)
+    reactions = vc.Reactions("foot", tags["bottom"], (1.0, 0.0), weight)
     touched = 0
     reactions.start(problem, initial_state(problem))
     for _, report in vc.march(
@@ -276,7 +276,7 @@ def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
     problem, _ = block_on_springs(
         comm, 160, 1e6, prescribed=lambda tags: fem.Prescribed(tags["top"], displacement=turned)
     )
-    recorder = engineering.Resultants("base", (B, 0.0))
+    recorder = vc.Resultants("base", (B, 0.0))
     start = vc.static_equilibrium(problem, solver=vc.Condensed())
     rows = [recorder.start(problem, start)]
     rows += [
@@ -316,8 +316,8 @@ def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
             loads=lambda tags, load=load: load,
         )
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
-        row = engineering.Resultants("base", (B, 0.0)).start(problem, state)
-        held = fem.Reactions("base", tags["bottom"], (B, 0.0), load).start(problem, state)
+        row = vc.Resultants("base", (B, 0.0)).start(problem, state)
+        held = vc.Reactions("base", tags["bottom"], (B, 0.0), load).start(problem, state)
         assert row["N_base"] == pytest.approx(BLOCK_WEIGHT, rel=1e-6)
         assert row["M_base"] == pytest.approx(BLOCK_WEIGHT * h * part, rel=1e-6)
         assert row["e_base"] == pytest.approx(h * part, rel=1e-6)
@@ -382,13 +382,13 @@ def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
         problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
     )
     whole = vc.Contact().start(problem, state)
-    row = engineering.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
+    row = vc.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
     size = row["N_base"]
     assert row["T_base"] < -0.05 * size  # against the push, along t = (-n_y, n_x) of the face
     for axis in "xy":
         total = whole[f"contact_force_{axis}"] + whole[f"friction_force_{axis}"]
         assert row[f"force_{axis}_base"] == pytest.approx(total, abs=1e-12 * size)
-    held = fem.Reactions("left", tags["left"], tuple(turn @ [1.0, 0.0]), push).start(problem, state)
+    held = vc.Reactions("left", tags["left"], tuple(turn @ [1.0, 0.0]), push).start(problem, state)
     assert row["M_base"] + held["reaction_M_left"] == pytest.approx(6.0e4, rel=1e-8)
 
 
@@ -406,8 +406,8 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
         problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
     )
     whole = vc.Contact().start(problem, state)
-    row = engineering.Resultants("base", (1.0, 0.0)).start(problem, state)
-    held = fem.Reactions("left", tags["left"], (1.0, 0.0), push).start(problem, state)
+    row = vc.Resultants("base", (1.0, 0.0)).start(problem, state)
+    held = vc.Reactions("left", tags["left"], (1.0, 0.0), push).start(problem, state)
     assert abs(whole["friction_force_x"]) > 0.0
     assert row["T_base"] == pytest.approx(whole["friction_force_x"], rel=1e-12)
     assert row["force_x_base"] == pytest.approx(whole["friction_force_x"], rel=1e-12)
@@ -416,7 +416,7 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
     total = row["M_base"] + held["reaction_M_left"] + moment_of_push
     assert total == pytest.approx(0.0, abs=1e-9 * abs(moment_of_push))
     halves = [
-        engineering.Resultants(name, (1.0, 0.0), where=mask).start(problem, state)
+        vc.Resultants(name, (1.0, 0.0), where=mask).start(problem, state)
         for name, mask in (("a", lambda x, n: x[:, 0] <= 1.0), ("b", lambda x, n: x[:, 0] > 1.0))
     ]
     assert halves[0]["M_a"] + halves[1]["M_b"] == pytest.approx(row["M_base"], rel=1e-12)
@@ -435,13 +435,13 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
         problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
     )
     middle = (0.5 * (left + inner), top_of_slab)
-    whole = engineering.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
-    above_cut = engineering.Resultants(
+    whole = vc.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
+    above_cut = vc.Resultants(
         "wall", middle, where=lambda p, n: (n[:, 0] < -0.5) & (p[:, 1] > top_of_slab + 1e-6)
     ).start(problem, state)
     cut = {"foot": ((left, top_of_slab), (inner, top_of_slab))}
     g = 9.80665
-    section = fem.SectionForces(cut, cells=model.tags["channel"], gravity=(0.0, -g)).start(
+    section = vc.SectionForces(cut, cells=model.tags["channel"], gravity=(0.0, -g)).start(
         problem, state
     )
     area = (x[4] - x[1]) * (y[3] - y[1]) - (x[3] - x[2]) * (y[3] - y[2])
@@ -462,7 +462,7 @@ def test_reactions_in_space(comm: Any) -> None:
     loads = [fem.BodyForce((0.0, -2.4e4, 0.0)), fem.Traction(tags["top"], (0.0, 0.0, 5.0e3))]
     problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=loads))
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    row = fem.Reactions("foot", tags["bottom"], (0.0, 0.0, 0.0), loads).start(problem, state)
+    row = vc.Reactions("foot", tags["bottom"], (0.0, 0.0, 0.0), loads).start(problem, state)
     weight, drag = 2.4e4 * 3.0, 5.0e3 * 3.0  # N, at (1, .5, .75) and (1, 1, .75)
     expected = {
         "x": 0.0,

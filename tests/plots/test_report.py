@@ -42,7 +42,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, vc.Solution]
     problem = chain_problem(
         3, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True, damping=1e-3
     )
-    right = engineering.Resultants("right", (0.0,), where=lambda x, n: n[:, 0] > 0.0)
+    right = vc.Resultants("right", (0.0,), where=lambda x, n: n[:, 0] > 0.0)
     record = [vc.Energy(), vc.Contact(), vc.Probe({"end": (3.0,)}, acceleration=True), right]
     scheme = vc.ZienkiewiczWoodTaylor()
     run = vc.simulate(

@@ -17,7 +17,8 @@ from vi_contact.core.step import Report, State
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic, Newton
 from vi_contact.run.march import march
-from vi_contact.run.recorders import Contact, Energy, Probe, Steps
+from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.run.recorders.steps import Steps
 from vi_contact.run.simulate import simulate
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22

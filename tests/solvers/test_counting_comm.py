@@ -29,7 +29,8 @@ from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import Redistributed
 from vi_contact.run.march import march
 from vi_contact.run.method import with_defaults
-from vi_contact.run.recorders import Energy, Steps
+from vi_contact.run.recorders import Energy
+from vi_contact.run.recorders.steps import Steps
 from vi_contact.solvers.iterative.preconditioners import KINDS
 from vi_contact.solvers.iterative.route import PreparedIterative
 

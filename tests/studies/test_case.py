@@ -183,14 +183,14 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
         system, surface, friction=vc.Coulomb(0.3), excitation=vc.GroundMotion(record, scale=1.5)
     )
     rest = vc.static_equilibrium(problem, solver=vc.Condensed())
-    foot = fem.Reactions("foot", tags["lower_bottom"], (1.0, 0.0))
+    foot = vc.Reactions("foot", tags["lower_bottom"], (1.0, 0.0))
     expected = vc.simulate(
         problem,
         dt=0.005,
         t_end=0.1,
         state=rest,
         progress=False,
-        record=[vc.Energy(), vc.Contact(), foot, engineering.Resultants("joint", (1.0, 1.0))],
+        record=[vc.Energy(), vc.Contact(), foot, vc.Resultants("joint", (1.0, 1.0))],
     )
     assert len(found.history["t"]) == 21 and np.abs(found.history["a_g_x"]).max() == pytest.approx(
         6.0, rel=1e-12

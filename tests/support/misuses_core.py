@@ -315,7 +315,7 @@ def values() -> Table:
             },
         ),
         (
-            engineering.Resultants,
+            vc.Resultants,
             {"name": "base", "centre": (0.0, 0.0)},
             {
                 "name": {"none": None, "spaces": "a b", "number": 0.5},
@@ -326,7 +326,7 @@ def values() -> Table:
             },
         ),
         (
-            engineering.Racking,
+            vc.Racking,
             {"frames": {"a": [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]}},
             {
                 "frames": LABELS
@@ -483,7 +483,7 @@ def of_the_mesh() -> Table:
         (soil.FreeField, {"facets": right, "base": vc.Ricker(1.0, 1.0)}, {"base": NEEDED}),
         (fem.XDMF, {}, {"every": COUNT | {"none": None}}),
         (
-            fem.Reactions,
+            vc.Reactions,
             {"name": "base", "facets": right, "centre": (0.0, 0.0)},
             {
                 "name": {"spaces": "a b", "none": None},
@@ -494,7 +494,7 @@ def of_the_mesh() -> Table:
             },
         ),
         (
-            fem.SectionForces,
+            vc.SectionForces,
             {"cuts": {"a": ((0.0, 0.0), (1.0, 0.0))}},
             {
                 "cuts": LABELS | {"one end": {"a": ((0.0, 0.0),)}},
@@ -616,11 +616,11 @@ def of_the_mesh() -> Table:
             {"recorder": vc.Energy()},
             {
                 "recorder": {
-                    "reactions": fem.Reactions("a", far, (0.0, 0.0)),
-                    "section": fem.SectionForces(
+                    "reactions": vc.Reactions("a", far, (0.0, 0.0)),
+                    "section": vc.SectionForces(
                         {"a": ((0.0, 0.5), (1.0, 0.5))}, cells=fem.Cells("a", [0], b.twin)
                     ),
-                    "loads": fem.Reactions(
+                    "loads": vc.Reactions(
                         "a", b.tags["bottom"], (0.0, 0.0), loads=fem.Traction(far, (1.0, 0.0))
                     ),
                 }

@@ -16,9 +16,8 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.exact.housner import HousnerBlock
 from demos.problems import rocking_block as rocking
-from vi_contact import fem, ground_motion
+from vi_contact import Resultants, fem, ground_motion
 from vi_contact.core.algebra import Array
-from vi_contact.engineering import Resultants
 from vi_contact.engineering.checks import (
     AtRest,
     Housner,

@@ -17,7 +17,7 @@ from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import say, world
-from .options import add_command
+from .options import add_command, add_settings
 
 if TYPE_CHECKING:
     from ..studies.cases.case import Case
@@ -28,23 +28,139 @@ OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": 
 
 def add_case_commands(commands: Any) -> None:
     """Add ``run``, ``cases``, ``schema`` and ``new`` to the commands of the top parser."""
-    words = {"schemes": ", ".join(schemes.__all__), "starters": ", ".join(starters())}
     run = add_command(
-        commands, "run", _run, "run", "short", "output", "settings", "check", words=words
+        commands,
+        "run",
+        _run,
+        help="run a case: one that ships with the package, or a TOML file",
+        description=(
+            "Run a case. The short options and --set replace values of the case. "
+            "'vi-contact cases' lists the cases of the package. 'vi-contact "
+            "report DIR' draws the results of the run."
+        ),
     )
+    run.add_argument(
+        "case", help="name of a case of the package (wall, channel), or the path of a .toml file"
+    )
+    _add_short_options(run)
+    _add_output(run)
+    add_settings(run)
+    _add_check(run)
     run.set_defaults(spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
+
     add_command(
         commands,
         "cases",
-        lambda options: "\n".join(
-            [
-                *(f"{name:<10} {title}" for name, title in builtin_cases().items()),
-                f"the files: {FOLDER}",
-            ]
+        _cases,
+        help="list the cases of the package",
+        description="List the cases of the package, and their folder.",
+    )
+    add_command(
+        commands,
+        "schema",
+        _schema,
+        help="print the JSON schema of case files, for editors",
+        description=(
+            "Print the JSON schema of case files. To keep it: vi-contact schema > case.json."
         ),
     )
-    add_command(commands, "schema", _schema)
-    add_command(commands, "new", _new, "new", words=words)
+
+    new = add_command(
+        commands,
+        "new",
+        _new,
+        help="write a case to begin with, and the script of its mesh",
+        description=(
+            "Write a commented case file and the Gmsh script of its mesh, which you then change."
+        ),
+    )
+    new.add_argument("name", metavar="NAME", help=", ".join(starters()))
+    new.add_argument(
+        "folder", metavar="DIR", nargs="?", help="folder to write into (default: NAME)"
+    )
+
+
+def _add_short_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that stand for the most common settings."""
+    group = parser.add_argument_group(
+        "short options", "The run ends with an error when the case cannot use a given option."
+    )
+    group.add_argument(
+        "--motion",
+        metavar="FILE[,FILE]",
+        help=(
+            "shake the model by one record (horizontal), or by two records (horizontal, vertical)"
+        ),
+    )
+    group.add_argument(
+        "--scale", type=float, metavar="F", help="multiply the excitation by this factor"
+    )
+    group.add_argument("--dt", type=float, metavar="S", help="time step [s]")
+    group.add_argument("--steps", type=int, metavar="N", help="number of steps")
+    group.add_argument(
+        "--solver",
+        metavar="NAME",
+        help="Condensed, Iterative, Volume, or a method such as Hildreth",
+    )
+    group.add_argument("--scheme", metavar="NAME", help=", ".join(schemes.__all__))
+    group.add_argument(
+        "--cross-check",
+        action="store_true",
+        help="solve every step a second time by another solver and compare the answers",
+    )
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the output folder and of restarts."""
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help=(
+            "output folder (default: the value of out in [run], or results/NAME, where "
+            "NAME is the name of the case)"
+        ),
+    )
+    parser.add_argument(
+        "--restart",
+        action="store_true",
+        help="continue the run in the output folder from its checkpoint",
+    )
+    parser.add_argument(
+        "--restart-changed",
+        action="store_true",
+        dest="changed",
+        help=(
+            "continue the run from its checkpoint even if the problem has changed since "
+            "the checkpoint"
+        ),
+    )
+    parser.add_argument(
+        "--wall-time",
+        metavar="TIME",
+        help=(
+            "write a checkpoint and end with status 75 before this time since the start "
+            "is over; give hours:minutes:seconds, or another form that Slurm reads as "
+            "--time"
+        ),
+    )
+
+
+def _add_check(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what is computed and printed."""
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help=(
+            "describe the model, draw it as DIR/model.png, and stop; the mesh and the "
+            "records are read, and no step is computed"
+        ),
+    )
+    parser.add_argument("--quiet", action="store_true", help="print no progress line")
+
+
+def _cases(options: argparse.Namespace) -> str:
+    lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
+    return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
 def _schema(options: argparse.Namespace) -> str:

@@ -31,28 +31,292 @@ _SPELLING = {
     "largest": "--largest",
     "resample_dt": "--even",
 }
+_RECORD_FILE = (
+    "record file: PEER AT2, COSMOS/CSMIP, SMC, K-NET, ESM, AFAD, GeoNet, BHRC, "
+    "RENADIC, USC, UNAM, CWA, columns of numbers, or an OpenSees path series"
+)
 
 
 def add_motion_commands(commands: Any) -> None:
     """Add ``motion`` with its actions to the commands of the top parser."""
-    actions = add_actions(commands, "motion")
-    for action, run, more in (
-        ("info", _info, ()),
-        ("convert", _convert, ("convert output",)),
-        ("plot", _plot, ("plot output",)),
-        ("spectrum", _spectrum, ("spectrum", "target", "spectrum output")),
-    ):
-        one = add_command(
-            actions,
-            f"motion {action}",
-            run,
-            f"motion {action}",
-            "reading",
-            "processing",
-            *more,
-            words={"acceleration": acceleration},
-        )
-        one.set_defaults(spelling=_SPELLING, largest=LARGEST_PEAK)
+    actions = add_actions(commands, "motion", help="read, process and draw ground motion files")
+
+    info = add_command(
+        actions,
+        "info",
+        _info,
+        help="print what a record file holds: units, peaks, intensities, duration, drift",
+    )
+    info.add_argument("file", nargs="+", help=_RECORD_FILE)
+    _add_reading(info)
+    _add_processing(info)
+
+    convert = add_command(
+        actions,
+        "convert",
+        _convert,
+        help="process a record and write it as columns, PEER AT2 or OpenSees path series",
+    )
+    convert.add_argument("file", help=_RECORD_FILE)
+    convert.add_argument("out", help="file to write")
+    _add_reading(convert)
+    _add_processing(convert)
+    _add_convert_output(convert)
+
+    plot = add_command(
+        actions,
+        "plot",
+        _plot,
+        help="draw the acceleration, velocity, displacement and Husid curve of a record",
+    )
+    plot.add_argument("file", help=_RECORD_FILE)
+    _add_reading(plot)
+    _add_processing(plot)
+    _add_plot_output(plot)
+
+    spectrum = add_command(
+        actions,
+        "spectrum",
+        _spectrum,
+        help=(
+            "compute response spectra, as a CSV table and a picture, beside the spectrum of "
+            "Eurocode 8"
+        ),
+    )
+    spectrum.add_argument("file", nargs="+", help=_RECORD_FILE)
+    _add_reading(spectrum)
+    _add_processing(spectrum)
+    _add_spectrum(spectrum)
+    _add_target(spectrum)
+    _add_spectrum_output(spectrum)
+
+    for parser in (info, convert, plot, spectrum):
+        parser.set_defaults(spelling=_SPELLING, largest=LARGEST_PEAK)
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what a file of a record does not say."""
+    group = parser.add_argument_group("reading a file")
+    group.add_argument(
+        "--units",
+        help=(
+            "unit of the accelerations, for example m/s2, cm/s2, gal or g; required when "
+            "the file does not state it"
+        ),
+    )
+    group.add_argument(
+        "--dt", type=float, help="time step [s]; required when the file does not state it"
+    )
+    group.add_argument(
+        "--channel",
+        metavar="K",
+        help=(
+            "number of the channel, from 1, or its name in the file, when the file holds several"
+        ),
+    )
+    group.add_argument(
+        "--largest",
+        type=acceleration,
+        metavar="A",
+        help=(
+            "accept peaks up to this acceleration (default 10g; a larger peak usually "
+            "means wrong units)"
+        ),
+    )
+    group.add_argument(
+        "--even",
+        type=float,
+        metavar="DT",
+        help="interpolate a file with unequal time steps to this time step [s]",
+    )
+
+
+def _add_processing(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the chain of processing, in its order."""
+    group = parser.add_argument_group(
+        "processing, in this order", "Give accelerations as 3.0 (in m/s2), or with a unit as 0.3g."
+    )
+    group.add_argument(
+        "--trim",
+        type=float,
+        nargs=2,
+        metavar=("START", "END"),
+        help="keep the part from START to END [s]",
+    )
+    group.add_argument(
+        "--pad",
+        type=float,
+        nargs=2,
+        metavar=("BEFORE", "AFTER"),
+        help="add zeros for these times [s] before and after the record",
+    )
+    group.add_argument("--remove-mean", action="store_true", dest="mean", help="remove the mean")
+    group.add_argument(
+        "--taper",
+        type=float,
+        nargs="?",
+        const=0.05,
+        metavar="PART",
+        help=(
+            "apply a cosine taper to this part of the duration at each end (0.05 if no "
+            "number follows)"
+        ),
+    )
+    group.add_argument(
+        "--low",
+        type=float,
+        metavar="HZ",
+        help=(
+            "lower corner frequency of the Butterworth filter: slower motions are "
+            "removed (high-pass)"
+        ),
+    )
+    group.add_argument(
+        "--high",
+        type=float,
+        metavar="HZ",
+        help=(
+            "upper corner frequency of the Butterworth filter: faster motions are "
+            "removed (low-pass)"
+        ),
+    )
+    group.add_argument("--order", type=int, default=4, help="order of the filter (default 4)")
+    group.add_argument(
+        "--causal",
+        action="store_true",
+        help=("filter forward in time only; without this option the filter has zero phase shift"),
+    )
+    group.add_argument(
+        "--resample",
+        type=float,
+        metavar="DT",
+        help="resample to this time step [s] with a band-limited filter",
+    )
+    group.add_argument(
+        "--baseline",
+        type=int,
+        nargs="?",
+        const=2,
+        metavar="DEGREE",
+        help=(
+            "remove a polynomial of this degree (default 2) so that the ground ends at "
+            "rest where it began"
+        ),
+    )
+    one_of = group.add_mutually_exclusive_group()
+    one_of.add_argument("--scale", type=float, metavar="F", help="multiply the record by F")
+    one_of.add_argument(
+        "--pga", type=acceleration, metavar="A", help="scale to this peak acceleration"
+    )
+    one_of.add_argument(
+        "--arias", type=float, metavar="I", help="scale to this Arias intensity [m/s]"
+    )
+    one_of.add_argument(
+        "--psa",
+        nargs=2,
+        metavar=("A", "T"),
+        help="scale to this pseudo-acceleration (5 %% damping) at period T [s]",
+    )
+
+
+def _add_convert_output(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the file that is written."""
+    group = parser.add_argument_group("output")
+    group.add_argument(
+        "--to",
+        choices=["columns", "at2", "path"],
+        help=(
+            "format of the file (default by its name: at2 for .at2, path for .th, .g3 "
+            "and .acc, columns for others)"
+        ),
+    )
+    group.add_argument(
+        "--out-units",
+        metavar="UNITS",
+        help="unit of the accelerations (default g in AT2 files, m/s2 in others)",
+    )
+
+
+def _add_plot_output(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the picture of a record."""
+    group = parser.add_argument_group("output")
+    group.add_argument(
+        "--out",
+        metavar="PNG",
+        help=(
+            "file of the picture (default: the name of the record file with .png, in the "
+            "current folder)"
+        ),
+    )
+    group.add_argument(
+        "--out-units",
+        default="m/s2",
+        metavar="UNITS",
+        help="unit of the accelerations in the picture (default m/s2)",
+    )
+
+
+def _add_spectrum(parser: argparse.ArgumentParser) -> None:
+    """Add the options of response spectra."""
+    group = parser.add_argument_group("spectrum")
+    group.add_argument(
+        "--damping",
+        type=float,
+        nargs="+",
+        default=[0.05],
+        metavar="Z",
+        help="damping ratios (default 0.05)",
+    )
+    group.add_argument(
+        "--periods",
+        type=float,
+        nargs=3,
+        default=[0.02, 10.0, 200],
+        metavar=("FROM", "TO", "N"),
+        help="N periods [s], logarithmically spaced (default 0.02 10 200)",
+    )
+
+
+def _add_target(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the spectrum of Eurocode 8."""
+    group = parser.add_argument_group("target")
+    group.add_argument(
+        "--ec8",
+        metavar="GROUND",
+        help=(
+            "draw the elastic spectrum for this ground type, A, B, C, D or E; --ag is needed too"
+        ),
+    )
+    group.add_argument(
+        "--ag", type=acceleration, metavar="A", help="design ground acceleration on ground type A"
+    )
+    group.add_argument(
+        "--ec8-type", type=int, choices=[1, 2], default=1, help="spectrum type (default 1)"
+    )
+
+
+def _add_spectrum_output(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the table and the picture of spectra."""
+    group = parser.add_argument_group("output")
+    group.add_argument(
+        "--csv",
+        metavar="FILE",
+        help=(
+            "file of the table (default: the name of the first record file with "
+            "_spectrum.csv, in the current folder)"
+        ),
+    )
+    group.add_argument(
+        "--png",
+        metavar="FILE",
+        help="file of the picture (default: the name of the table with .png)",
+    )
+    group.add_argument(
+        "--out-units",
+        default="g",
+        metavar="UNITS",
+        help="unit of the accelerations in the picture and the table (default g)",
+    )
 
 
 def acceleration(text: str) -> float:

@@ -2,8 +2,7 @@
 
 import argparse
 import math
-import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,61 +14,70 @@ from ..core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
 PICTURES = (".png", ".pdf", ".svg")
-_TOLD = tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
 
 
 def add_command(
     commands: Any,
     name: str,
     run: Callable[[argparse.Namespace], str],
-    *parts: str,
-    words: Mapping[str, Any] | None = None,
+    *,
+    help: str,
+    description: str | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a command and return its parser.
+    """Add a command, and return its parser for its options.
 
-    It may be an action of one such as "motion info"; it has these parts of options.toml.
-
-    run: what it calls. words: what the texts there, and the names of types, are looked up in.
+    Args:
+        commands: what argparse's ``add_subparsers`` returned, of the top parser or of a command
+            that has actions.
+        name: the word that calls it.
+        run: what it does; it returns the text that is printed.
+        help: the line about it in the list of commands, without a period.
+        description: the text above its options; ``help`` as a sentence when None.
     """
-    known, command = {"float": float, "int": int} | dict(words or {}), _TOLD[name]
-    told = command["help"]
-    about = command.get("description", f"{told[0].upper()}{told[1:]}.")
+    sentence = f"{help[0].upper()}{help[1:]}."
     parser: argparse.ArgumentParser = commands.add_parser(
-        name.split()[-1], help=told, description=about
+        name, help=help, description=sentence if description is None else description
     )
-    for part in parts:
-        table = _TOLD[part]
-        titled = (
-            parser.add_argument_group(table["title"], table.get("about"))
-            if "title" in table
-            else parser
-        )
-        _add(titled, table, known)
     parser.set_defaults(run=run)
     return parser
 
 
-def add_actions(commands: Any, name: str) -> Any:
-    """Add a command that has actions, and return what they are added to."""
-    actions = commands.add_parser(name, help=_TOLD[name]["help"])
+def add_actions(commands: Any, name: str, *, help: str) -> Any:
+    """Add a command that has actions, and return what they are added to by ``add_command``."""
+    actions = commands.add_parser(name, help=help)
     return actions.add_subparsers(dest="action", required=True, metavar="ACTION")
 
 
-def _add(place: Any, table: Mapping[str, Any], known: Mapping[str, Any]) -> None:
-    """Add the options of a table, which are its own tables."""
-    for option, told in table.items():
-        if option == "one_of":
-            _add(
-                place.add_mutually_exclusive_group(required=told.get("required", False)),
-                told,
-                known,
-            )
-        elif isinstance(told, dict):
-            given = told | {"help": told["help"].format_map(known)}
-            given |= {"type": known[told["type"]]} if "type" in told else {}
-            if isinstance(told.get("metavar"), list):
-                given["metavar"] = tuple(told["metavar"])
-            place.add_argument(option, **given)
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add the options that change a case and allow classes of the user's own."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="settings",
+        help=(
+            "replace a value of the case, such as friction.mu=0.5 or "
+            "excitation.1.scale=2; KEY= alone removes the value; the option may be "
+            "repeated"
+        ),
+    )
+    parser.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="PACKAGE",
+        help=(
+            "allow the case to name classes of this Python package as "
+            "package.module:Name, and so to run its code; the option may be repeated "
+            "(docs/guide/extend.md)"
+        ),
+    )
+
+
+def add_folder(parser: argparse.ArgumentParser) -> None:
+    """Add the argument of commands that read the folder of a run."""
+    parser.add_argument("folder", metavar="DIR", help="output folder of a run")
 
 
 def spaced(option: str, values: Sequence[float]) -> Any:

@@ -8,18 +8,132 @@ from typing import Any
 from ..core.checks import shown
 from ..core.errors import InputError
 from .errors import world
-from .options import add_command, output_file
+from .options import add_command, add_folder, output_file
 
 
 def add_picture_commands(commands: Any) -> None:
     """Add ``report``, ``plot`` and ``film`` to the commands of the top parser."""
-    for name, run, more in (
-        ("report", _report, ()),
-        ("plot", _plot, ("magnify",)),
-        ("film", _film, ("magnify",)),
-    ):
-        one = add_command(commands, name, run, name, "folder", *more)
-        one.set_defaults(spelling={"magnified": "--magnify"})
+    report = add_command(
+        commands,
+        "report",
+        _report,
+        help="write a report on a run, with pictures",
+        description=(
+            "Write a report on a run from the files in its folder. It is a PDF "
+            "file and, where jinja2 and plotly are installed, also a web page in "
+            "one file. peaks.csv and the pictures are written beside it."
+        ),
+    )
+    report.add_argument(
+        "--out",
+        metavar="FILE",
+        help=("file of the report, .html or .pdf (default: DIR/report.pdf and DIR/report.html)"),
+    )
+    report.add_argument(
+        "--title",
+        help=("title of the report (default: the title of the case, or the name of the folder)"),
+    )
+    report.add_argument(
+        "--show",
+        metavar="COLUMN[,COLUMN...]",
+        action="append",
+        help=(
+            "draw a chart of these columns, which must have one unit; the option may be "
+            "repeated (default: a chart for each kind of column that changes during the "
+            "run)"
+        ),
+    )
+    report.add_argument(
+        "--refine",
+        action="store_true",
+        help=(
+            "run the case again with half the element size and with half the time step, "
+            "into DIR/refined, and compare the peaks"
+        ),
+    )
+    report.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="PACKAGE",
+        help="the option of 'vi-contact run', for the runs of --refine",
+    )
+    add_folder(report)
+
+    plot = add_command(
+        commands,
+        "plot",
+        _plot,
+        help="draw the bodies of a run",
+        description=(
+            "Draw the deformed bodies of a run with their stress, contact "
+            "pressure and contact states, from the frames that are stored in its "
+            "folder."
+        ),
+    )
+    plot.add_argument(
+        "--times",
+        metavar="T[,T...]",
+        help=(
+            "moments to draw [s] (default: the first, the last, and the one of the "
+            "largest uplift, contact pressure or displacement)"
+        ),
+    )
+    plot.add_argument(
+        "--out", metavar="FOLDER", help="folder for deformed.png and faces.png (default: DIR)"
+    )
+    add_folder(plot)
+    _add_magnify(plot)
+
+    film = add_command(
+        commands,
+        "film",
+        _film,
+        help="film the bodies of a run",
+        description=(
+            "Film the deformed bodies of a run above the curve of a history, "
+            "from the frames that are stored in its folder."
+        ),
+    )
+    film.add_argument(
+        "--between",
+        metavar="T,T",
+        dest="times",
+        help=(
+            "first and last moment of the film [s] (default: 48 frames around the moment "
+            "of the largest uplift, contact pressure or displacement)"
+        ),
+    )
+    film.add_argument(
+        "--out",
+        metavar="FILE",
+        help=("file of the film, .gif or, where ffmpeg is installed, .mp4 (default: DIR/film.gif)"),
+    )
+    film.add_argument(
+        "--column",
+        metavar="COLUMN",
+        help=(
+            "column of history.csv that is drawn below the bodies (default: the uplift, "
+            "the contact pressure or the first displacement that changes)"
+        ),
+    )
+    add_folder(film)
+    _add_magnify(film)
+
+
+def _add_magnify(parser: argparse.ArgumentParser) -> None:
+    """Add the option of the scale of displacements in a drawing."""
+    parser.set_defaults(spelling={"magnified": "--magnify"})
+    parser.add_argument(
+        "--magnify",
+        type=float,
+        metavar="F",
+        dest="magnified",
+        help=(
+            "factor by which displacements are enlarged in the drawing (default: a round "
+            "number that makes the displacements visible)"
+        ),
+    )
 
 
 def _report(options: argparse.Namespace) -> str:

@@ -16,7 +16,7 @@ from ..engineering import (
 )
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
-from .options import PICTURES, add_actions, add_command, output_file, spaced
+from .options import PICTURES, add_actions, add_command, add_folder, output_file, spaced
 
 if TYPE_CHECKING:
     from ..run.files.reading import RunFolder
@@ -24,17 +24,128 @@ if TYPE_CHECKING:
 
 def add_post_commands(commands: Any) -> None:
     """Add ``post`` to the commands of the top parser."""
-    actions = add_actions(commands, "post")
-    for name, run in {
-        "peaks": _peaks,
-        "spectrum": _spectrum,
-        "transfer": _transfer,
-        "checks": _checks,
-        "loop": _loop,
-    }.items():
-        add_command(
-            actions, f"post {name}", run, "folder", "table", f"post {name}", words={"action": name}
-        )
+    actions = add_actions(
+        commands, "post", help="compute numbers and draw pictures from the folder of a run"
+    )
+
+    largest = add_command(
+        actions,
+        "peaks",
+        _peaks,
+        help="print the largest and the smallest value of every column, as a table",
+    )
+    add_folder(largest)
+    _add_table(largest, "peaks")
+    largest.add_argument(
+        "columns", metavar="COLUMN", nargs="*", help="columns of history.csv (default: all)"
+    )
+
+    spectrum = add_command(
+        actions,
+        "spectrum",
+        _spectrum,
+        help=(
+            "compute floor response spectra of recorded accelerations, as a CSV table and a picture"
+        ),
+    )
+    add_folder(spectrum)
+    _add_table(spectrum, "spectrum")
+    spectrum.add_argument(
+        "columns",
+        metavar="COLUMN",
+        nargs="+",
+        help=(
+            "columns of history.csv: accelerations such as a_x_top or a_g_x, or a "
+            "velocity such as v_x_top when the run has an impact law"
+        ),
+    )
+    spectrum.add_argument(
+        "--damping", type=float, default=0.05, metavar="Z", help="damping ratio (default 0.05)"
+    )
+    spectrum.add_argument(
+        "--periods",
+        type=float,
+        nargs=3,
+        default=[0.02, 4.0, 200],
+        metavar=("FROM", "TO", "N"),
+        help="N periods [s], logarithmically spaced (default 0.02 4 200)",
+    )
+    spectrum.add_argument(
+        "--relative",
+        action="store_true",
+        help="use the motion relative to the ground instead of the absolute motion",
+    )
+
+    transfer = add_command(
+        actions,
+        "transfer",
+        _transfer,
+        help=(
+            "compute the transfer function between two recorded accelerations, as a CSV table "
+            "and a picture"
+        ),
+    )
+    add_folder(transfer)
+    _add_table(transfer, "transfer")
+    transfer.add_argument(
+        "surface", metavar="COLUMN", help="acceleration of the upper point, such as a_x_top"
+    )
+    transfer.add_argument(
+        "base",
+        metavar="BASE",
+        nargs="?",
+        default="a_g_x",
+        help="acceleration of the lower point (default a_g_x)",
+    )
+    transfer.add_argument(
+        "--bandwidth",
+        type=float,
+        default=40.0,
+        metavar="B",
+        help=("bandwidth of the smoothing of Konno and Ohmachi (default 40); 0 means no smoothing"),
+    )
+    transfer.add_argument(
+        "--frequencies",
+        type=float,
+        nargs=3,
+        metavar=("FROM", "TO", "N"),
+        help=(
+            "N frequencies [Hz], logarithmically spaced (default: 200 from 4/duration to "
+            "1/(4 dt), or all of them without smoothing)"
+        ),
+    )
+
+    checks = add_command(
+        actions, "checks", _checks, help="compare the run with the formulas of its [[check]] tables"
+    )
+    add_folder(checks)
+    _add_table(checks, "checks")
+
+    loop = add_command(
+        actions,
+        "loop",
+        _loop,
+        help=(
+            "draw a force over a deformation, with the work of the force, as a CSV table and a "
+            "picture"
+        ),
+    )
+    add_folder(loop)
+    _add_table(loop, "loop")
+    loop.add_argument(
+        "deformation", metavar="DEFORMATION", help="column such as u_x_top or theta_base"
+    )
+    loop.add_argument("force", metavar="FORCE", help="column such as reaction_x_base or M_base")
+    loop.add_argument("--turn", action="store_true", help="change the sign of the force")
+
+
+def _add_table(parser: argparse.ArgumentParser, action: str) -> None:
+    """Add the option of the file of the table; ``action`` names it otherwise."""
+    parser.add_argument(
+        "--out",
+        metavar="CSV",
+        help=f"file of the table (default: DIR/{action}.csv); the picture is written beside it",
+    )
 
 
 def _run(options: argparse.Namespace) -> "RunFolder":

@@ -7,7 +7,17 @@ thing of the new name with a DeprecationWarning, and case files name the new wor
 from __future__ import annotations
 
 # Package -> old public name -> dotted path of the new one.
-NAMES: dict[str, dict[str, str]] = {}
+NAMES: dict[str, dict[str, str]] = {
+    "vi_contact.engineering": {
+        "Racking": "vi_contact.Racking",
+        "Resultants": "vi_contact.Resultants",
+    },
+    "vi_contact.fem": {
+        "LargestStrain": "vi_contact.LargestStrain",
+        "Reactions": "vi_contact.Reactions",
+        "SectionForces": "vi_contact.SectionForces",
+    },
+}
 
 # Old word of a case file or an option -> new word.
 WORDS: dict[str, str] = {}

@@ -1,7 +1,7 @@
 """Answer what engineers ask of a run: resultants, racking, floor spectra, peaks, frequencies.
 
-``Resultants`` and ``Racking`` record; the functions take the ``history`` of a run:
-docs/guide/outputs.md; ``checks`` compare it with formulas: docs/guide/checks.md.
+The functions take the ``history`` of a run: docs/guide/outputs.md; ``checks`` compare it with
+formulas: docs/guide/checks.md. What records a history stands in ``run.recorders``.
 
 >>> import numpy as np
 >>> from vi_contact.engineering import hysteresis

@@ -12,6 +12,4 @@ from .peak_values import Peak as Peak
 from .peak_values import hysteresis as hysteresis
 from .peak_values import peaks as peaks
 from .peak_values import write_peaks as write_peaks
-from .racking import Racking as Racking
-from .resultants import Resultants as Resultants
 from .resultants import contact_summary as contact_summary

@@ -23,9 +23,6 @@ from .mesh import read_mesh as read_mesh
 from .output.fields import XDMF as XDMF
 from .output.functions import as_function as as_function
 from .output.functions import read_function as read_function
-from .output.largest_strain import LargestStrain as LargestStrain
-from .output.reactions import Reactions as Reactions
-from .output.section_forces import SectionForces as SectionForces
 from .own_forms import Forms as Forms
 from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release

@@ -3,7 +3,7 @@
 Gmsh runs commands of the shell and opens files from scripts, so none is given to it as it stands.
 The script is cut into tokens. Statements that change no mesh, as most scripts have some
 (``Printf``, ``Save``, ``Mesh 2``, options of the window), are left out. All other tokens must be
-words that geo_words.toml lists, or names that the script sets. Those names get a prefix, so that
+words that geo_words.py lists, or names that the script sets. Those names get a prefix, so that
 none of them can be a command, and texts stand only where groups are named.
 """
 
@@ -11,32 +11,31 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from stat import S_ISREG
 from typing import NamedTuple
 
 from vi_contact.core.checks import shown
 from vi_contact.core.errors import InputError
+from vi_contact.meshes.geo_words import (
+    FIELD_OPTIONS,
+    MESH_OPTIONS,
+    PARAMETERS,
+    UNSEEN_OF_GEOMETRY,
+    UNSEEN_OF_MESH,
+    WORDS,
+)
 
 LARGEST = 2_000_000  # bytes of a script
 TOLD = 20  # how many refused places one message names
 PREFIX = "own_"  # before the names that a script sets
 
-_LISTS = tomllib.loads(files(__package__).joinpath("geo_words.toml").read_text(encoding="utf-8"))
-_WORDS = frozenset(_LISTS["words"].split())
-_OPTIONS = frozenset(_LISTS["options"].split())
-_OF_FIELDS = frozenset(_LISTS["fields"].split())
-_UNSEEN_OF_MESH = frozenset(_LISTS["unseen_of_mesh"].split())
-_UNSEEN_OF_GEOMETRY = frozenset(_LISTS["unseen_of_geometry"].split())
 _UNSEEN_OPTIONS = frozenset(("General", "Print", "PostProcessing", "View"))  # all options of these
 _UNSEEN_COMMANDS = frozenset(("Printf", "Print", "Save", "Draw"))  # up to their semicolon
 # up to their semicolon, or the brace that ends them
 _UNSEEN_BRACES = frozenset(("Color", "Show", "Hide"))
-_PARAMETERS = frozenset(_LISTS["parameters"].split())
 
 _TOKEN = re.compile(
     r"(?P<blank>[ \t]+|//[^\n]*|/\*.*?\*/|\n)"
@@ -99,7 +98,7 @@ def allowed(path: Path, numbers: Mapping[str, float] | None = None) -> Script:
     given = dict(numbers or {})
     tokens = _tokens(text)
     _refuse_numbers_without_effect(path, tokens, given)
-    own = (set(_SET.findall(text)) | set(given)) - _WORDS
+    own = (set(_SET.findall(text)) | set(given)) - WORDS
     kept, left_out = _leave_out(tokens)
     written = "".join(_write(path, _without_parameters(kept), own))
     values = "".join(f"{PREFIX}{name} = {float(value)!r}; " for name, value in given.items())
@@ -191,8 +190,8 @@ def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
         or first in _UNSEEN_BRACES
         or (first == "Mesh" and second in ("1", "2", "3") and third == ";")
         or (option and first in _UNSEEN_OPTIONS)
-        or (option and first == "Mesh" and third in _UNSEEN_OF_MESH)
-        or (option and first == "Geometry" and third in _UNSEEN_OF_GEOMETRY)
+        or (option and first == "Mesh" and third in UNSEEN_OF_MESH)
+        or (option and first == "Geometry" and third in UNSEEN_OF_GEOMETRY)
     )
     return _end_of_statement(tokens, start, braces=first in _UNSEEN_BRACES) if unseen else start
 
@@ -286,7 +285,7 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
             return [*tokens[start + 1 : comma], *blanks], place + 1
         if level == 1 and token.word == "," and not comma:
             comma = place
-        named = named or (level == 1 and before == "," and token.word in _PARAMETERS)
+        named = named or (level == 1 and before == "," and token.word in PARAMETERS)
         before = token.word
     return None, start
 
@@ -332,9 +331,11 @@ def _fits(kind: str, word: str, words: Sequence[str], own: set[str]) -> bool:
         means_all = word == '"*"' and words[-2] in ("Transfinite", "Recombine")
         return names_a_group or is_formula or means_all
     if kind == "name" and words[-1] == ".":
-        return word in (_OPTIONS if words[-2] == "Mesh" else _OF_FIELDS if words[-2] == "]" else ())
+        return word in (
+            MESH_OPTIONS if words[-2] == "Mesh" else FIELD_OPTIONS if words[-2] == "]" else ()
+        )
     if kind == "name":
-        return word in _WORDS or word in own
+        return word in WORDS or word in own
     return kind == "sign" and (word != "." or words[-1] in ("Mesh", "]"))
 
 

@@ -6,7 +6,6 @@ In it, build a mesh and write it.
 import ctypes
 import inspect
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +14,21 @@ from typing import Any, Protocol
 from vi_contact.core.errors import InputError
 
 M_PERTURB = -6  # of malloc.h
-_OPTIONS = tomllib.loads(Path(__file__).with_name("gmsh_options.toml").read_text(encoding="utf-8"))
+# Options of Gmsh while it meshes for this package: quiet and reproducible, whatever the user's own
+# session has.
+_OPTIONS: Mapping[str, float] = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,  # one thread and a fixed seed give the same mesh every time
+    "Mesh.RandomSeed": 1,
+    "Mesh.ElementOrder": 1,  # this and the following options undo choices of a user's own session
+    "Mesh.RecombineAll": 0,
+    "Mesh.RecombinationAlgorithm": 3,  # where a script recombines, no triangle is left behind
+    "Mesh.SubdivisionAlgorithm": 0,
+    "Mesh.MeshSizeFactor": 1,
+    "Mesh.MshFileVersion": 4.1,
+    "Mesh.Binary": 0,
+    "Mesh.SaveAll": 0,
+}
 
 
 class MeshScript(Protocol):

@@ -3,9 +3,6 @@
 These are the sides of cells, which rows have the same members, and what hangs together.
 """
 
-import tomllib
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix
@@ -13,12 +10,54 @@ from scipy.sparse import coo_matrix
 Rows = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
-# which says what they are
-_CELLS = tomllib.loads(Path(__file__).with_name("cells.toml").read_text(encoding="utf-8"))
-GMSH_NUMBERS, SECOND_ORDER, SIDES, CORNERS = (
-    {name: one[key] for name, one in _CELLS.items()}
-    for key in ("first_order", "second_order", "sides", "corners")
-)
+# Cells are called as UFL calls them. Gmsh's numbers of a cell and of its side:
+GMSH_NUMBERS = {
+    "interval": [1, 15],
+    "triangle": [2, 1],
+    "quadrilateral": [3, 1],
+    "tetrahedron": [4, 2],
+    "hexahedron": [5, 3],
+}
+# Of those with a node in the middle of every edge, side and cell, after their vertices:
+SECOND_ORDER = {
+    "interval": [8, 15],
+    "triangle": [9, 8],
+    "quadrilateral": [10, 8],
+    "tetrahedron": [11, 9],
+    "hexahedron": [12, 10],
+}
+# The corners of the sides of a cell, in the order of VTK:
+SIDES = {
+    "interval": [[0], [1]],
+    "triangle": [[0, 1], [1, 2], [2, 0]],
+    "quadrilateral": [[0, 1], [1, 2], [2, 3], [3, 0]],
+    "tetrahedron": [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]],
+    "hexahedron": [
+        [0, 1, 2, 3],
+        [4, 5, 6, 7],
+        [0, 1, 5, 4],
+        [1, 2, 6, 5],
+        [2, 3, 7, 6],
+        [3, 0, 4, 7],
+    ],
+}
+# A vertex and its d neighbours, right-handed in an unturned cell:
+CORNERS = {
+    "interval": [[0, 1]],
+    "triangle": [[0, 1, 2]],
+    "quadrilateral": [[0, 1, 3], [1, 2, 0], [2, 3, 1], [3, 0, 2]],
+    "tetrahedron": [[0, 1, 2, 3]],
+    "hexahedron": [
+        [0, 1, 3, 4],
+        [1, 2, 0, 5],
+        [2, 3, 1, 6],
+        [3, 0, 2, 7],
+        [4, 7, 5, 0],
+        [5, 4, 6, 1],
+        [6, 5, 7, 2],
+        [7, 6, 4, 3],
+    ],
+}
 
 
 def vertex_count(cell: str) -> int:

@@ -15,7 +15,6 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.files import write_output
-from ..run.files.table import WORDS
 
 History = Mapping[str, Array]
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
@@ -148,8 +147,17 @@ def require_matplotlib() -> None:
         raise InputError(f"matplotlib cannot be imported ({reason}): correct {place}") from error
 
 
-# column, label, colour, line
-LEDGER = tuple((name, *look) for name, look in WORDS["curves"].items())
+# Curves of the energy ledger: column, label, colour, line.
+LEDGER = (
+    ("work_input", "input work", "black", "-"),
+    ("energy_kinetic", "kinetic", "tab:blue", "-"),
+    ("energy_strain", "strain", "tab:orange", "-"),
+    ("loss_damping", "damping", "tab:purple", "-"),
+    ("loss_contact", "contact work", "tab:red", "-"),
+    ("loss_friction", "friction", "tab:cyan", "-"),
+    ("loss_impact", "impact loss", "tab:green", "-"),
+    ("loss_algorithmic", "algorithmic", "tab:brown", ":"),
+)
 
 
 def cell_edges(centres: Array) -> Array:

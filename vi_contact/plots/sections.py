@@ -3,7 +3,6 @@
 This is the content of the page, whatever draws it.
 """
 
-import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,9 +21,15 @@ from . import charts
 from .charts import Chart
 from .histories import LEDGER, scaled
 from .maps import Drawing, maps_of
-
-WORDS = tomllib.loads((Path(__file__).parent / "web" / "words.toml").read_text(encoding="utf-8"))
-SAY, HEADERS = WORDS["sentences"], WORDS["headers"]
+from .report_words import (
+    CHARTS,
+    HEADERS,
+    MODEL_FACTS,
+    MODEL_TABLES,
+    RESULTS,
+    SAY,
+    SUMMARY,
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ def sections_of(
             f"the run in '{run.folder}' has no steps yet: report on it when it has some"
         )
     histories = (
-        charts.history_charts(run, WORDS["groups"])
+        charts.history_charts(run, CHARTS)
         if columns is None
         else charts.chosen_charts(run, columns)
     )
@@ -121,11 +126,9 @@ def table_of(title: str, rows: Any) -> list[Table]:
 
 def _model(model: Mapping[str, Any]) -> Section:
     tables = [
-        table for title, key in WORDS["tables"].items() for table in table_of(title, model.get(key))
+        table for title, key in MODEL_TABLES.items() for table in table_of(title, model.get(key))
     ]
-    said = [
-        text.format(words(model[key])) for text, key in WORDS["facts"].items() if model.get(key)
-    ]
+    said = [text.format(words(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)]
     warnings = model.get("warnings")
     said += [f"Warning: {words(one)}." for one in (warnings if isinstance(warnings, list) else ())]
     return Section("Model and contact", said, tables)
@@ -146,9 +149,7 @@ def _motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
 
 def _results(run: RunFolder) -> Section:
     rows = [
-        row
-        for title, starts in WORDS["results"].items()
-        for row in _result_rows(run, title, tuple(starts))
+        row for title, starts in RESULTS.items() for row in _result_rows(run, title, tuple(starts))
     ]
     safe = list(_safety(run))
     tables = [Table(HEADERS["results"], rows), Table(HEADERS["safety"], safe)]
@@ -290,5 +291,5 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
     known |= {key: number(one) if isinstance(one, float) else one for key, one in facts.items()}
     return [
         (name, shorten(text.format_map(known), 78, placeholder=" …"))
-        for name, text in WORDS["header"].items()
+        for name, text in SUMMARY.items()
     ]

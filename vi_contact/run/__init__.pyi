@@ -7,7 +7,12 @@ from .march_many import march_many as march_many
 from .method import with_defaults as with_defaults
 from .recorders import Contact as Contact
 from .recorders import Energy as Energy
+from .recorders import LargestStrain as LargestStrain
 from .recorders import Probe as Probe
+from .recorders import Racking as Racking
+from .recorders import Reactions as Reactions
+from .recorders import Resultants as Resultants
+from .recorders import SectionForces as SectionForces
 from .simulate import simulate as simulate
 from .simulate_many import simulate_many as simulate_many
 from .solution import Solution as Solution

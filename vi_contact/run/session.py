@@ -10,16 +10,17 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
+from math import isfinite
 from signal import Signals
 from timeit import repeat
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.algebra import Comm, largest
 from ..core.checks import on_all
 from ..core.collective import together, users
-from ..core.errors import InputError, Interrupted, OutOfTime
+from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
 from ..core.stages import done
 from ..core.step import Recorder, Report, Row, State, StepResult
 from ..engineering.damping import NOT_COMPUTED, damping_in_words
@@ -31,7 +32,7 @@ from .files.writer import Writer
 from .march import March
 from .memory import in_words, memory
 from .method import Method
-from .recorders import refuse_overflow
+from .request import RunRequest
 from .sampling import sampling_warning
 from .solution import Solution, energy_warning
 from .stop_signals import StopSignals
@@ -48,13 +49,6 @@ ENDED: dict[type[BaseException], str] = {
 LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compared with
 
 
-class Comparison(Protocol):
-    """Report about a cross-check of routes that accompanies the run (cross_check.CrossChecked)."""
-
-    def report(self) -> Mapping[str, Mapping[str, float]]:
-        """Return, by method, how far its answers were off."""
-
-
 @dataclass
 class Session:
     """Hold a run under way.
@@ -62,28 +56,32 @@ class Session:
     This is what of the arguments of ``simulate`` holds for all of it, and where it is.
 
     Attributes:
+        request: the arguments of ``simulate``.
+        method: scheme, solvers and the rest of them, checked and with defaults.
         recorders: the user's, after those of every run.
-        wall_time: when the process has to have ended.
         table: the rows so far.
         step_plan: the base steps.
         place: the end of the last base step.
-        loop: its steps, where others have them too.
+        wall_time: when the process has to have ended.
         resumed_from: the step of the checkpoint that it continues, None for a new run.
+        loop: its steps, where others have them too.
         stopped: in words, when the callback has asked for the end.
+        last: the report of the last step, None before the first.
+        dt: the length of the last step [s].
+        memory: bytes of this process and of the large matrices, by name.
+        halved: attempts that were thrown away.
+        seconds: of the last ``TIMED`` steps [s].
     """
 
+    request: RunRequest
     method: Method
     recorders: Sequence[Recorder]
     table: Table
     step_plan: StepPlan
     place: RestartPoint
-    checkpoint_every: int
-    cross_check: Comparison | None
-    progress: bool
     wall_time: WallTime
-    loop: March | None = None
     resumed_from: int | None = None
-    callback: Callable[[State, Report], Any] | None = None
+    loop: March | None = None
     stopped: str = ""
     last: Report | None = None
     dt: float = float("nan")
@@ -107,7 +105,7 @@ class Session:
             "scheme": repr(method.scheme),
             "mass": repr(problem.mass),
             "solver": repr(
-                solver if self.cross_check is None else getattr(solver, "primary", solver)
+                solver if self.request.cross_check is None else getattr(solver, "primary", solver)
             ),
             "dt": described(method.dt),
             "tolerance": method.tolerance,
@@ -176,7 +174,7 @@ class Session:
         )
         worst, begin = 0.0, time.perf_counter()
         self.wall_time.begin()
-        with closing(Progress(self.left, shown=self.progress and self.root)) as progress:
+        with closing(Progress(self.left, shown=self.request.progress and self.root)) as progress:
             for state, report in loop:
                 self._keep(state, report, writer)
                 self.dt, self.halved = loop.dt, loop.halved
@@ -186,7 +184,8 @@ class Session:
                         state, place.t_start, place.k_start, loop.base, loop.halved
                     )
                     writer.frame(report, self.place.number)
-                    if self.place.number % self.checkpoint_every == 0 or self.wall_time.unsure:
+                    due = self.place.number % self.request.checkpoint_every == 0
+                    if due or self.wall_time.unsure:
                         self._checkpoint(writer)
                     if self.root:
                         progress.step(
@@ -195,8 +194,8 @@ class Session:
                 self.seconds.append(time.perf_counter() - begin)
                 if len(self.seconds) == 1:
                     self._measure()
-                if self.callback is not None:
-                    self._call(self.callback, report, writer)
+                if self.request.callback is not None:
+                    self._call(self.request.callback, report, writer)
                 if loop.ended and self.stopped:
                     return
                 if loop.ended and self.left:
@@ -263,7 +262,7 @@ class Session:
                 call: Callable[[], Row] = partial(recorder.row, report)
                 row.update(users(name, call, nothing, as_it_is=True))
             self.table.check(row)
-            refuse_overflow(row)
+            _refuse_overflow(row)
         writer.append(row)
         self.last = report
 
@@ -332,6 +331,7 @@ class Session:
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """Return the content of summary.json."""
+        cross_check = self.request.cross_check
         return {
             "status": status,
             "reason": reason,
@@ -341,7 +341,7 @@ class Session:
             **self.table.facts(),
             "base_steps": self.place.base,
             "halved_steps": self.halved,
-            "cross_check": None if self.cross_check is None else self.cross_check.report(),
+            "cross_check": None if cross_check is None else cross_check.report(),
             "seconds": seconds,
             "memory": self.memory,
             "seconds_per_step": float(np.median(list(self.seconds)))
@@ -374,6 +374,21 @@ class Session:
 
         # the first is slower
         return float(np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:]))
+
+
+def _refuse_overflow(row: Row) -> None:
+    """Raise StepFailure for a number beyond those of the machine.
+
+    It is infinite, or NaN in the energy ledger.
+    """
+    for name, value in row.items():
+        if not isinstance(value, float) or isfinite(value):
+            continue
+        if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
+            raise StepFailure(
+                f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, too large for the "
+                "machine: check the sizes and units of loads, motions and initial data"
+            )
 
 
 def _locked(value: T) -> T:

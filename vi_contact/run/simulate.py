@@ -3,7 +3,7 @@
 A crash cannot spoil the folder.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..core.algebra import Comm
-from ..core.arguments import check
-from ..core.checks import flag, function, optional, provides, several, whole
-from ..core.collective import Parts, agree, together, users
+from ..core.collective import agree, together, users
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
 from ..core.quantities import Unit
-from ..core.state_checks import check_problem_given, initial_state
+from ..core.state_checks import initial_state
 from ..core.step import Columns, Recorder, Report, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from .files.checkpoint import RestartPoint, read_checkpoint
@@ -26,9 +24,11 @@ from .files.folder import HISTORY_H5, locked, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
-from .method import checked_method, with_defaults
-from .recorders import Contact, Energy, Steps
-from .session import Comparison, Session
+from .method import Method, checked_method, with_defaults
+from .recorders import Contact, Energy
+from .recorders.steps import Steps
+from .request import CrossCheck, RunRequest
+from .session import Session
 from .solution import Solution
 from .time_steps import TimeSteps, step_plan
 from .wall_time import WallTime
@@ -54,7 +54,7 @@ def simulate(
     changed: bool = False,
     progress: bool = True,
     fields: FieldWriter | None = None,
-    cross_check: Comparison | None = None,
+    cross_check: CrossCheck | None = None,
     wall_time: str | None = None,
     callback: Callable[[State, Report], Any] | None = None,
 ) -> Solution:
@@ -109,179 +109,109 @@ def simulate(
         StepFailure: no solver could certify a step.
         ViContactError: the disk refused to read or write.
     """
-    with opened(**locals()) as (session, writer):
+    request = RunRequest(
+        problem=problem,
+        scheme=scheme,
+        solver=solver,
+        dt=dt,
+        t_end=t_end,
+        steps=steps,
+        record=record,
+        out=out,
+        state=state,
+        escalation=escalation,
+        tolerance=tolerance,
+        checkpoint_every=checkpoint_every,
+        restart=restart,
+        changed=changed,
+        progress=progress,
+        fields=fields,
+        cross_check=cross_check,
+        wall_time=wall_time,
+        callback=callback,
+    )
+    with open_run(request) as (session, writer):
         return session.go(writer)
 
 
 @contextmanager
-def opened(
-    problem: ContactProblem,
-    scheme: Scheme | None,
-    solver: Solver | None,
-    dt: TimeSteps,
-    t_end: float | None,
-    steps: int | None,
-    record: Sequence[Recorder] | None,
-    out: str | Path | None,
-    state: State | None,
-    escalation: Sequence[Solver],
-    tolerance: float,
-    checkpoint_every: int,
-    restart: bool | str | Path,
-    changed: bool,
-    progress: bool,
-    fields: FieldWriter | None,
-    cross_check: Comparison | None,
-    wall_time: str | None,
-    callback: Callable[[State, Report], Any] | None,
-    others: Sequence[ContactProblem] = (),
-    runs: int = 1,
+def open_run(
+    request: RunRequest, *, others: Sequence[ContactProblem] = (), runs: int = 1
 ) -> Iterator[tuple[Session, Writer]]:
-    """Check the arguments of ``simulate`` and set a run up, in its locked folder.
+    """Check a request, and hold its run, set up in its locked folder, until the block ends.
 
-    ``others``: problems that lend their matrices and factors to it, if they are its own. ``runs``:
-    how many take turns. Collective.
+    Collective.
+
+    Args:
+        request: the arguments of ``simulate``.
+        others: problems that lend their matrices and factors to it, if they are its own.
+        runs: how many runs take turns in this process, for its wall time.
+
+    Raises:
+        InputError: before anything is computed or overwritten, as of ``simulate``.
     """
-    check_problem_given("simulate", problem)
-    comm = problem.system.algebra.comm
-    agree(
-        comm,
-        "simulate",
-        {
-            "scheme": scheme,
-            "solver": solver,
-            "dt": dt,
-            "t_end": t_end,
-            "steps": steps,
-            "record": _kinds(record),
-            "out": None if out is None else str(out),
-            "state": Parts(state),
-            "escalation": escalation,
-            "tolerance": tolerance,
-            "checkpoint_every": checkpoint_every,
-            "restart": restart,
-            "changed": changed,
-            "fields": fields,
-            "cross_check": cross_check,
-            "wall_time": wall_time,
-            "callback": callback,
-        },
-    )
-    _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
-    optional(
-        function,
-        "simulate",
-        "callback",
-        callback,
-        "give a function of a state and a report, or None",
-    )
-    if wall_time is not None and out is None:
-        raise InputError("wall_time needs a folder from which the run continues: give out")
-    if changed and restart is False:
-        raise InputError(
-            "changed=True is for a run that is continued, and this one begins anew: give restart "
-            "too, or leave it out"
+    request.check()
+    wall_time = WallTime(request.wall_time, runs)
+    method = _choose_method(request, others)
+    comm = request.comm
+    folder = None if request.out is None else run_folder(comm, request.out)
+    source = _folder_to_continue(request.restart, folder)
+    recorders = _all_recorders(request.record)
+    with locked(comm, folder):
+        # The first state: that of the checkpoint, of an earlier stage, or at rest. The scheme adds
+        # its memory of earlier steps, which depends on the length of the first one.
+        place, checksum = _first_place(request, method, source)
+        plan = step_plan(request.dt, request.steps, request.t_end, place.t_start)
+        with together(comm):
+            first = method.scheme.start(method.problem, place.state, plan.dt(place.base))
+        place = replace(place, state=first)
+
+        # The recorders name their columns, which the table needs to read rows of an earlier run;
+        # then they start once more from the last of these rows, where their sums over time go on.
+        columns, row = _start_recorders(method.problem, recorders, place.state)
+        table = Table(columns, row, None if folder is None else folder / HISTORY_H5, comm)
+        stored = None
+        if source is not None:
+            stored = StoredRows(source, table, place.state.k, checksum)
+            last = _restore(table, stored, comm)
+            _start_recorders(method.problem, recorders, place.state, last)
+
+        session = Session(
+            request=request,
+            method=method,
+            recorders=recorders,
+            table=table,
+            step_plan=plan,
+            place=place,
+            wall_time=wall_time,
+            resumed_from=None if stored is None else stored.k,
         )
-    end = WallTime(wall_time, runs)
-    problem, scheme = with_defaults(problem, scheme, others)
-    method = checked_method(
+        yield session, Writer(method.problem, folder, request.fields, table, stored)
+
+
+def _choose_method(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
+    """Return how the run is marched, checked; ``others`` lend their matrices. Collective."""
+    problem, scheme = with_defaults(request.problem, request.scheme, others)
+    return checked_method(
         "simulate",
         problem,
         scheme,
-        (solver, escalation),
-        dt,
-        steps=steps,
-        t_end=t_end,
-        state=state,
-        tolerance=tolerance,
+        (request.solver, request.escalation),
+        request.dt,
+        steps=request.steps,
+        t_end=request.t_end,
+        state=request.state,
+        tolerance=request.tolerance,
     )
-    source = _source(restart, folder := None if out is None else run_folder(comm, out))
-    recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
-    with locked(comm, folder):
-        if source is None:
-            with together(comm):
-                begin = initial_state(method.problem) if state is None else state
-            place, checksum = RestartPoint(begin, begin.t, begin.k), ""
-        else:
-            place, checksum = read_checkpoint(
-                source, method.problem, scheme=method.scheme, dt=dt, changed=changed
-            )
-        plan = step_plan(dt, steps, t_end, place.t_start)
-        with together(comm):
-            place = replace(
-                place, state=method.scheme.start(problem, place.state, plan.dt(place.base))
-            )
-        table = Table(
-            *_started(problem, recorders, place.state),
-            None if folder is None else folder / HISTORY_H5,
-            comm,
-        )
-        stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
-        if stored is not None:
-            _started(problem, recorders, place.state, _restored(table, stored, comm))
-        session = Session(
-            method,
-            recorders,
-            table,
-            plan,
-            place,
-            checkpoint_every,
-            cross_check,
-            progress,
-            end,
-            resumed_from=None if stored is None else stored.k,
-            callback=callback,
-        )
-        yield session, Writer(problem, folder, fields, table, stored)
 
 
-def _check_outputs(
-    record: Any,
-    out: Any,
-    restart: Any,
-    checkpoint_every: Any,
-    flags: tuple[Any, Any],
-    fields: Any,
-    cross_check: Any,
-) -> None:
-    """Raise InputError for outputs that are none.
+def _folder_to_continue(restart: bool | str | Path, folder: Path | None) -> Path | None:
+    """Return the folder of the run to continue, None for a new run.
 
-    This is what is no recorder, folder, number of steps, writer of fields or cross-check.
+    Args:
+        restart: as of ``simulate``; a path may be that of a folder or of its checkpoint.
+        folder: the folder of this run, if it has one.
     """
-    owner = "simulate"
-    for one in (
-        ()
-        if record is None
-        else several(owner, "record", record, "give a list of recorders, or None")
-    ):
-        provides(
-            owner,
-            "a recorder",
-            one,
-            ("columns", "start", "row"),
-            "give Energy(), Contact(), Probe(…) or another",
-        )
-    check(owner, "out", out, str | Path | None)
-    check(owner, "restart", restart, bool | str | Path)
-    whole(owner, "checkpoint_every", checkpoint_every, least=1)
-    for meaning, value in zip(("progress", "changed"), flags, strict=True):
-        flag(owner, meaning, value)
-    if fields is not None:
-        if out is None:
-            raise InputError("fields need an output folder: give out, or leave out fields")
-        provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
-    optional(
-        provides,
-        owner,
-        "cross_check",
-        cross_check,
-        ("report",),
-        "give a CrossChecked solver, or None",
-    )
-
-
-def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
-    """Return the folder of the run to continue."""
     if isinstance(restart, bool):
         if restart and folder is None:
             raise InputError("restart=True needs the folder of the run: give out")
@@ -290,61 +220,87 @@ def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
     return path.parent if path.suffix == ".npz" else path
 
 
-def _started(
+def _all_recorders(record: Sequence[Recorder] | None) -> list[Recorder]:
+    """Return the recorder of every run, then those that were asked for."""
+    if record is None:
+        return [Steps(), Energy(), Contact()]
+    return [Steps(), *record]
+
+
+def _first_place(
+    request: RunRequest, method: Method, source: Path | None
+) -> tuple[RestartPoint, str]:
+    """Return (where the run begins, checksum of the rows that its checkpoint belongs to).
+
+    The checksum of a new run is "". Collective.
+    """
+    if source is not None:
+        return read_checkpoint(
+            source,
+            method.problem,
+            scheme=method.scheme,
+            dt=request.dt,
+            changed=request.changed,
+        )
+    state = request.state
+    if state is None:
+        with together(request.comm):  # loads and motions at the start are the user's
+            state = initial_state(method.problem)
+    return RestartPoint(state, state.t, state.k), ""
+
+
+def _start_recorders(
     problem: ContactProblem,
     recorders: Sequence[Recorder],
     state: State,
-    resumed: Mapping[str, Any] | None = None,
+    resumed: Row | None = None,
 ) -> tuple[Columns, Row]:
-    """Start the recorders: their columns, and the row of the state.
+    """Return (columns of all recorders, their row of the first state). Collective.
 
-    InputError when two record the same column.
+    Args:
+        problem: what is marched.
+        recorders: those of the run; one of the user's may fail on one rank.
+        state: the first state.
+        resumed: the last row of the run that is continued, None for a new run.
+
+    Raises:
+        InputError: two recorders have the same column, or the columns differ between ranks.
     """
-    row: dict[str, Any] = {}
-    nothing: Row = {}
-    columns: dict[str, tuple[str, str]] = {}
     comm = problem.system.algebra.comm
-    with together(comm):  # a recorder of the user's may fail on one rank
+    row: dict[str, Any] = {}
+    with together(comm):
         for recorder in recorders:
             name = f"the recorder {type(recorder).__name__} at the start"
             call: Callable[[], Row] = partial(recorder.start, problem, state, resumed)
+            nothing: Row = {}
             row |= users(name, call, nothing, as_it_is=True)
+
+    # Only after the start: many recorders do not know their columns before.
+    columns: dict[str, tuple[str, str]] = {}
     with together(comm):
         for recorder in recorders:
-            twice = sorted(set(columns) & set(recorder.columns()))
+            own = recorder.columns()
+            twice = sorted(set(columns) & set(own))
             if twice:
                 raise InputError(
                     f"two recorders have the column '{twice[0]}': leave one of them out"
                 )
-            columns |= recorder.columns()
+            columns |= own
     agree(comm, "simulate", {"the list of recorded columns": list(columns)})
     return columns, row
 
 
-def _kinds(record: Any) -> Any:
-    """Return what is compared over ranks of recorders.
+def _restore(table: Table, stored: StoredRows, comm: Comm) -> Row:
+    """Put the rows of an earlier run into the table, and return the last of them.
 
-    This is kinds, and settings of those of the package, as each rank may hold its part of what is
-    recorded.
-    """
-    if not isinstance(record, list | tuple):
-        return record
-    return [
-        Parts(one) if type(one).__module__.startswith("vi_contact.") else type(one)
-        for one in record
-    ]
-
-
-def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:
-    """Put the rows of an earlier run into the table, arrays on rank 0 only; the last of them.
-
-    Collective.
+    Arrays stay on rank 0, which reads the file; the numbers go to all ranks. Collective.
     """
     blocks = stored.blocks()
     last: Row = {}
     while True:
         whole = on_root(comm, lambda: next(blocks, None))
-        block: Block | None = comm.bcast(whole and {name: whole[name] for name in table.numbers})
+        numbers = None if whole is None else {name: whole[name] for name in table.numbers}
+        block: Block | None = comm.bcast(numbers)
         if block is None:
             return last
         table.restore(whole or block)

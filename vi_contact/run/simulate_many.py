@@ -4,9 +4,9 @@ Each is recorded in its own folder as ``simulate`` does.
 """
 
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from typing import Any
 from ..core.checks import several
 from ..core.errors import InputError, Interrupted, ViContactError
 from .files.log import turn_of
+from .request import RunRequest
 from .session import Session
-from .simulate import opened, simulate
+from .simulate import open_run, simulate
 from .solution import Solution
 from .stop_signals import StopSignals
 from .together import Together, grouped
@@ -41,27 +42,36 @@ def simulate_many(
     ``simulate`` does, when all runs that have begun have written their checkpoints:
     ``restart=True`` continues them.
     """
-    every = [
-        _arguments(run)
-        for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")
-    ]
-    folders = [
-        str(Path(run["out"]).resolve()) for run in every if isinstance(run["out"], str | Path)
-    ]
-    books = [
-        id(one) for run in every if isinstance(run["record"], Sequence) for one in run["record"]
-    ]
-    for what, own in (("recorder", books), ("folder", folders)):
-        if len(set(own)) < len(own):
-            raise InputError(
-                f"simulate_many: two runs have one {what}, which keeps results of one: give each "
-                "its own"
-            )
-    return _in_turn(every, tell)
+    given = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
+    requests = [_request(run) for run in given]
+    recorders: list[int] = []
+    folders: list[Path] = []
+    for request in requests:
+        # What is no list of recorders or no path is refused when the run is opened.
+        if isinstance(request.record, Sequence):
+            recorders += map(id, request.record)
+        if isinstance(request.out, str | Path):
+            folders.append(Path(request.out).resolve())
+    _refuse_shared("recorder", recorders)
+    _refuse_shared("folder", folders)
+    return _in_turn(requests, tell)
 
 
-def _arguments(run: Mapping[str, Any]) -> dict[str, Any]:
-    """All arguments of a call of ``simulate``."""
+def _refuse_shared(kind: str, things: Sequence[Hashable]) -> None:
+    """Raise InputError when two runs have one of these things."""
+    if len(set(things)) < len(things):
+        raise InputError(
+            f"simulate_many: two runs have one {kind}, which keeps results of one: give each "
+            "its own"
+        )
+
+
+def _request(run: Mapping[str, Any]) -> RunRequest:
+    """Return the request of a call of ``simulate`` with these arguments, without progress line.
+
+    The names are the user's, so the signature of ``simulate`` says here which are known and what is
+    meant by those that are left out.
+    """
     try:
         bound = signature(simulate).bind(**run)
     except TypeError as error:
@@ -69,7 +79,7 @@ def _arguments(run: Mapping[str, Any]) -> dict[str, Any]:
             f"simulate_many: {error}; give the arguments of simulate for every run"
         ) from None
     bound.apply_defaults()
-    return bound.arguments | {"progress": False}
+    return replace(RunRequest(**bound.arguments), progress=False)
 
 
 @dataclass
@@ -101,17 +111,16 @@ class _Turn:
         self.loop.prepared.clear()
 
 
-def _in_turn(runs: Sequence[Mapping[str, Any]], tell: Callable[[float], None]) -> Iterator[Ended]:
+def _in_turn(requests: Sequence[RunRequest], tell: Callable[[float], None]) -> Iterator[Ended]:
     """Make a base step of every run in turn, until all have ended."""
     going: list[_Turn] = []
     stopped: Interrupted | None = None
     with StopSignals(lasting=True) as signals, ExitStack() as stack:
-        for number, run in enumerate(runs):
+        for number, request in enumerate(requests):
+            others = [turn.session.method.problem for turn in going]
             try:
                 session, writer = stack.enter_context(
-                    opened(
-                        **run, others=[one.session.method.problem for one in going], runs=len(runs)
-                    )
+                    open_run(request, others=others, runs=len(requests))
                 )
             except ViContactError as error:
                 yield number, error

@@ -1,8 +1,7 @@
 """Hold what a run leaves behind: histories, the final state and a summary in figures."""
 
-import tomllib
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -19,7 +18,50 @@ from ..core.problem import ContactProblem
 from ..core.step import Columns, State
 from .files.table import LEDGER
 
-_LINES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# Lines of the summary, in its four parts: name, text, and the fact without which the line is left
+# out. A line without a name is a sentence.
+LINES: Mapping[str, Sequence[tuple[str, ...]]] = {
+    "run": (
+        (
+            "",
+            (
+                "run {status}: {steps} steps {length}, t = {t_start:g} to {t_end:g} s, on {ranks} "
+                "rank{s}"
+            ),
+        ),
+        ("scheme", "{scheme}"),
+        ("mass matrix", "{mass}"),
+        ("solver", "{solver}"),
+        ("damping", "{damping}", "damping"),
+        ("unknowns, contact points", "{unknowns}, {contact_points}"),
+        (
+            "iterations per step",
+            "{iterations_per_step[mean]:.2f} on average, {iterations_per_step[max]} at most",
+        ),
+        ("worst certificate", "{worst_certificate:.2e}"),
+        ("escalated steps", "{escalated_steps}"),
+        ("halved steps", "{halved_steps}", "halved_steps"),
+        (
+            "steps in contact",
+            "{steps_in_contact}, largest uplift {largest_uplift:.3f}",
+            "steps_in_contact",
+        ),
+        ("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),
+    ),
+    "energy": (
+        ("", "  energy ledger [J]", "energy"),
+        ("  energy at the start", "{energy[energy_start]: .6e}", "energy"),
+    ),
+    "defect": (("  defect, relative", "{energy_defect: .2e}", "energy"),),
+    "end": (
+        (
+            "wall time per step",
+            "{seconds_per_step:.3e} s{ratio} (with records{and_output})",
+            "ratio",
+        ),
+        ("reason", "{reason}", "reason"),
+    ),
+}
 CREATED = (
     0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 )
@@ -151,7 +193,7 @@ def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     def lines(part: str) -> list[tuple[str, str]]:
         return [
             (name, text.format_map(told))
-            for name, text, *needs in _LINES[part]
+            for name, text, *needs in LINES[part]
             if all(told.get(one) is not None for one in needs)
         ]
 
@@ -164,8 +206,8 @@ def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     ledger = [
         (f"  {title}", f"{facts['energy'][name]: .6e}")
-        for name, title in LEDGER[:-1]
-        if "energy" in facts
+        for name, title in LEDGER.items()
+        if "energy" in facts and name != "energy_defect"
     ]
     warned = [
         ("", text)

@@ -20,8 +20,8 @@ from ..fem.forms import KINDS, Materials, cell_constants
 from ..fem.groups import cells_of
 from ..fem.heterogeneous import Heterogeneous
 from ..fem.mesh import Cells
-from ..fem.output.largest_strain import LargestStrain
 from ..laws.materials import LinearElastic
+from ..run.recorders import LargestStrain
 from .curves import SoilCurves
 from .equivalent_linear import iterated
 

@@ -4,12 +4,10 @@ This is what all checks of ``engineering.checks`` have in common.
 """
 
 import math
-import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
-from typing import Annotated, Any
+from typing import Annotated, ClassVar
 
 from ...core.algebra import Array
 from ...core.arguments import check_fields
@@ -20,10 +18,6 @@ History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
 # expected, found, why it does not apply, inputs taken from the run
 Numbers = tuple[float, float, str, Inputs]
-_SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(
-    files(__package__).joinpath("checks.toml").read_text("utf-8")
-)
-
 _RADIANS = "radians; 30 degrees are 0.5236"
 Length = Annotated[float, Positive, Unit("m")]
 Density = Annotated[float, Positive, Unit("kg/m³")]
@@ -62,29 +56,42 @@ class Comparison:
         return self.found / self.expected if self.expected else math.nan
 
 
+@dataclass(frozen=True)
+class Formula:
+    """Hold what a check says of itself.
+
+    Attributes:
+        text: the formula, in signs.
+        source: its author and year.
+        range: where it applies, in words.
+        fields: names of the fields of the check that go into it.
+        reads: columns of the history that it reads; {name} stands for the value of a field.
+        answers: what ``of`` may ask for -> unit.
+    """
+
+    text: str
+    source: str
+    range: str
+    fields: tuple[str, ...]
+    reads: tuple[str, ...]
+    answers: Mapping[str, str]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Check(ABC):
     """Compare a run with a formula.
 
     This is the base of all checks, which are frozen dataclasses with fields in SI units and angles
-    in radians.
-
-    checks.toml tells what each says of itself.
+    in radians. Each says in ``formula`` what it is.
     """
+
+    formula: ClassVar[Formula]
 
     of: str = ""
 
-    @property
-    def said(self) -> Mapping[str, Any]:
-        """Return formula, source, range, fields and answers with their units.
-
-        With them come the columns that are read.
-        """
-        return _SAID[type(self).__name__]
-
     def __post_init__(self) -> None:
         name = type(self).__name__
-        check_word(f"{name}: of", self.of, tuple(self.said["answers"]))
+        check_word(f"{name}: of", self.of, tuple(self.formula.answers))
         check_fields(self)
 
     @abstractmethod
@@ -99,7 +106,7 @@ class Check(ABC):
         asked = quantities(type(self))
         return {
             key: (it, asked[key].symbol or "-")
-            for key in self.said["fields"]
+            for key in self.formula.fields
             if (it := getattr(self, key)) is not None
         }
 
@@ -108,23 +115,23 @@ class Check(ABC):
 
         The history is column -> values (rows,), as of a solution or run folder.
         """
-        lacking = [
-            name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history
-        ]
-        lack: Numbers = (
-            math.nan,
-            math.nan,
-            f"the run has no column {', '.join(lacking[:1])}: record it",
-            {},
-        )
-        expected, found, why, more = lack if lacking else self.numbers(history)
+        columns = [column.format(**vars(self)) for column in self.formula.reads]
+        lacking = [column for column in columns if column not in history]
+        if lacking:
+            expected = found = math.nan
+            why = f"the run has no column {lacking[0]}: record it"
+            more: Inputs = {}
+        else:
+            expected, found, why, more = self.numbers(history)
         chosen = [name for name, value in vars(self).items() if value is True]
         return Comparison(
-            ", ".join([type(self).__name__, *(one.replace("_", " ") for one in chosen)]),
-            **{name: self.said[name] for name in ("formula", "source", "range")},
-            found=found,
+            name=", ".join([type(self).__name__, *(name.replace("_", " ") for name in chosen)]),
+            formula=self.formula.text,
+            source=self.formula.source,
+            range=self.formula.range,
             inputs={**self.given(), **dict.fromkeys(chosen, (1.0, "-")), **more},
-            applies=why,
             expected=math.nan if why else expected,
-            unit=self.said["answers"][self.of],
+            found=found,
+            unit=self.formula.answers[self.of],
+            applies=why,
         )

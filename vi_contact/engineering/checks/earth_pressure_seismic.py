@@ -10,15 +10,15 @@ these are to be met by such a run.
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...core.algebra import Array
 from ...core.quantities import RATIO, Between, Positive, Unit
-from .comparison import History, Length, Numbers, Poisson
-from .earth_pressure_static import Coulomb, EarthPressure
+from .comparison import Formula, History, Length, Numbers, Poisson
+from .earth_pressure_static import WALL_ANSWERS, WALL_COLUMNS, Coulomb, EarthPressure
 
 # CHOSEN: share of the layer's lowest frequency below which inertia adds less than 5 %, 1/sqrt(1 -
 # 0.3²)
@@ -58,6 +58,34 @@ class MononobeOkabe(Coulomb):
     does.
     """
 
+    formula: ClassVar[Formula] = Formula(
+        text=(
+            "N = K_AE cos δ (1-kv) (ρ g H²/2 + q H cos ι cos β/cos(β-ι)), K_AE(φ, δ, slope "
+            "β, batter ι, ψ), tan ψ = kh/(1-kv)"
+        ),
+        source="Okabe 1924; Mononobe and Matsuo 1929",
+        range=(
+            "δ up to φ, passive up to φ/2; φ - slope - ψ from 0, passive φ + slope - ψ; "
+            "ground up to φ; soil that yields"
+        ),
+        fields=(
+            "height",
+            "rho",
+            "surcharge",
+            "gravity",
+            "width",
+            "phi",
+            "delta",
+            "slope",
+            "batter",
+            "kh",
+            "kv",
+        ),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
+    largest: ClassVar[bool] = True
+
     kh: Annotated[float, Between(0.0, 10.0), RATIO]
     kv: Annotated[float, Between(-0.9, 0.9), RATIO] = 0.0
 
@@ -65,6 +93,9 @@ class MononobeOkabe(Coulomb):
         """Return K (1 - kv) under gravity turned by psi [rad] and the earthquake, and why none."""
         found, why = super().coefficient(psi + math.atan(self.kh / (1.0 - self.kv)))
         return found * (1.0 - self.kv), why
+
+
+LAYER_COLUMNS = ("t", "N_{part}", "height_{part}", "uplift_{part}", "{acceleration}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +154,18 @@ class Wood(_Layer):
     motion is max a/(pi (max v - min v)).
     """
 
+    formula: ClassVar[Formula] = Formula(
+        text="ΔN = F(ν, L/H) ρ a H², exact in plane strain; a the peak towards the wall",
+        source="Wood 1973, EERL 73-05",
+        range=(
+            "motions below 0.3 c_s/(4 H); a rigid smooth wall of which at most 5 % opens; "
+            "elastic soil on rock"
+        ),
+        fields=("height", "rho", "nu", "c_s", "length"),
+        reads=LAYER_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
+
     length: Length | None = None
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
@@ -152,6 +195,18 @@ class VeletsosYounan(_Layer):
     damping: xi of the soil, hysteretic; w_n = n pi c_s/(2 H), n odd. Slow ones give 3 to 6 % more
     than ``Wood``'s.
     """
+
+    formula: ClassVar[Formula] = Formula(
+        text=(
+            "ΔN = max Q(t), Q(ω) = κ ρ H² a(ω) Σ 16/(nπ)³ / √(1 - (ω/ω_n)²/(1+2iξ)), κ = "
+            "2/√((1-ν)(2-ν))"
+        ),
+        source="Veletsos and Younan 1994",
+        range="a rigid smooth wall of which at most 5 % opens; a long elastic layer on rock",
+        fields=("height", "rho", "nu", "c_s", "damping"),
+        reads=LAYER_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
 
     damping: Annotated[float, Positive, RATIO] = 0.05
 

@@ -10,7 +10,7 @@ active and passive ones are bounds beside it.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ...core.units import STANDARD_GRAVITY
 from .comparison import (
     Check,
     Density,
+    Formula,
     Friction,
     Gravity,
     History,
@@ -60,6 +61,10 @@ def wedge(
     )
 
 
+WALL_COLUMNS = ("N_{part}", "height_{part}")
+WALL_ANSWERS = {"thrust": "N/m", "height": "m"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class EarthPressure(Check):
     """Hold what all theories of a wall need.
@@ -71,6 +76,9 @@ class EarthPressure(Check):
     its line of action above the foot [m]; surcharge: q [Pa], on a horizontal metre of ground;
     width: of the model across its plane, of a slice its thickness.
     """
+
+    # Whether the largest thrust of the run is compared, or that of the first row, the one of rest.
+    largest: ClassVar[bool] = False
 
     height: Length
     rho: Density
@@ -98,7 +106,7 @@ class EarthPressure(Check):
             laden * self.surcharge * self.height,
         )
         thrust, height = history[f"N_{self.part}"], history[f"height_{self.part}"]
-        row = int(np.argmax(thrust)) if "largest" in self.said else 0  # the first is that of rest
+        row = int(np.argmax(thrust)) if self.largest else 0
         if self.of == "height":
             return (
                 self.height * (own / 3.0 + extra / 2.0) / (own + extra),
@@ -119,6 +127,15 @@ class AtRest(EarthPressure):
     K0/(1 + K0).
     """
 
+    formula: ClassVar[Formula] = Formula(
+        text="N = K0 (ρ g H²/2 + q H), K0 = ν/(1-ν)",
+        source="plane strain without lateral strain",
+        range="an elastic layer on a smooth wall that does not move",
+        fields=("height", "rho", "surcharge", "gravity", "width", "nu"),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
+
     nu: Poisson
 
     def coefficient(self) -> tuple[float, str]:
@@ -134,6 +151,15 @@ class Rankine(EarthPressure):
 
     phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand.
     """
+
+    formula: ClassVar[Formula] = Formula(
+        text="N = K (ρ g H²/2 + q H), K = cos²β (cos β ∓ s)/(cos β ± s), s² = cos²β - cos²φ",
+        source="Rankine 1857",
+        range="β up to φ; soil that yields",
+        fields=("height", "rho", "surcharge", "gravity", "width", "phi", "slope"),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
 
     phi: Friction
     slope: Incline = 0.0
@@ -159,6 +185,28 @@ class Coulomb(EarthPressure):
     <= phi/2 (beyond it surfaces that are curved slide at less), ground up to phi, and phi -+ slope
     - psi >= 0.
     """
+
+    formula: ClassVar[Formula] = Formula(
+        text=(
+            "N = K cos δ (ρ g H²/2 + q H cos ι cos β/cos(β-ι)), K(φ, δ, slope β, batter ι) "
+            "of the worst plane wedge"
+        ),
+        source="Coulomb 1776",
+        range="δ up to φ, passive up to φ/2; ground up to φ; soil that yields",
+        fields=(
+            "height",
+            "rho",
+            "surcharge",
+            "gravity",
+            "width",
+            "phi",
+            "delta",
+            "slope",
+            "batter",
+        ),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
 
     phi: Friction
     delta: Friction = 0.0

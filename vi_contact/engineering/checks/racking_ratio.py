@@ -4,12 +4,12 @@ The box is a thin frame that neither slips nor opens (Wang 1993).
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from ...core.quantities import Positive, Unit
-from .comparison import Check, History, Length, Numbers, Poisson
+from .comparison import Check, Formula, History, Length, Numbers, Poisson
 
 # ends of Wang's curves: F, and depth of the centre over the height of the box
 LARGEST, SHALLOWEST = (10.0, 1.5)
@@ -44,6 +44,15 @@ class RackingRatio(Check):
     of the box's centre; box, free: labels of the box and of four points of the ground far away,
     at the same depths. It applies up to F = 10, from 1.5 H down.
     """
+
+    formula: ClassVar[Formula] = Formula(
+        text="R = 4 (1-ν) F/(3-4ν+F), F = G H W²/(12 EI_roof) ψ(EI, H/W)",
+        source="Wang 1993; Penzien 2000",
+        range="F up to 10; centre at 1.5 heights or deeper; neither slip nor opening",
+        fields=("width", "height", "wall", "roof", "invert", "shear_modulus", "nu", "depth"),
+        reads=("racking_{box}", "racking_{free}"),
+        answers={"": "-"},
+    )
 
     width: Length
     height: Length

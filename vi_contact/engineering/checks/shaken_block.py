@@ -6,14 +6,14 @@ Sliding is after Newmark, Géotechnique 15, 1965; rocking is after Housner, Bull
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from ...core.algebra import Array
 from ...core.quantities import RATIO, Between, Positive
 from ...core.units import STANDARD_GRAVITY
-from .comparison import Check, Gravity, History, Incline, Length, Numbers
+from .comparison import Check, Formula, Gravity, History, Incline, Length, Numbers
 
 # CHOSEN: of a step of the run; a slide ends within one, which costs less than r h²/8 of slip, h =
 # dt/32
@@ -56,6 +56,18 @@ class NewmarkBlock(Check):
     displacement on the plane, signed, and of the ground's accelerations. It applies while the block
     stays on the plane, and where it stands without motion.
     """
+
+    formula: ClassVar[Formula] = Formula(
+        text=(
+            "u'' = w - r sgn u', w = g sin β - a_x cos β + a_y sin β, r = μ (g cos β + a_x "
+            "sin β + a_y cos β)"
+        ),
+        source="Newmark 1965",
+        range="one rigid block that stays on its plane, and stands when nothing moves",
+        fields=("mu", "slope", "towards", "gravity"),
+        reads=("t", "{slip}", "{acceleration}", "{vertical}"),
+        answers={"": "m"},
+    )
 
     mu: Annotated[float, Positive, RATIO]
     slope: Incline = 0.0
@@ -101,6 +113,21 @@ class Housner(Check):
     applies to blocks that rock and do not overturn, slide or bounce. One history in a long motion
     is chaotic: compare many, or the first impacts.
     """
+
+    formula: ClassVar[Formula] = Formula(
+        text=(
+            "θ'' = -p² (± (1 + a_y/g) sin(α - |θ|) - a_x/g cos(α - |θ|)), p² = 3g/4R, θ' "
+            "times 1 - 1.5 sin²α where θ = 0"
+        ),
+        source="Housner 1963",
+        range=(
+            "width below √2 height; a rigid block that rocks, and does not overturn, slide "
+            "or bounce"
+        ),
+        fields=("width", "height", "gravity"),
+        reads=("t", "{theta}", "{acceleration}", "{vertical}"),
+        answers={"angle": "rad", "impact": "s"},
+    )
 
     width: Length
     height: Length

@@ -1,4 +1,5 @@
-"""Write fields of a run, and resultants that need elements.
+"""Write fields of a run, and compute what its recorders need of elements.
 
-These are reactions, section forces, nodal work.
+This is the work of nodal forces, plane cuts and mean strains; the recorders themselves stand in
+``run.recorders``.
 """

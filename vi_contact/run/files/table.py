@@ -5,7 +5,6 @@ These are compact columns; of a run with a folder only so much of them is held.
 
 import copy
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,9 +22,18 @@ BYTES = 16 * 2**20
 KEPT = 64 * 2**20  # bytes of histories that stay in memory of a run with a folder, on each rank
 SHARED = 10_000  # rows of an array (contact points) up to which every rank gets it at the end
 
-# of the energy ledger
-WORDS = tomllib.loads(Path(__file__).with_name("ledger.toml").read_text(encoding="utf-8"))
-LEDGER = tuple(WORDS["titles"].items())
+# Terms of the energy ledger: column -> title, in the order in which a summary prints them.
+LEDGER = {
+    "work_input": "input work",
+    "energy_kinetic": "kinetic energy",
+    "energy_strain": "strain energy",
+    "loss_damping": "damping",
+    "loss_contact": "contact work",
+    "loss_friction": "friction work",
+    "loss_impact": "impact loss",
+    "loss_algorithmic": "algorithmic loss",
+    "energy_defect": "defect",
+}
 
 # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
 Block = dict[str, Array]
@@ -230,7 +238,7 @@ class Tally:
 
     def add(self, rows: Mapping[str, Array]) -> None:
         """Add rows, in order: column -> values."""
-        ends = [name for name in ("t", *dict(LEDGER)) if name in rows]
+        ends = [name for name in ("t", *LEDGER) if name in rows]
         self._last = {name: float(rows[name][-1]) for name in ends}
         self._first = self._first or {name: float(rows[name][0]) for name in ends}
         steps = slice(0 if self._rows else 1, None)
@@ -249,7 +257,7 @@ class Tally:
             self._raise("defect", np.abs(rows["energy_defect"]))
             self._raise(
                 "created",
-                -np.asarray(sum(rows[name] for name, _ in LEDGER if name.startswith("loss_"))),
+                -np.asarray(sum(rows[name] for name in LEDGER if name.startswith("loss_"))),
             )
 
     def _add(self, name: str, values: Array) -> None:
@@ -295,7 +303,7 @@ class Tally:
         energy = {
             "energy_start": start,
             "energy_max": most["energy"],
-            **{name: last[name] for name, _ in LEDGER[:-1]},
+            **{name: last[name] for name in LEDGER if name != "energy_defect"},
             "energy_defect_joule": last["energy_defect"],
             "energy_defect": relative,
         }

@@ -8,9 +8,7 @@ carries along is, in held rows, the reaction there. To look at the signs costs n
 on from a known residual costs none either: PETSc solves for the correction.
 """
 
-import tomllib
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,8 +24,28 @@ Watch = Callable[[int, Array, Callable[[], Array]], int]
 SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
 # too many iterations; not a number; indefinite matrix
 STAGNATED, NOT_A_NUMBER, INDEFINITE = (-3, -9, -10)
-# what happened, what helps
-SAID = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_OTHER_PRECONDITIONER = (
+    "take another preconditioner, or Condensed() where a factor fits into memory"
+)
+_CHECK_MATRIX = (
+    "check that every body is held or has mass, that A is positive definite, and that "
+    "no material is a million times stiffer than its neighbour"
+)
+# PETSc's reasons for stopping: number -> (what happened, what helps).
+REASONS: Mapping[int, tuple[str, str]] = {
+    2: ("the contact set did not settle", _OTHER_PRECONDITIONER),
+    -3: ("the residual stagnated", f"{_CHECK_MATRIX}; else {_OTHER_PRECONDITIONER}"),
+    -8: ("the preconditioner is not positive definite", _OTHER_PRECONDITIONER),
+    -9: (
+        "the residual is not a number",
+        "check the load, the guess and the bound of this step for NaN",
+    ),
+    -10: ("A is not positive definite", _CHECK_MATRIX),
+    -11: ("the preconditioner could not be applied", _OTHER_PRECONDITIONER),
+}
+# Of what stopped for none of them.
+CG_BROKE_DOWN = ("conjugate gradients broke down", f"{_CHECK_MATRIX}; else {_OTHER_PRECONDITIONER}")
+GMRES_BROKE_DOWN = ("GMRES broke down", _OTHER_PRECONDITIONER)
 SHOWN = 6  # residuals
 
 
@@ -77,7 +95,7 @@ def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -
 
     ``history`` are residuals over the forces.
     """
-    words, remedy = SAID.get(str(reason), SAID["cg"])
+    words, remedy = REASONS.get(reason, CG_BROKE_DOWN)
     return StepFailure(
         f"{name} stopped after {iterations} linear iterations, {words} (residuals "
         f"{told(history)}): {remedy}"

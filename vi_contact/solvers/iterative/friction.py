@@ -16,7 +16,7 @@ from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...laws.friction import project
-from .conjugate_gradients import NOT_A_NUMBER, SAID, told
+from .conjugate_gradients import GMRES_BROKE_DOWN, NOT_A_NUMBER, REASONS, told
 from .contact import Contact
 from .friction_krylov import Gmres, Turned
 from .friction_states import LawOfStep, Limits, States, Tangents
@@ -192,7 +192,7 @@ class Newton:
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
-            raise self._stopped(*SAID[str(NOT_A_NUMBER)])
+            raise self._stopped(*REASONS[NOT_A_NUMBER])
         self.goal = of.worth.goal(
             self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0
         )
@@ -237,7 +237,7 @@ class Newton:
         share = min(SHARE, AHEAD * last[1] / last[0]) if last[0] > 0.0 and len(last) > 1 else SHARE
         dx, left, reason = of.gmres.solve(residual, share, 0.5 * self.goal)
         if reason < 0:
-            raise self._stopped(*SAID.get(str(reason), SAID["gmres"]))
+            raise self._stopped(*REASONS.get(reason, GMRES_BROKE_DOWN))
         of.operator.work.newton_steps += 1
         self.steps += 1
         self.x += dx

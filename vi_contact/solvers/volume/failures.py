@@ -5,22 +5,39 @@ here.
 """
 
 import re
-import tomllib
-from pathlib import Path
 from typing import Any
 
 from ...core.errors import StepFailure
 
 # SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
 NOT_A_NUMBER = -4
-WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# Names of PETSc's reasons for stopping -> their meaning.
+MEANING = {
+    "DIVERGED_FUNCTION_DOMAIN": "the residual could not be evaluated",
+    "DIVERGED_FUNCTION_COUNT": "too many residual evaluations",
+    "DIVERGED_LINEAR_SOLVE": "a linear system could not be solved",
+    "DIVERGED_FNORM_NAN": "the residual is not a number",
+    "DIVERGED_FUNCTION_NANORINF": "the residual is not a number",
+    "DIVERGED_OBJECTIVE_NANORINF": "the objective is not a number",
+    "DIVERGED_MAX_IT": "the iteration limit was reached",
+    "DIVERGED_LINE_SEARCH": "the line search found no descent",
+    "DIVERGED_INNER": "the inner solve failed",
+    "DIVERGED_LOCAL_MIN": "the merit function has a minimum that is no solution",
+    "DIVERGED_DTOL": "the residual grew without limit",
+    "DIVERGED_MAXITS": "the iteration limit was reached",
+    "DIVERGED_NAN": "the objective is not a number",
+    "DIVERGED_MAXFCN": "too many evaluations of the objective",
+    "DIVERGED_LS_FAILURE": "the line search found no descent",
+    "DIVERGED_TR_REDUCTION": "the trust region shrank to nothing",
+    "DIVERGED_USER": "the matrix is not positive definite, so that nothing has a minimum",
+}
 CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
 ADVICE = {
     "DIVERGED_LINEAR_SOLVE": (
         "check that the body is held or that mass enters A, and that A is positive definite"
     ),
     **dict.fromkeys(
-        (name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS
+        (name for name, words in MEANING.items() if words.endswith("not a number")), CHECK_NUMBERS
     ),
 }
 ERRORS = {  # of PETSc, by number
@@ -53,7 +70,7 @@ def name_of(reasons: type, reason: int) -> str:
 def stopped(method: str, reasons: type, reason: int, iterations: int, worst: float) -> StepFailure:
     """Return the failure of a solver that stopped with a reason <= 0."""
     name = name_of(reasons, reason)
-    words = WORDS.get(name, "no convergence")
+    words = MEANING.get(name, "no convergence")
     return StepFailure(
         f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, "
         f"{name} ({words}): {ADVICE.get(name, GENERAL_ADVICE)}"

@@ -10,12 +10,10 @@ solvers with one prefix do not meet.
 
 import ctypes
 import logging
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from ...core import packages
@@ -23,6 +21,7 @@ from ...core.algebra import Comm
 from ...core.errors import InputError
 from ..petsc import PETSc
 from .failures import last_line
+from .option_names import KNOWN
 
 log = logging.getLogger(__name__)
 Options = Mapping[str, object | None]
@@ -172,9 +171,63 @@ def refuse(combination: str, reason: str, remedy: str) -> None:
 
 _TOLD: set[str] = set()  # options of the command line that a warning has named
 NOT_EXACT = "one application of it does not solve the system"
-TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-REDUCED_PC = TABLES["reduced_pc"]
-KNOWN = tuple(TABLES["known"].split())
+# Linear solvers for symmetric matrices alone.
+SYMMETRIC_KSP = (
+    "cg",
+    "pipecg",
+    "groppcg",
+    "cgne",
+    "cr",
+    "minres",
+    "symmlq",
+    "nash",
+    "stcg",
+    "gltr",
+    "chebyshev",
+)
+# Where options of a part begin: those of blocks, of levels of a multigrid.
+PARTS = ("sub_", "mg_coarse_sub_", "mg_coarse_", "mg_levels_", "esteig_")
+# Newton's method on the inequality. Line search: bt throttles changes of the active set, 16 to 50
+# iterations instead of 5 to 7. Tolerances: ScaledStep.verdict decides; a user who sets one of these
+# options stops earlier, relative to |b|.
+NEWTON: Options = {
+    "snes_linesearch_type": "none",
+    "snes_vi_zero_tolerance": 0.0,
+    "snes_max_it": 100,
+    "snes_rtol": 0.0,
+    "snes_atol": 0.0,
+    "snes_stol": 0.0,
+}
+# A direct solver; icntl_20 = 0, as distributed right-hand sides crash.
+MUMPS: Options = {
+    "ksp_type": "preonly",
+    "pc_factor_mat_solver_type": "mumps",
+    "mat_mumps_icntl_20": 0,
+}
+# TAO's trust region method on the bounds; ScaledStep.verdict decides here too.
+TRON: Options = {
+    "tao_gatol": 0.0,
+    "tao_grtol": 0.0,
+    "tao_gttol": 0.0,
+    "tao_steptol": 0.0,
+    "tao_max_it": 200,
+    "sub_pc_type": "icc",
+}
+# Preconditioners that cannot work on the reduced systems -> the reason.
+REDUCED_PC = {
+    "gamg": (
+        "it is built on the whole displacement field, and the reduced matrix has lost its "
+        "blocks and rigid modes (PETSc 3.18 stops with error 60 as soon as the active set "
+        "changes)"
+    ),
+    "mg": (
+        "it is built on the whole displacement field, and the reduced matrix has lost its "
+        "blocks and rigid modes, so its grid transfers no longer fit"
+    ),
+    "fieldsplit": (
+        "its field numbers belong to the whole field and select wrong rows of the reduced matrix"
+    ),
+}
 
 
 def _part(key: str) -> str:
@@ -182,7 +235,7 @@ def _part(key: str) -> str:
 
     Such parts are blocks or levels.
     """
-    return next((one for one in TABLES["parts"] if key.startswith(one)), "")
+    return next((one for one in PARTS if key.startswith(one)), "")
 
 
 EXCHANGE = ("umfpack", "superlu")  # solvers that exchange rows
@@ -199,7 +252,7 @@ def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
     own does not do. InputError where nothing else is there.
     """
     if packages.petsc_has("mumps"):
-        return {**TABLES["mumps"], "pc_type": kind}
+        return {**MUMPS, "pc_type": kind}
     own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
     if exchanges:
         found = [name for name in EXCHANGE if packages.petsc_has(name)]
@@ -263,7 +316,7 @@ def _check_unsymmetric(
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     for kind, name, symmetric in (
         ("pc", pc, ("cholesky", "icc")),
-        ("ksp", ksp, TABLES["symmetric_ksp"]),
+        ("ksp", ksp, SYMMETRIC_KSP),
     ):
         if name in symmetric:
             refuse(

@@ -19,7 +19,7 @@ from .bounded_system import BoundedSystem
 from .friction_jacobian import FrictionJacobian
 from .friction_system import ScaledFrictionStep
 from .options import (
-    TABLES,
+    NEWTON,
     OptionLayers,
     Options,
     check_friction,
@@ -28,8 +28,6 @@ from .options import (
     direct,
 )
 from .scaled_step import ScaledStep
-
-NEWTON: Options = TABLES["newton"]
 
 
 class SnesDriver:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ..petsc import PETSc
-from .options import REDUCED_PC, TABLES, OptionLayers, Options, refuse
+from .options import REDUCED_PC, TRON, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
 
@@ -115,7 +115,7 @@ class TaoTron:
 
         PETSc has no incomplete Cholesky for several ranks.
         """
-        return {**TABLES["tron"], "pc_type": "icc" if ranks == 1 else "bjacobi"}
+        return {**TRON, "pc_type": "icc" if ranks == 1 else "bjacobi"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """Return the TAO object."""

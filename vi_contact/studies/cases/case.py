@@ -42,7 +42,8 @@ from ...run.cross_check import CrossChecked
 from ...run.files.folder import locked, refuse_files_of_others, run_folder
 from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
-from ...run.recorders import Contact, Energy, Steps
+from ...run.recorders import Contact, Energy
+from ...run.recorders.steps import Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import StepPlan, step_plan
 from .expressions import check_axes

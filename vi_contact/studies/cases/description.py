@@ -4,8 +4,8 @@ This is what ``run --check`` tells and model.json holds.
 """
 
 import json
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,65 @@ ROUNDED = 1e-9  # of a time step
 FEW = 10_000
 DIGITS = 10  # of a number: those beyond depend on the number of ranks
 RATIO_DIGITS = 4  # of the damping ratio of a mode, which is found less sharply than its period
-WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Say a part of the description of a model.
+
+    Attributes:
+        text: filled in with the model, or with each entry of its list ``key``.
+        key: a list of the model, None for the model itself.
+        heading: the line before the first entry of the list.
+        needs: the key without which the part is left out; "" for none.
+    """
+
+    text: str
+    key: str | None = None
+    heading: str = ""
+    needs: str = ""
+
+
+# What the description of a model says, line by line.
+PARTS = (
+    _Part(text="{title}\n{dimension}D, {unknowns} unknowns of degree {degree}, {mass:.4g} kg"),
+    _Part(key="groups", heading="groups of the mesh:", text="  {name} ({kind})"),
+    _Part(
+        key="bodies", heading="bodies:", text="  {name}: {cells} cells, {mass:.4g} kg; {material}"
+    ),
+    _Part(key="supports", heading="supports:", text="  {groups}: {kind} along {components}"),
+    _Part(
+        key="contact",
+        heading="contact:",
+        text="  {name}: {points} points on {size:.4g} m²; {friction}",
+    ),
+    _Part(key="contact", heading="contact nodes:", text="  {name}: {nodes}"),
+    _Part(
+        key="waves",
+        heading="shear waves:",
+        text=(
+            "  {body}: {c_s:.4g} m/s; edges of {h:.3g} m, 8 edges in a wave length up to "
+            "{f_max:.3g} Hz; a wave passes {dt_ratio:.3g} edges in a step"
+        ),
+    ),
+    _Part(
+        key="records",
+        heading="records:",
+        text=(
+            "  {file}, scaled by {scale:g}: peak {pga:.3g} m/s², {duration:.4g} s in steps "
+            "of {dt:.4g} s, 95 % of its energy below {f_95:.3g} Hz"
+        ),
+    ),
+    _Part(
+        needs="periods",
+        text=(
+            "natural periods, contact closed where it touches at the start: {periods} "
+            "s\nrigid motions that are left: {rigid_motions}"
+        ),
+    ),
+    _Part(text="damping: {damping}"),
+    _Part(text="run: {run[steps]} steps of {run[dt]:.4g} s, {run[t_end]:.4g} s"),
+)
 
 
 def describe(
@@ -116,18 +174,16 @@ def describe(
 def in_words(model: Mapping[str, Any]) -> str:
     """Return what ``describe`` found, as lines of text."""
     lines = []
-    for part in WORDS["part"]:
-        rows = (
-            model[part["key"]]
-            if "key" in part
-            else [model]
-            if part.get("needs", "title") in model
-            else []
-        )
-        lines += [part["heading"]] if rows and "heading" in part else []
-        lines += [
-            part["text"].format(**{key: _word(one) for key, one in row.items()}) for row in rows
-        ]
+    for part in PARTS:
+        if part.key is not None:
+            entries = model[part.key]
+        else:
+            entries = [model] if not part.needs or part.needs in model else []
+        if entries and part.heading:
+            lines.append(part.heading)
+        for entry in entries:
+            words = {key: _word(value) for key, value in entry.items()}
+            lines.append(part.text.format(**words))
     return "\n".join([*lines, *(f"warning: {one}" for one in model["warnings"])])
 
 
@@ -307,34 +363,76 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
         found |= {} if opened is None else {"periods_open": [opened]}
         found["damping_ratios"] = [float(f"{one:.{RATIO_DIGITS}g}") for one in modes.ratios]
     if "strain_compatible" in case.nodes:  # the system has the damping of other cells only
-        return {**found, "damping_ratios": [], "damping": WORDS["by_curves"]}
-    unknown = WORDS["many"].format(unknown=NOT_COMPUTED, most=most)
-    return {**found, "damping": damping_in_words(problem, unknown="" if few else unknown)}
+        words = "that of the curves of [strain_compatible], which the run finds"
+        return {**found, "damping_ratios": [], "damping": words}
+    unknown = "" if few else f"{NOT_COMPUTED}, as the model has more than {most} unknowns"
+    return {**found, "damping": damping_in_words(problem, unknown=unknown)}
 
 
 def _defects(model: Mapping[str, Any]) -> Iterator[str]:
     """Yield why records do not fit to each other or to the time step, a sentence each."""
+    dt = model["run"]["dt"]
     for one, other in pairwise(model["records"]):
-        for key, words in (("dt", "uneven"), ("duration", "unequal")):
-            if abs(one[key] - other[key]) > ROUNDED * one[key]:
-                yield WORDS[words].format(one=one, other=other)
-    for one in model["records"]:
-        if model["run"]["dt"] > one["dt"] * (1.0 + ROUNDED):
-            yield WORDS["long"].format(one=one, run=model["run"])
+        if abs(one["dt"] - other["dt"]) > ROUNDED * one["dt"]:
+            yield (
+                f"'{one['file']}' and '{other['file']}' have samples every {one['dt']:g} and "
+                f"{other['dt']:g} s: bring them to one step with record = "
+                f'{{path = "FILE", resample_dt = {one["dt"]:g}}}'
+            )
+        if abs(one["duration"] - other["duration"]) > ROUNDED * one["duration"]:
+            yield (
+                f"'{one['file']}' and '{other['file']}' last {one['duration']:g} and "
+                f"{other['duration']:g} s: trim or pad one of them in its table of processing"
+            )
+    for record in model["records"]:
+        if dt > record["dt"] * (1.0 + ROUNDED):
+            yield (
+                f"the time step of {dt:g} s leaves out samples of '{record['file']}', which has "
+                f"one every {record['dt']:g} s: shorten [run] dt, or give the record resample_dt "
+                f"= {dt:g}"
+            )
 
 
 def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
     """Yield what an engineer should look at, a sentence each."""
-    for one in sorted(model["records"], key=lambda one: float(one["f_95"]))[-1:]:
-        coarse = (wave for wave in model["waves"] if one["f_95"] > wave["f_max"])
-        yield from (WORDS["coarse"].format(wave=wave, one=one) for wave in coarse)
-    for sides in (one["sides"] for one in model["contact"] if one["sides"]):
-        if sides[1]["h"] > COARSER * sides[0]["h"] and sides[1]["G"] < sides[0]["G"]:
-            yield WORDS["unlike"].format(one=sides[0], two=sides[1])
-    if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
-        yield WORDS["slow"].format(**model)
-    elif model["run"]["dt"] > next(iter(model.get("periods_open", ())), np.inf) / STEPS:
-        yield WORDS["slow_open"].format(**model)
+    # Elements too long for the shear waves of the record with the highest frequencies.
+    for record in sorted(model["records"], key=lambda record: float(record["f_95"]))[-1:]:
+        for wave in model["waves"]:
+            if record["f_95"] > wave["f_max"]:
+                yield (
+                    f"'{wave['body']}' carries shear waves up to {wave['f_max']:.3g} Hz and "
+                    f"'{record['file']}' has 95 % of its energy below {record['f_95']:.3g} Hz: "
+                    "give smaller elements, or filter the record"
+                )
+
+    # A softer side of a contact with longer edges cannot follow the points of the other side.
+    for contact in model["contact"]:
+        if not contact["sides"]:
+            continue
+        one, two = contact["sides"]
+        if two["h"] > COARSER * one["h"] and two["G"] < one["G"]:
+            yield (
+                f"'{one['name']}', side 1 of its contact, has edges of {one['h']:.3g} m, and "
+                f"'{two['name']}', the softer side, has edges of {two['h']:.3g} m: points open "
+                f"there and pressures zigzag, so mesh '{two['name']}' as finely, or exchange "
+                "facets1 and facets2"
+            )
+
+    # Time steps too long for the first period, of the model with the contact closed or open.
+    dt = model["run"]["dt"]
+    closed = next(iter(model.get("periods", ())), np.inf)
+    lifted = next(iter(model.get("periods_open", ())), np.inf)
+    if dt > closed / STEPS:
+        yield (
+            f"the time step of {dt:.3g} s is longer than a twentieth of the first natural period, "
+            f"{closed:.3g} s: the computed periods become too long, so shorten [run] dt"
+        )
+    elif dt > lifted / STEPS:
+        yield (
+            f"the time step of {dt:.3g} s is longer than a twentieth of the first natural period "
+            f"with the contact open, {lifted:.3g} s: what moves after it has lifted off is "
+            "computed too slowly, so shorten [run] dt"
+        )
 
 
 def write_model(comm: Comm, model: Mapping[str, Any], folder: Path) -> None:

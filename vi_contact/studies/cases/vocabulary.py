@@ -75,14 +75,13 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     ),
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
-    fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
+    fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, FieldWriter),
     solvers: (Solver,),
     normal: (SmallMethod,),
     friction: (FrictionMethod, Extrapolation),
     volume: (Method,),
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
-    engineering: (Recorder,),
     checks: (Check,),
     soil: (SoilCurves,),
 }
@@ -224,9 +223,9 @@ def resultants(
     centre: Annotated[tuple[float, ...] | None, Unit("m")] = None,
     normal: tuple[float, ...] | None = None,
     part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
-) -> engineering.Resultants:
+) -> run.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
-    return engineering.Resultants(name, centre, normal=normal, part=part)
+    return run.Resultants(name, centre, normal=normal, part=part)
 
 
 def upgoing(

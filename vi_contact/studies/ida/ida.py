@@ -12,7 +12,6 @@ import hashlib
 import math
 import os
 import time
-import tomllib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -45,7 +44,24 @@ SECONDS = 30.0  # between two lines about the time left
 SHARES = (0.16, 0.50, 0.84)
 TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
 FRAGILITY = "fragility.csv"
-_COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
+# Columns of ida.csv before and after the intensity and the demands: column -> (unit, meaning).
+_FIRST_COLUMNS: Units = {
+    "record": ("-", "name of the record"),
+    "scale": ("-", "factor on the motion of the case"),
+}
+_LAST_COLUMNS: Units = {
+    "certificate": ("-", "worst certificate of the run"),
+    "energy_created": (
+        "-",
+        (
+            "energy that contact and time scheme created, over the largest energy; with the "
+            "recorder Energy() only"
+        ),
+    ),
+    "steps": ("-", "steps of the run"),
+    "status": ("-", "finished or failed"),
+    "reason": ("-", "why the run failed"),
+}
 
 
 @dataclass(frozen=True)
@@ -310,10 +326,10 @@ def _tabulated(
     found.sort(
         key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"])
     )
-    units: Units = _COLUMNS["first"] | {
+    units: Units = _FIRST_COLUMNS | {
         measure.name: (measure.unit, f"{measure.meaning} of the scaled motion")
     }
-    units |= {one.name: ("", one.meaning) for one in demands} | _COLUMNS["last"]
+    units |= {one.name: ("", one.meaning) for one in demands} | _LAST_COLUMNS
     rows = []
     for folder, row in found:
         measured: Row = {measure.name: None} | {one.name: None for one in demands}

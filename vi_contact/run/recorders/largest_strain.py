@@ -3,15 +3,13 @@
 from collections.abc import Mapping
 
 import numpy as np
-import ufl
 
 from ...core.algebra import Array, largest
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
-from .. import compat
-from ..petsc_algebra import PetscMatrix
-from ..space import space_of
+from ...fem.output.cell_strains import CellStrains
+from ...fem.space import space_of
 
 
 class LargestStrain:
@@ -39,19 +37,13 @@ class LargestStrain:
             raise InputError(
                 "LargestStrain does not know the strains before the checkpoint: run from the start"
             )
-        self._problem, self._space = problem, space_of("LargestStrain", problem.system)
-        V, d = self._space.V, self._space.dimension
-        if d == 1:
+        self._problem = problem
+        self._space = space_of("LargestStrain", problem.system)
+        if self._space.dimension == 1:
             raise InputError("LargestStrain: a body on a line has no shear strain; leave it out")
-        tensors = compat.lagrange(V.mesh, 0, (d, d), continuous=False)
-        q, eps = ufl.TestFunction(tensors), ufl.sym(ufl.grad(ufl.TrialFunction(V)))
-        self._integral = PetscMatrix(
-            compat.assemble_matrix(compat.compile_form(ufl.inner(q, eps) * ufl.dx))
-        )
-        volumes = np.array(compat.assemble_vector(compat.compile_form(q[0, 0] * ufl.dx)).array_r)
-        self._volumes = volumes.reshape(-1, d * d)[:, :1]
-        self._order = compat.cell_blocks(tensors)[: len(self._volumes), 0]
-        self._begin, self.values = self._nodal(state), np.zeros(len(self._volumes))
+        self._strains = CellStrains(self._space)
+        self._begin = self._nodal(state)
+        self.values = np.zeros(len(self._strains))
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -59,13 +51,15 @@ class LargestStrain:
         return self._row(report.new)
 
     def _nodal(self, state: State) -> Array:
+        """Return the displacements of all nodes [m], as one row."""
         return self._space.expand(self._problem.cartesian(state.u), state.t).ravel()
 
     def _row(self, state: State) -> Row:
+        """Take a state into the largest values, and return the largest of all cells."""
         d = self._space.dimension
-        eps = (self._integral @ (self._nodal(state) - self._begin)).reshape(
-            -1, d * d
-        ) / self._volumes
-        square = 2.0 * (np.sum(eps**2, axis=1) - np.sum(eps[:, :: d + 1], axis=1) ** 2 / d)
-        self.values = np.maximum(self.values, np.sqrt(np.maximum(square, 0.0))[self._order])
+        eps = self._strains.mean(self._nodal(state) - self._begin)
+        # dev(eps):dev(eps) = eps:eps - tr(eps)²/d, which round-off may leave just below zero
+        trace = np.sum(eps[:, :: d + 1], axis=1)
+        square = 2.0 * (np.sum(eps**2, axis=1) - trace**2 / d)
+        self.values = np.maximum(self.values, np.sqrt(np.maximum(square, 0.0)))
         return {"largest_shear_strain": largest(self._space.comm, self.values.max(initial=0.0))}

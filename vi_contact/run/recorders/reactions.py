@@ -12,10 +12,10 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
-from ..groups import facets_of
-from ..mesh import Facets
-from ..space import FemSpace
-from .nodal_work import Loads, NodalWork, check_actions
+from ...fem.groups import facets_of
+from ...fem.mesh import Facets
+from ...fem.output.nodal_work import Loads, NodalWork, check_actions
+from ...fem.space import FemSpace
 
 
 @dataclass
@@ -72,14 +72,13 @@ class Reactions:
         """Call ``start`` first."""
         force = "N", f"force of boundary {self.name} on the body"
         moment = "N m", f"moment of boundary {self.name} on the body about its centre"
-        found = {}
+        columns = {}
         for part in self._parts:
             unit, text = moment if part.startswith("M") else force
-            found[f"reaction_{part}_{self.name}"] = (
-                unit,
-                text if part == "M" else f"{text} along {part[-1]}",
-            )
-        return found
+            if part != "M":  # the moment in the plane has no axis
+                text = f"{text} along {part[-1]}"
+            columns[f"reaction_{part}_{self.name}"] = (unit, text)
+        return columns
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
@@ -95,12 +94,15 @@ class Reactions:
             raise InputError(
                 f"{owner}: the centre has {len(self.centre)} coordinates: give {space.dimension}"
             )
+
+        # The components that count: held ones on the facets, and all of those with dashpots.
         held = np.zeros_like(space.held)
         facets_of(owner, "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
         held[blocks] = space.held[blocks]
-        for one in space.forms.boundaries:
-            held[space.facet_blocks(np.intersect1d(self.facets.indices, one.facets.indices))] = True
+        for boundary in space.forms.boundaries:
+            shared = np.intersect1d(self.facets.indices, boundary.facets.indices)
+            held[space.facet_blocks(shared)] = True
         if not largest(space.comm, held.any()):
             raise InputError(
                 f"nothing is prescribed on boundary group '{self.facets.name}', and it has no "
@@ -110,11 +112,12 @@ class Reactions:
             space.dimension
         ]
         self._work.take([(held, np.asarray(self.centre, dtype=float), None, None)])
-        return self._named(self._work.at_rest(state))
+        return self._row(self._work.at_rest(state))
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
-        return self._named(self._work.of_step(report))
+        return self._row(self._work.of_step(report))
 
-    def _named(self, values: np.ndarray) -> Row:
+    def _row(self, values: np.ndarray) -> Row:
+        """Return components of force and moment, in the order of the columns, as a row."""
         return dict(zip(self.columns(), values.tolist(), strict=True))

@@ -1,0 +1,41 @@
+"""Average strains over cells."""
+
+import numpy as np
+import ufl
+
+from ...core.algebra import Array
+from .. import compat
+from ..petsc_algebra import PetscMatrix
+from ..space import FemSpace
+
+
+class CellStrains:
+    """Average small strains over the cells of a mesh: eps = ∫ sym grad u dx / volume of the cell.
+
+    The integrals of all cells are one matrix times the nodal displacements, which is assembled
+    once.
+    """
+
+    def __init__(self, space: FemSpace) -> None:
+        V, d = space.V, space.dimension
+        self._components = d * d
+        tensors = compat.lagrange(V.mesh, 0, (d, d), continuous=False)
+        q, eps = ufl.TestFunction(tensors), ufl.sym(ufl.grad(ufl.TrialFunction(V)))
+        form = compat.compile_form(ufl.inner(q, eps) * ufl.dx)
+        self._integrals = PetscMatrix(compat.assemble_matrix(form))
+        volumes = compat.assemble_vector(compat.compile_form(q[0, 0] * ufl.dx)).array_r
+        self._volumes = np.array(volumes).reshape(-1, self._components)[:, :1]
+        # The rows of the matrix are in the order of the tensors, which need not be that of cells.
+        self._order = compat.cell_blocks(tensors)[: len(self._volumes), 0]
+
+    def __len__(self) -> int:
+        """Return how many cells this rank owns."""
+        return len(self._volumes)
+
+    def mean(self, u: Array) -> Array:
+        """Return mean strains (owned cells, d²), row by row, of nodal displacements. Collective.
+
+        The displacements (nodes d,) [m] are those of ``FemSpace.expand``, as one row.
+        """
+        integrals = (self._integrals @ u).reshape(len(self), self._components)
+        return np.asarray((integrals / self._volumes)[self._order])

@@ -1,0 +1,10 @@
+from .contact import Contact as Contact
+from .energy import Energy as Energy
+from .largest_strain import LargestStrain as LargestStrain
+from .probe import Probe as Probe
+from .racking import Racking as Racking
+from .reactions import Reactions as Reactions
+from .resultants import Resultants as Resultants
+from .section_forces import SectionForces as SectionForces
+
+__all__: list[str]

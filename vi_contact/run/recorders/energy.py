@@ -1,0 +1,108 @@
+"""Record the energy ledger of a run."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ...core.problem import ContactProblem
+from ...core.step import Columns, Report, Row, State
+from ...core.ledger import Energies, energies, energy_balance
+
+
+class Energy:
+    """Record the energy ledger of the run in joules. Works and losses are sums since the start.
+
+        W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic
+                         - defect
+
+        E = ½ vᵀMv + ½ uᵀKu   of the free unknowns, and with initial strains
+        E = ½ vᵀMv + ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0
+
+    with f_0·u = ∫ C eps_0 : eps(u), so that the latter is ½ ∫ (eps - eps_0) : C (eps - eps_0) if
+    supports are at zero. Rates of initial strains do work too. E has no energy that moved supports
+    store by themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign.
+    W_input is the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the
+    summed work of the residual of the equation of motion; ``summary.json`` has its size over the
+    largest energy or work. Each step costs three products, and damping and impacts cost one more
+    each.
+    """
+
+    _COLUMNS: ClassVar[Columns] = {
+        "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
+        "energy_strain": ("J", "strain energy ½ uᵀKu"),
+        "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
+        "loss_damping": ("J", "work of viscous damping since the start"),
+        "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
+        "loss_friction": ("J", "work of friction since the start"),
+        "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
+        "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
+        "energy_defect": ("J", "what the ledger cannot explain since the start"),
+    }
+    _SUMS = tuple(_COLUMNS)[2:]
+
+    def columns(self) -> Columns:
+        """Name energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
+        return self._COLUMNS
+
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
+        """Return the initial energies.
+
+        Works and losses are zero, or those of the run that is continued.
+        """
+        self._problem = problem
+        self._now = energies(problem.equations, state.u, state.v)
+        self._stored = self._stored_by_strains(state)
+        self._sums = dict.fromkeys(self._SUMS, 0.0)
+        if resumed is not None:
+            self._sums = {term: float(resumed[term]) for term in self._SUMS}
+        return self._row()
+
+    def _row(self) -> Row:
+        return {
+            "energy_kinetic": self._now.kinetic,
+            "energy_strain": self._now.strain + self._stored,
+            **self._sums,
+        }
+
+    def _stored_by_strains(self, state: State) -> float:
+        """Return what initial strains add to ½ uᵀKu [J]."""
+        initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
+        if initial is None:
+            return 0.0
+        return float(initial.energy(self._problem.cartesian(state.u), state.t))
+
+    def row(self, report: Report) -> Row:
+        """Return the row of the step that ``report`` tells of."""
+        system, new = self._problem.equations, report.new
+        end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
+        with np.errstate(over="ignore", invalid="ignore"):  # the session refuses overflow
+            # The step without its impact: from the energies before it to those of v⁻.
+            free = energies(system, new.u, report.v_minus)
+            step = energy_balance(
+                self._problem, report.old, end, report.balance, before=self._now, after=free
+            )
+            # The impact law changes velocities, and so the kinetic energy alone.
+            self._now = free
+            if new.v is not report.v_minus:
+                momentum = system.product("M", new.v)
+                kinetic = 0.5 * system.algebra.dot(new.v, momentum)
+                self._now = Energies(momentum, free.elastic, kinetic, free.strain)
+
+        # Rates of initial strains do the work by which the energy they store has grown.
+        before = self._stored
+        self._stored = self._stored_by_strains(new)
+        losses = (
+            step.input + (self._stored - before),
+            step.damping,
+            step.contact,
+            step.friction,
+            free.kinetic - self._now.kinetic,
+            step.algorithmic,
+            step.defect,
+        )
+        for term, loss in zip(self._SUMS, losses, strict=True):
+            self._sums[term] += loss
+        return self._row()

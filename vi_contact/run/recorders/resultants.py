@@ -1,0 +1,206 @@
+"""Record resultants of a part of the contact surface: thrust, shear, moment, uplift, rotation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from ...core.algebra import Mask, from_each, largest
+from ...core.checks import array, column_name, optional, provides
+from ...core.errors import InputError
+from ...core.problem import ContactProblem
+from ...core.quantities import Unit
+from ...core.step import AXES, Columns, Report, Row, State
+from ...core.surfaces import ContactSurface
+from ...engineering.resultants import DETERMINED, Part, Where, check_part
+
+# Quantity -> (unit, meaning).
+_MEANING: Columns = {
+    "uplift": ("-", "uplift ratio 1 - L_contact/L"),
+    "opening": ("m", "largest gap"),
+    "slip": ("m", "largest tangential displacement on the support"),
+    "force": ("N", "contact force on the body"),
+    "N": ("N", "normal force -F·n, compression positive"),
+    "T": ("N", "tangential force F·t on the body"),
+    "M": ("N m", "moment on the body about the centre, anticlockwise positive"),
+    "e": ("m", "eccentricity M/N; nan without normal force"),
+    "height": ("m", "height of the thrust above the centre; nan while open"),
+    "theta": (
+        "rad",
+        (
+            "rocking angle, anticlockwise positive; nan where the points of the part do not "
+            "determine it"
+        ),
+    ),
+    "settlement": ("m", "mean displacement towards the support"),
+    "level": (
+        "-",
+        ("height of the thrust above the lowest point over the height of the part; nan while open"),
+    ),
+    "sliding": ("m", "mean tangential displacement on the support; in space its size"),
+    "margin": ("-", "share of the friction that is left, 1 - |T|/limit; nan while open"),
+    "pressure_low": ("Pa", "contact pressure at the end where the longest coordinate is least"),
+    "pressure_high": ("Pa", "contact pressure at the end where the longest coordinate is largest"),
+}
+# What the normal displacements of a part tell of its motion, by dimension.
+_MOTIONS: Mapping[int, Sequence[str]] = {
+    1: (),
+    2: ("theta", "settlement"),
+    3: (*(f"theta_{axis}" for axis in AXES), "settlement"),
+}
+
+
+@dataclass
+class Resultants:
+    """Record columns <quantity>_<name> of a named part of the contact surface, such as N_base.
+
+    The quantities are uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta,
+    settlement (relative to the support), level, sliding, pressure_low, pressure_high and, with
+    friction, margin. In space there are also force_z and the components of T and e, and those of M
+    and theta take the place of M and theta, as M_x. What has slid in the end is the last
+    ``sliding`` less the first.
+
+    Args:
+        name: names the columns; that of the group ``part`` when left out.
+        centre: the point of reference (d,) [m], of a footing the middle of its base, of a wall a
+            point at the level from which ``height`` counts; the middle of the part at the level of
+            its lowest point when None.
+        where: points (m, d) [m], normals (m, d) -> boolean mask (m,) of the part.
+        normal: direction of N towards the support; the part's mean contact direction when None.
+        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces
+            too: a node belongs wholly, with all its force and weight, to each part that it is in.
+            The whole surface when ``part`` and ``where`` are None.
+
+    Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on
+    a held support. InputError for both part and where, and for a part of no contact points.
+    """
+
+    name: str = ""
+    centre: Annotated[Sequence[float] | None, Unit("m")] = None
+    where: Where | None = None
+    normal: Sequence[float] | None = None
+    part: Any = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            column_name("part name", self.name)
+        self.name = self.name or getattr(self.part, "name", "")
+        column_name("part name", self.name)
+        check_part(self.name, self.centre, self.where, self.normal)
+        if self.part is not None and self.where is not None:
+            raise InputError(f"part '{self.name}' has both part and where: leave one of them out")
+        if not hasattr(self.part, "indices"):
+            optional(
+                array, f"part '{self.name}'", "part, a box,", self.part, (2, None), unit="metres"
+            )
+
+    def columns(self) -> Columns:
+        """Call ``start`` first."""
+        columns = {}
+        for quantity in self._quantities:
+            kind, axis = quantity, ""
+            if quantity not in _MEANING:  # a component, such as force_x
+                kind, _, axis = quantity.partition("_")
+            unit, text = _MEANING[kind]
+            if axis:
+                text = f"{text} along {axis}"
+            columns[f"{quantity}_{self.name}"] = (unit, f"{text}, part {self.name}")
+        return columns
+
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
+        """Find the part once, and return the row of the state, a static one or the start of a run.
+
+        Collective.
+        """
+        self._problem = problem
+        self._surface = problem.surface
+        whole = problem.surface.whole()
+        where = self.where if self.part is None else self._where(whole)
+        self._part = Part(self.name, whole, self.centre, where, self.normal, problem.surface.slots)
+        return self._row(state)
+
+    def _where(self, whole: ContactSurface) -> Where:
+        """Return what picks the conditions of ``part`` out of all. Collective."""
+        chosen = self._in_group(whole) if hasattr(self.part, "indices") else self._in_box(whole)
+        return lambda points, normals: chosen
+
+    def _in_box(self, whole: ContactSurface) -> Mask:
+        """Return which of all conditions (m,) are in the box ``part``, its faces included."""
+        low, high = np.sort(np.asarray(self.part, dtype=float), axis=0)
+        slack = DETERMINED * np.ptp(whole.points, axis=0).max()
+        inside = (whole.points >= low - slack) & (whole.points <= high + slack)
+        return np.asarray(np.all(inside, axis=1))
+
+    def _in_group(self, whole: ContactSurface) -> Mask:
+        """Return which of all conditions (m,) are in the boundary group ``part``. Collective."""
+        space: Any = self._problem.system.space
+        comm = self._surface.comm
+        owner = f"part '{self.name}'"
+        remedy = "use one of fem.assemble"
+        provides(owner, "the system's space", space, ("facet_blocks",), remedy)
+        nodes = from_each(comm, space.nodes[space.facet_blocks(self.part.indices)])
+        chosen = np.isin(whole.nodes, np.concatenate(nodes))  # type: ignore[arg-type]
+
+        # A group that only touches the contact at an edge is a mistake: it has to have a facet all
+        # of whose corners are contact nodes, or clamped ones.
+        clamped = from_each(comm, space.nodes[space.held.all(axis=1)])
+        contact = np.concatenate([whole.nodes, *clamped])
+        touching = np.isin(space.corners_of_facets(self.part.indices), contact)
+        if not largest(comm, touching.all(axis=1).any()):
+            raise InputError(
+                f"{owner}: its group has no whole facet in contact: give a group of the contact, "
+                "or a box"
+            )
+
+        # A node at a corner has a condition for each face: the one counts whose direction is
+        # nearest to the mean of the conditions of the group that are not at corners.
+        alone = chosen.copy()
+        for rows in whole.corners:
+            alone[rows] = False
+        mean = whole.weights[alone] @ whole.normals[alone]
+        for rows in whole.corners:
+            nearest = np.argmax(whole.normals[rows] @ mean)
+            chosen[rows] &= np.arange(len(rows)) == nearest
+        return chosen
+
+    def row(self, report: Report) -> Row:
+        """Return the values of a step."""
+        return self._row(report.new)
+
+    def _row(self, state: State) -> Row:
+        """Return the row of a state. Collective."""
+        surface, part, r_n, d = self._surface, self._part, state.r_n, self._part.dimension
+        u_n = surface.normal_values(state.u)
+        slip = surface.slip(state.u, state.t)
+        gap = surface.gap(state.t) - u_n + surface.compliance * r_n
+
+        # What adds up over the conditions: of this rank, then of all ranks in one message.
+        r_t = None if state.r_t is None else state.r_t[None]
+        forces = part.sums(r_n[None], r_t, state.active[None])[0]
+        motion = u_n[part.mask] @ part.fit
+        ends = r_n[part.mask] @ part.ends
+        slid = np.einsum("k,kdc,kc->d", part.weights, part.tangents, slip[part.mask]) / part.whole
+        limit = [self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()]
+        sums = [forces, motion, ends, slid, limit]
+        everywhere = surface.comm.sum(np.concatenate(sums))
+        borders = np.cumsum([len(values) for values in sums[:-1]])
+        forces, motion, (low, high), slid, (limit,) = np.split(everywhere, borders)
+
+        # Largest values, then the quantities that sums and largest values make.
+        tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
+        quantities = part.quantities(forces[None], tops[None])
+        row = {quantity: float(values[0]) for quantity, values in quantities.items()}
+        row |= dict(zip(_MOTIONS[d], motion.tolist(), strict=False))
+        across = [-part.normal[1], part.normal[0]] if d == 2 else None  # T points along it
+        sliding = np.linalg.norm(slid) if across is None else slid @ across
+        row["level"] = (row["height"] - part.lowest) / part.tall if part.tall else np.nan
+        row["sliding"] = float(sliding)
+        row["pressure_low"] = float(low)
+        row["pressure_high"] = float(high)
+        if self._problem.frictional:
+            row["margin"] = float(1.0 - abs(row["T"]) / limit) if limit > 0.0 else np.nan
+        self._quantities = list(row)
+        return {f"{quantity}_{self.name}": value for quantity, value in row.items()}
