@@ -26,7 +26,7 @@ from step_cost import SCHEME, block, wall  # first: it sets the number of thread
 
 import vi_contact as vc
 from vi_contact.core.contact_last import ContactLast
-from vi_contact.fem.petsc_algebra import PetscMatrix
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 from vi_contact.run.march import March
 from vi_contact.solvers import certified, condensed
 from vi_contact.solvers.normal.active_set import ActiveSet, PreparedSets

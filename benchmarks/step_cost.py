@@ -52,7 +52,7 @@ from vi_contact.core import contact_last  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
 from vi_contact.core.compiled import cholmod  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
-from vi_contact.fem.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
+from vi_contact.fem.matrices.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 

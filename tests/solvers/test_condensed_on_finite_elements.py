@@ -19,7 +19,7 @@ import vi_contact as vc
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.contact_last import ContactLast
 from vi_contact.core.step import PreparedSolver
-from vi_contact.fem import copied_factor, petsc_algebra
+from vi_contact.fem.matrices import copied_factor, petsc_algebra
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 
 COMM = MPI.COMM_WORLD

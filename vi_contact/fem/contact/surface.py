@@ -20,9 +20,9 @@ from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
 from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
-from ..groups import facets_of
-from ..mesh import Facets
-from ..space import FemSpace, space_of
+from ..body.space import FemSpace, space_of
+from ..mesh.group_checks import facets_of
+from ..mesh.tagged_mesh import Facets
 from .borrowing import borrowed
 from .bubbles import averaged
 from .counting import census_on_ranks, tell

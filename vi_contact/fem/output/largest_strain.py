@@ -10,8 +10,8 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
 from .. import compat
-from ..petsc_algebra import PetscMatrix
-from ..space import space_of
+from ..body.space import space_of
+from ..matrices.petsc_algebra import PetscMatrix
 
 
 class LargestStrain:

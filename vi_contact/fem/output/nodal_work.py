@@ -23,12 +23,12 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Balance, Report, State
 from .. import compat
+from ..body.initial_strains import InitialStrain
+from ..body.linear_forms import LOADS, LinearForm, Loads
+from ..body.loads import as_tuple, evaluate
+from ..body.space import known_matrices, space_of
 from ..contact.surface import moved_by_held
-from ..groups import facets_of
-from ..initial_strains import InitialStrain
-from ..linear_forms import LOADS, LinearForm, Loads
-from ..loads import as_tuple, evaluate
-from ..space import known_matrices, space_of
+from ..mesh.group_checks import facets_of
 
 log = logging.getLogger(__name__)
 

@@ -12,9 +12,9 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
-from ..groups import facets_of
-from ..mesh import Facets
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..mesh.group_checks import facets_of
+from ..mesh.tagged_mesh import Facets
 from .nodal_work import Loads, NodalWork, check_actions
 
 

@@ -20,9 +20,9 @@ from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
 from .. import compat
-from ..groups import cells_of
-from ..mesh import Cells
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..mesh.group_checks import cells_of
+from ..mesh.tagged_mesh import Cells
 from .cut_cells import work_beyond
 from .nodal_work import Loads, NodalWork, Rigid, check_actions, rigid_motions
 

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Indices
-from ..core.checks import at
-from ..core.errors import InputError
-from ..meshes.rows import connected
-from .groups import components_given, components_of, facets_of
-from .mesh import Facets
+from ...core.algebra import Array, Indices
+from ...core.checks import at
+from ...core.errors import InputError
+from ...meshes.rows import connected
+from ..mesh.group_checks import components_given, components_of, facets_of
+from ..mesh.tagged_mesh import Facets
 
 PLACE_TOLERANCE = (
     1e-6  # of the body's size: nodes farther from the place of their partner have none

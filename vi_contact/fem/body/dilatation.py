@@ -17,9 +17,9 @@ import numpy as np
 import ufl
 from petsc4py import PETSc
 
-from ..core.algebra import Array
-from . import compat
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
+from ...core.algebra import Array
+from .. import compat
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
 
 
 class MeanDilatation:

@@ -16,18 +16,18 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from vi_contact.core.checks import ended, function, instance, mask, provides, refuse, shown, whole
-from vi_contact.core.collective import Parts, agree
-from vi_contact.core.errors import InputError
-from vi_contact.core.files import on_root
-from vi_contact.core.stages import stage
-from vi_contact.fem import compat
-from vi_contact.fem.communicators import MpiComm
-from vi_contact.fem.compat import Indices
-from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
-from vi_contact.meshes.gmsh_session import MeshScript
-from vi_contact.meshes.partition import destinations
-from vi_contact.meshes.rows import found_in, number_alike
+from ...core.checks import ended, function, instance, mask, provides, refuse, shown, whole
+from ...core.collective import Parts, agree
+from ...core.errors import InputError
+from ...core.files import on_root
+from ...core.stages import stage
+from ...meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
+from ...meshes.gmsh_session import MeshScript
+from ...meshes.partition import destinations
+from ...meshes.rows import found_in, number_alike
+from .. import compat
+from ..compat import Indices
+from .communicators import MpiComm
 
 MOST_NAMED = 20  # values of tags in a message
 

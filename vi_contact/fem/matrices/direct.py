@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..core import packages
-from ..core.errors import InputError
+from ...core import packages
+from ...core.errors import InputError
 
 log = logging.getLogger(__name__)
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more

@@ -8,11 +8,11 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..core.algebra import Array
-from ..core.checks import array, on_all, shown
-from ..core.errors import InputError
-from ..core.system import Load, SemiDiscreteSystem
-from .communicators import MpiComm, kept
+from ...core.algebra import Array
+from ...core.checks import array, on_all, shown
+from ...core.errors import InputError
+from ...core.system import Load, SemiDiscreteSystem
+from ..mesh.communicators import MpiComm, kept
 from .own_matrices import own_system
 from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from .petsc_rows import aij_of, rows_of

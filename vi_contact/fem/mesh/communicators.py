@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..core.algebra import Array
-from ..core.stages import trim
+from ...core.algebra import Array
+from ...core.stages import trim
 
 
 class MpiComm:

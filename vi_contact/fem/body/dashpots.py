@@ -25,16 +25,16 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import ufl
 
-from ..core.algebra import Array, largest
-from ..core.arguments import check_fields
-from ..core.checks import function, instance, optional
-from ..core.errors import InputError
-from ..core.quantities import NotNegative
-from ..laws.materials import LinearElastic, Section
-from . import compat
-from .groups import facets_of
-from .mesh import Facets
-from .petsc_algebra import PetscMatrix
+from ...core.algebra import Array, largest
+from ...core.arguments import check_fields
+from ...core.checks import function, instance, optional
+from ...core.errors import InputError
+from ...core.quantities import NotNegative
+from ...laws.materials import LinearElastic, Section
+from .. import compat
+from ..matrices.petsc_algebra import PetscMatrix
+from ..mesh.group_checks import facets_of
+from ..mesh.tagged_mesh import Facets
 from .space import FemSpace
 
 log = logging.getLogger(__name__)

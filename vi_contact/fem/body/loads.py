@@ -15,12 +15,12 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ..core.algebra import Array, Comm
-from ..core.checks import ended, function, number, optional, refuse, shown
-from ..core.quantities import Unit
-from . import compat
-from .groups import components_given, components_of, facets_of, field_given
-from .mesh import Facets
+from ...core.algebra import Array, Comm
+from ...core.checks import ended, function, number, optional, refuse, shown
+from ...core.quantities import Unit
+from .. import compat
+from ..mesh.group_checks import components_given, components_of, facets_of, field_given
+from ..mesh.tagged_mesh import Facets
 
 Field = Callable[[Array, float], Array]
 Value = tuple[float, ...] | Field

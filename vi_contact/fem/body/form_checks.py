@@ -13,12 +13,12 @@ from petsc4py import PETSc
 from ufl.algorithms import compute_form_data
 from ufl.algorithms.check_arities import ArityMismatch
 
-from ..core.algebra import largest
-from ..core.checks import function, instance, on_all
-from ..core.errors import InputError
-from ..core.matrix_checks import SYMMETRIC, asymmetry, probe
-from . import compat
-from .petsc_algebra import PetscMatrix
+from ...core.algebra import largest
+from ...core.checks import function, instance, on_all
+from ...core.errors import InputError
+from ...core.matrix_checks import SYMMETRIC, asymmetry, probe
+from .. import compat
+from ..matrices.petsc_algebra import PetscMatrix
 from .space import FemSpace
 
 PROBES = 4

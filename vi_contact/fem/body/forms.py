@@ -13,16 +13,16 @@ from weakref import WeakSet
 import numpy as np
 import ufl
 
-from ..core.algebra import Array, largest
-from ..core.errors import InputError
-from ..core.system import SemiDiscreteSystem
-from ..laws.materials import Damping, ElasticValues, LinearElastic, Section
-from ..laws.orthotropic import VOIGT, Orthotropic
-from . import compat
+from ...core.algebra import Array, largest
+from ...core.errors import InputError
+from ...core.system import SemiDiscreteSystem
+from ...laws.materials import Damping, ElasticValues, LinearElastic, Section
+from ...laws.orthotropic import VOIGT, Orthotropic
+from .. import compat
+from ..mesh.tagged_mesh import Cells
 from .dashpots import Dashpots
 from .dilatation import MeanDilatation
 from .heterogeneous import Heterogeneous
-from .mesh import Cells
 from .space import FemSpace
 
 Material = LinearElastic | Orthotropic | Heterogeneous
@@ -45,7 +45,7 @@ class ElasticForms:
         densities: whether ``fields`` tell the mass and its damping, cell by cell.
         materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in
-            K, in C = beta K and in stresses (``fem.dilatation``); None otherwise.
+            K, in C = beta K and in stresses (``dilatation``); None otherwise.
         tells_stress: whether ``stress`` is known.
         symmetric: whether all matrices are.
         notes: what comes from where.

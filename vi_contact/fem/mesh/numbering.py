@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..core.algebra import Array, Indices
-from ..meshes.rows import number_alike
-from . import compat
-from .mesh import node_numbers
+from ...core.algebra import Array, Indices
+from ...meshes.rows import number_alike
+from .. import compat
+from .tagged_mesh import node_numbers
 
 
 def is_curved(mesh: Any) -> bool:

@@ -13,9 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
-from ..core.contact_last import ContactLast
-from .communicators import MpiComm, give_back
+from ...core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
+from ...core.contact_last import ContactLast
+from ..mesh.communicators import MpiComm, give_back
 from .copied_factor import contact_last, product_of_rows
 from .direct import by_mumps, failure, finite, ordering, own_serves
 from .petsc_rows import aij_of, rows_of
@@ -46,7 +46,7 @@ class PetscMatrix:
     """Hold an AIJ matrix behind the ``Matrix`` protocol.
 
     ``stored`` is the PETSc object, ``mat`` too unless it is stored otherwise: then it is made anew
-    (``fem.compact``).
+    (``fem.matrices.half``).
     """
 
     def __init__(self, mat: Any) -> None:

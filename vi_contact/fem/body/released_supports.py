@@ -19,13 +19,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, from_each, largest, max_abs
-from ..core.checks import several
-from ..core.errors import InputError
-from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given, check_sizes
-from ..core.step import State
-from . import compat
+from ...core.algebra import Array, Mask, from_each, largest, max_abs
+from ...core.checks import several
+from ...core.errors import InputError
+from ...core.problem import ContactProblem
+from ...core.state_checks import check_problem_given, check_sizes
+from ...core.step import State
+from .. import compat
 from .space import FemSpace
 
 log = logging.getLogger(__name__)

@@ -12,9 +12,9 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ..core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
-from ..core.errors import InputError
-from ..laws.materials import (
+from ...core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
+from ...core.errors import InputError
+from ...laws.materials import (
     BLIND_TO_RATIOS,
     Damping,
     DampingRatio,
@@ -26,15 +26,15 @@ from ..laws.materials import (
     Section,
     Solid,
 )
-from . import compat
-from .communicators import MpiComm
+from .. import compat
+from ..mesh.communicators import MpiComm
+from ..mesh.group_checks import cells_of, facets_of, field_given
+from ..mesh.numbering import is_curved
 from .dashpots import Dashpots
 from .form_checks import refuse_complex
 from .forms import KINDS, ElasticForms
-from .groups import cells_of, facets_of, field_given
 from .linear_forms import LOADS
 from .loads import Prescribed
-from .numbering import is_curved
 from .own_forms import Forms
 from .ties import Tied
 

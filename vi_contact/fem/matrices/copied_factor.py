@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array, Indices, SerialComm, largest
-from ..core.compiled import cholmod, library
-from ..core.contact_last import AT_ONCE, ContactLast, at
+from ...core.algebra import Array, Indices, SerialComm, largest
+from ...core.compiled import cholmod, library
+from ...core.contact_last import AT_ONCE, ContactLast, at
 from .petsc_rows import rows_of
 
 

@@ -21,9 +21,9 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Matrix
 from vi_contact.core.matrix_checks import probe
-from vi_contact.fem import compact
-from vi_contact.fem.petsc_algebra import PetscMatrix
-from vi_contact.fem.petsc_rows import aij_of
+from vi_contact.fem.matrices import half
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
+from vi_contact.fem.matrices.petsc_rows import aij_of
 
 COMM = MPI.COMM_WORLD
 CLOSE = 1e-13  # of the largest entry of a product: round-off of some tens of terms
@@ -72,7 +72,7 @@ PROBLEMS: dict[str, Callable[[], vc.ContactProblem]] = {
 def both(name: str, monkeypatch: pytest.MonkeyPatch) -> tuple[vc.ContactProblem, vc.ContactProblem]:
     """The problem as it is, and with compact matrices."""
     plain = PROBLEMS[name]()
-    monkeypatch.setattr(compact, "COMPACT", 0)
+    monkeypatch.setattr(half, "COMPACT", 0)
     return plain, PROBLEMS[name]()
 
 
@@ -135,14 +135,14 @@ def test_the_same_steps(name: str, solver: Any, monkeypatch: pytest.MonkeyPatch)
 def test_bodies_below_the_limit_stay_as_they_are() -> None:
     """Nothing compact for small ones, nor in the plane."""
     assert type(thrown_box(COMM).system.K) is PetscMatrix
-    assert type(compact.algebra_for(COMM, 2, 10**6)) is not compact.CompactAlgebra
-    assert type(compact.algebra_for(COMM, 3, compact.COMPACT)) is compact.CompactAlgebra
+    assert type(half.algebra_for(COMM, 2, 10**6)) is not half.CompactAlgebra
+    assert type(half.algebra_for(COMM, 3, half.COMPACT)) is half.CompactAlgebra
 
 
 def test_rows_of_a_node_may_have_entries_in_different_places() -> None:
     """The blocks of a node are then met in any order: the first row of each rank's first node names
     the last node of all, the others their own before."""
-    nodes, algebra = 2, compact.CompactAlgebra(COMM, 3)
+    nodes, algebra = 2, half.CompactAlgebra(COMM, 3)
     n = 3 * nodes
     first, dense = n * COMM.rank, np.eye(n * COMM.size)
     for rank in range(COMM.size):
@@ -153,6 +153,6 @@ def test_rows_of_a_node_may_have_entries_in_different_places() -> None:
         )
     rows = sp.csr_matrix(dense[first : first + n])
     held = algebra.held(aij_of(rows, COMM))
-    assert isinstance(held, compact.Half)
+    assert isinstance(held, half.Half)
     x = np.sin(np.arange(n * COMM.size) + 1.0)
     assert alike(held @ x[first : first + n], rows @ x)

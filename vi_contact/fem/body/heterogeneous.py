@@ -8,13 +8,13 @@ import numpy as np
 from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.checks import at, on_all, refuse, shown
-from ..core.checks import number as number_given
-from ..core.errors import InputError
-from ..laws.materials import ElasticValues
-from . import compat
-from .communicators import MpiComm
+from ...core.algebra import Array, Indices, Mask
+from ...core.checks import at, on_all, refuse, shown
+from ...core.checks import number as number_given
+from ...core.errors import InputError
+from ...laws.materials import ElasticValues
+from .. import compat
+from ..mesh.communicators import MpiComm
 
 Values = Any  # a number, a scalar DOLFINx Function, or a function of points (3, k)
 RANGES: dict[str, tuple[str, float, float, str]] = {

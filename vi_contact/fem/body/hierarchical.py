@@ -17,10 +17,10 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Mask, Matrix
-from . import compat
-from .numbering import supports
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ...core.algebra import Array, Mask, Matrix
+from .. import compat
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..mesh.numbering import supports
 
 TETRAHEDRON = 10  # nodes of one of degree 2
 

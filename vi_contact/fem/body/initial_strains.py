@@ -11,16 +11,16 @@ from typing import Annotated, Any
 import numpy as np
 import ufl
 
-from ..core.algebra import Array, total
-from ..core.checks import array, function, optional, shape_of, shown
-from ..core.errors import InputError
-from ..core.quantities import RATIO
-from ..laws.materials import PlaneStress
-from . import compat
+from ...core.algebra import Array, total
+from ...core.checks import array, function, optional, shape_of, shown
+from ...core.errors import InputError
+from ...core.quantities import RATIO
+from ...laws.materials import PlaneStress
+from .. import compat
+from ..mesh.group_checks import cells_of
+from ..mesh.tagged_mesh import Cells
 from .forms import ElasticForms
-from .groups import cells_of
 from .loads import ActingLoad, evaluate
-from .mesh import Cells
 
 
 @dataclass(frozen=True)

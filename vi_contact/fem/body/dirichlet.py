@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, Indices, Mask, largest, max_abs
-from ..core.checks import provides, refuse
-from ..core.errors import InputError
-from . import compat
-from .communicators import MpiComm
-from .numbering import facet_rows
+from ...core.algebra import Array, Indices, Mask, largest, max_abs
+from ...core.checks import provides, refuse
+from ...core.errors import InputError
+from .. import compat
+from ..mesh.communicators import MpiComm
+from ..mesh.numbering import facet_rows
 
 REMEDY = (
     "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or "

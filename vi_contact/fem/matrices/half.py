@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Indices, Matrix, largest, total, upper_blocks
-from .communicators import give_back
+from ...core.algebra import Array, Indices, Matrix, largest, total, upper_blocks
+from ..mesh.communicators import give_back
 from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra, as_petsc, triple_product
 from .petsc_rows import aij_of, rows_of
 

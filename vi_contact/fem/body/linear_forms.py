@@ -11,10 +11,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import ufl
 
-from ..core.algebra import Array
-from ..core.checks import function, on_all, optional, refuse
-from ..core.errors import InputError
-from . import compat
+from ...core.algebra import Array
+from ...core.checks import function, on_all, optional, refuse
+from ...core.errors import InputError
+from .. import compat
 from .form_checks import form_of
 from .initial_strains import InitialStrain
 from .loads import BodyForce, Traction

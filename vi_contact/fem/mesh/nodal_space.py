@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Algebra, Array, Comm, Indices, Mask, from_each, largest
-from ..core.checks import at
-from ..core.errors import InputError
-from ..meshes.rows import connected
+from ...core.algebra import Algebra, Array, Comm, Indices, Mask, from_each, largest
+from ...core.checks import at
+from ...core.errors import InputError
+from ...meshes.rows import connected
 
 MEANT = (
     0.05  # of the size of a body: how far from it a point may be that stands for the nearest node

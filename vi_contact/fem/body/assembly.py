@@ -16,27 +16,27 @@ from typing import Annotated, Any
 import numpy as np
 import ufl
 
-from ..core.algebra import Array, from_each
-from ..core.collective import Parts, agree
-from ..core.quantities import Unit
-from ..core.stages import stage
-from ..core.system import Load, SemiDiscreteSystem
-from ..laws.free_motions import floating
-from ..laws.materials import Damping, Section
-from . import compat
+from ...core.algebra import Array, from_each
+from ...core.collective import Parts, agree
+from ...core.quantities import Unit
+from ...core.stages import stage
+from ...core.system import Load, SemiDiscreteSystem
+from ...laws.free_motions import floating
+from ...laws.materials import Damping, Section
+from .. import compat
+from ..matrices.half import algebra_for
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..matrices.petsc_rows import moved
+from ..mesh.communicators import MpiComm, give_back
+from ..mesh.tagged_mesh import Cells, Facets
 from .assembly_checks import check_body, check_boundaries, check_initial, check_ratios
-from .communicators import MpiComm, give_back
-from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .dirichlet import refuse_contradictions, taken, taken_space
 from .forms import ElasticForms, Materials, cell_materials
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import Prescribed, as_tuple, evaluate
-from .mesh import Cells, Facets
 from .own_forms import Forms, OwnForms
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from .petsc_rows import moved
 from .space import FemSpace
 from .ties import Tied
 
@@ -98,7 +98,7 @@ def assemble(
             share with prescribed nodes. True is right for motions relative to the ground; False is
             the load of docs/start/first_wall.md.
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
-            hexahedra, where each cell has one mean value of tr eps (``fem.dilatation``).
+            hexahedra, where each cell has one mean value of tr eps (``dilatation``).
         initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
             start from zero.

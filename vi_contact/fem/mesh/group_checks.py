@@ -10,9 +10,9 @@ from typing import Any, cast
 
 from dolfinx.mesh import Mesh
 
-from ..core.checks import array, function, several, shown, whole
-from ..core.errors import InputError
-from .mesh import Cells, Facets, Group
+from ...core.checks import array, function, several, shown, whole
+from ...core.errors import InputError
+from .tagged_mesh import Cells, Facets, Group
 
 KINDS: dict[type[Group], str] = {Facets: "boundary group", Cells: "cell group"}
 

@@ -13,21 +13,21 @@ import scipy.sparse as sp
 import ufl
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Indices, Mask, from_each, total
-from ..core.checks import instance, optional, refuse, whole
-from ..core.errors import InputError
-from ..core.system import SemiDiscreteSystem
-from . import compat
-from .communicators import MpiComm, kept
+from ...core.algebra import Array, Indices, Mask, from_each, total
+from ...core.checks import instance, optional, refuse, whole
+from ...core.errors import InputError
+from ...core.system import SemiDiscreteSystem
+from .. import compat
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
+from ..matrices.petsc_rows import aij_of
+from ..mesh.communicators import MpiComm, kept
+from ..mesh.group_checks import cells_of
+from ..mesh.nodal_space import NodalSpace, bounding_box, parts_of
+from ..mesh.numbering import facet_rows, numbered
+from ..mesh.tagged_mesh import Cells, Facets, node_numbers
 from .dirichlet import GivenValues
-from .groups import cells_of
 from .hierarchical import Hierarchy, needs_hierarchy
 from .loads import Prescribed
-from .mesh import Cells, Facets, node_numbers
-from .nodal_space import NodalSpace, bounding_box, parts_of
-from .numbering import facet_rows, numbered
-from .petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
-from .petsc_rows import aij_of
 from .ties import PLACE_TOLERANCE, Links, Tied, linked
 
 
@@ -114,7 +114,7 @@ class FemSpace(NodalSpace):
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
             -1 where held.
         degree: 1 for P1 and Q1, 2 for P2 and Q2.
-        nodes: numbers of the nodes of the owned blocks, those of the mesh (``fem.numbering``: of
+        nodes: numbers of the nodes of the owned blocks, those of the mesh (``numbering``: of
             mid-points too).
         points: their coordinates (k, d).
         node_of_block: the numbers, those of ghosts too.

@@ -7,9 +7,9 @@ from typing import Any
 
 import ufl
 
-from ..core.errors import InputError
-from ..laws.materials import Damping, PlaneStrain, Rayleigh, Section
-from . import compat
+from ...core.errors import InputError
+from ...laws.materials import Damping, PlaneStrain, Rayleigh, Section
+from .. import compat
 from .form_checks import form_of, is_symmetric, matrix_of, refuse_masses, refuse_stress, takes
 from .forms import ElasticForms, Material
 from .space import FemSpace

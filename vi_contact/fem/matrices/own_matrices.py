@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import (
+from ...core.algebra import (
     Algebra,
     Array,
     Indices,
@@ -25,12 +25,12 @@ from ..core.algebra import (
     largest,
     total,
 )
-from ..core.checks import array, integers, on_all, refuse
-from ..core.errors import InputError
-from ..core.matrix_checks import SYMMETRIC, asymmetry, matrix_defects
-from ..core.system import Load, SemiDiscreteSystem
-from ..laws.free_motions import floating
-from .nodal_space import NodalSpace, bounding_box, parts_of
+from ...core.checks import array, integers, on_all, refuse
+from ...core.errors import InputError
+from ...core.matrix_checks import SYMMETRIC, asymmetry, matrix_defects
+from ...core.system import Load, SemiDiscreteSystem
+from ...laws.free_motions import floating
+from ..mesh.nodal_space import NodalSpace, bounding_box, parts_of
 
 OWNER = "system_from_arrays"
 
