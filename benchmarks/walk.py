@@ -27,7 +27,7 @@ from typing import Any
 
 COMPREHENSIONS = {"<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>"}
 DEPTH = 6  # how deep the mesh is looked for inside of what a function is handed
-FEW = 8  # members of a list that are looked at
+FEW = 32  # members of a list that are looked at
 
 Call = tuple[str, str]  # file below the package, and function
 
@@ -47,6 +47,8 @@ def holds(value: Any, mesh: Any, depth: int = DEPTH) -> bool:
         return True
     if depth == 0 or isinstance(value, type):
         return False
+    if isinstance(value, dict):
+        value = list(value.values())
     if isinstance(value, list | tuple):
         return any(holds(member, mesh, depth) for member in value[:FEW])
     home = type(value).__module__.partition(".")[0]

@@ -21,7 +21,7 @@ from ...core.collective import Parts, agree
 from ...core.quantities import Unit
 from ...core.stages import stage
 from ...core.system import Load, SemiDiscreteSystem
-from ...laws.free_motions import floating
+from ...laws.free_motions import Unheld, floats
 from ...laws.materials import Damping, Section
 from .. import compat
 from ..matrices.half import algebra_for
@@ -168,29 +168,26 @@ def assemble(
         viscous=(*viscous, *(one for part in acting for one in part.viscous)),
         general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
     )
-    system = floating(
-        SemiDiscreteSystem(
-            algebra=algebra,
-            M=M,
-            C=C,
-            K=K,
-            load=load,
-            influence=rigid,
-            base_mass=np.column_stack(
-                [one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]
-            )
-            if momenta
-            else None,
-            u0=_initial(space, "initial displacement", initial_displacement),
-            v0=_initial(space, "initial velocity", initial_velocity),
-            space=space,
-            tied=space.tied_unknowns,
-            absolute=any(one.lets_waves_in for one in boundaries),
-            notes=describe_boundaries(
-                boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
-            ),
-            companions=tuple(one for part in (*moved, *acting) for one in part.companions),
-        )
+    system = SemiDiscreteSystem(
+        algebra=algebra,
+        M=M,
+        C=C,
+        K=K,
+        load=load,
+        influence=rigid,
+        base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)])
+        if momenta
+        else None,
+        u0=_initial(space, "initial displacement", initial_displacement),
+        v0=_initial(space, "initial velocity", initial_velocity),
+        space=space,
+        floating=floats(Unheld(algebra, M, K, rigid, space.bodies, space.coordinates)),
+        tied=space.tied_unknowns,
+        absolute=any(one.lets_waves_in for one in boundaries),
+        notes=describe_boundaries(
+            boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
+        ),
+        companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     body.own(system)
     del absorbers, damper, mass

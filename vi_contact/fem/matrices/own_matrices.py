@@ -29,7 +29,7 @@ from ...core.checks import array, integers, on_all, refuse
 from ...core.errors import InputError
 from ...core.matrix_checks import SYMMETRIC, asymmetry, matrix_defects
 from ...core.system import Load, SemiDiscreteSystem
-from ...laws.free_motions import floating
+from ...laws.free_motions import Unheld, floats
 from ..mesh.nodal_space import NodalSpace, bounding_box, parts_of
 
 OWNER = "system_from_arrays"
@@ -148,24 +148,24 @@ def own_system(
     momenta = [(every @ r)[free] - M @ r[free] for r in influence.T]
     massless = M.diagonal() == 0.0
     space = MatrixSpace(algebra, points, block[free], component[free], K)
-    return floating(
-        SemiDiscreteSystem(
-            algebra=algebra,
-            M=M,
-            C=matrices.get("C"),
-            K=K,
-            load=load,
-            influence=influence[free],
-            u0=u0[free],
-            v0=v0[free],
-            space=space,
-            base_mass=np.column_stack(momenta),
-            massless=massless if largest(comm, massless.any()) else None,
-            notes=tuple(
-                f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu"
-                for name in skew
-            ),
-        )
+    rigid = influence[free]
+    return SemiDiscreteSystem(
+        algebra=algebra,
+        M=M,
+        C=matrices.get("C"),
+        K=K,
+        load=load,
+        influence=rigid,
+        u0=u0[free],
+        v0=v0[free],
+        space=space,
+        floating=floats(Unheld(algebra, M, K, rigid, space.bodies, space.coordinates)),
+        base_mass=np.column_stack(momenta),
+        massless=massless if largest(comm, massless.any()) else None,
+        notes=tuple(
+            f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu"
+            for name in skew
+        ),
     )
 
 
