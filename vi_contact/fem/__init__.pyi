@@ -19,11 +19,11 @@ from .contact.mortar import DualMortar as DualMortar
 from .contact.pairs import contact_pair as contact_pair
 from .contact.surface import contact_surface as contact_surface
 from .matrices.petsc_system import system_from_matrices as system_from_matrices
+from .mesh.numbering import node_numbers as node_numbers
 from .mesh.tagged_mesh import Cells as Cells
 from .mesh.tagged_mesh import Facets as Facets
 from .mesh.tagged_mesh import Tags as Tags
 from .mesh.tagged_mesh import build_mesh as build_mesh
-from .mesh.tagged_mesh import node_numbers as node_numbers
 from .mesh.tagged_mesh import read_mesh as read_mesh
 from .output.fields import XDMF as XDMF
 from .output.functions import as_function as as_function

@@ -17,6 +17,7 @@ import numpy as np
 import ufl
 
 from ...core.algebra import Array, from_each
+from ...core.checks import optional, whole
 from ...core.collective import Parts, agree
 from ...core.quantities import Unit
 from ...core.stages import stage
@@ -28,8 +29,16 @@ from ..matrices.half import algebra_for
 from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..matrices.petsc_rows import moved
 from ..mesh.communicators import MpiComm, give_back
+from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
-from .assembly_checks import check_body, check_boundaries, check_initial, check_ratios
+from .assembly_checks import (
+    check_body,
+    check_boundaries,
+    check_initial,
+    check_nodes,
+    check_ratios,
+    refuse_folded,
+)
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .dirichlet import refuse_contradictions, taken, taken_space
 from .forms import ElasticForms, Materials, cell_materials
@@ -135,14 +144,22 @@ def assemble(
             },
         )
     V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
+    optional(whole, "assemble", "quadrature_degree", quadrature_degree)
     section, damping = check_body(
         mesh, material, forms, section, damping, base_inertia, degree, integration
     )
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
+    V = compat.vector_space(mesh, degree) if V is None else V
+    nodes = number_nodes(V)
+    check_nodes(MpiComm(mesh.comm), nodes, degree)
+    if nodes.curved:
+        refuse_folded(mesh)
     given = (*(Prescribed(facets) for facets in held), *moved, *taken(mesh, V, as_tuple(bcs)))
-    space = FemSpace(mesh, given, as_tuple(tied), degree, V, quadrature_degree)
+    space = FemSpace(
+        V, nodes, given, as_tuple(tied), degree=degree, quadrature_degree=quadrature_degree
+    )
     refuse_contradictions(space)
     body = _stated(
         space, material, forms, section, damping, boundaries, selective=integration == "selective"

@@ -12,6 +12,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
+from ...core.algebra import total
 from ...core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
 from ...core.errors import InputError
 from ...laws.materials import (
@@ -29,7 +30,7 @@ from ...laws.materials import (
 from .. import compat
 from ..mesh.communicators import MpiComm
 from ..mesh.group_checks import cells_of, facets_of, field_given
-from ..mesh.numbering import is_curved
+from ..mesh.numbering import NodeTable
 from .dashpots import Dashpots
 from .form_checks import refuse_complex
 from .forms import KINDS, ElasticForms
@@ -67,8 +68,7 @@ def check_body(
             f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
             f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}"
         )
-    _refuse_lonely_nodes(mesh)
-    _check_degree(mesh, degree)
+    _check_degree(degree)
     refuse_complex("assemble")
     optional(
         instance,
@@ -202,44 +202,47 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
             )
 
 
-def _refuse_lonely_nodes(mesh: Mesh) -> None:
-    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell.
+def _check_degree(degree: Any) -> None:
+    """Raise InputError unless the degree is 1 or 2."""
+    if isinstance(degree, bool) or degree not in (1, 2):
+        raise InputError(
+            f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
+        )
 
-    Parts of meshes may leave such nodes.
+
+def check_nodes(comm: MpiComm, nodes: NodeTable, degree: int) -> None:
+    """Raise InputError, on all ranks, for cells of another order than the degree. Collective.
+
+    So it does where a rank owns nodes of which it has no cell, as parts of meshes may leave them.
+
+    Args:
+        comm: the communicator of the mesh.
+        nodes: those of the displacement's space.
+        degree: that of the displacement, 1 or 2.
     """
-    own = np.arange(mesh.geometry.index_map().size_local)
-    lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
+    lonely = round(total(comm, nodes.lonely))
     if lonely:
         raise InputError(
             f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, "
             "as create_submesh may leave them; write the part to a file and read it, or use fewer "
             "ranks"
         )
-
-
-def _check_degree(mesh: Mesh, degree: Any) -> None:
-    """Raise InputError unless the degree is 1 or 2 and suits the cells. Collective.
-
-    Curved cells must not be folded.
-    """
-    if isinstance(degree, bool) or degree not in (1, 2):
-        raise InputError(
-            f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
-        )
-    if not is_curved(mesh):
-        return
-    if degree == 1:
+    if nodes.curved and degree == 1:
         raise InputError(
             "assemble: the mesh has cells of second order; give degree=2, or mesh it in first order"
         )
-    if (
-        compat.geometry_dofmap(mesh).shape[1]
-        != compat.cell_blocks(compat.vector_space(mesh, 2)).shape[1]
-    ):
+    if nodes.curved and not nodes.complete:
         raise InputError(
             "assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it "
             "with complete cells of first or second order"
         )
+
+
+def refuse_folded(mesh: Mesh) -> None:
+    """Raise InputError, on all ranks, for curved cells that are folded. Collective.
+
+    The Jacobian J of such a cell changes its sign: |∫ sign(det J)| < ∫ 1 over the cell.
+    """
     size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
     signed, whole = (
         compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r

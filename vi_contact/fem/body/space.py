@@ -14,7 +14,7 @@ import ufl
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices, Mask, from_each, total
-from ...core.checks import instance, optional, refuse, whole
+from ...core.checks import instance, refuse
 from ...core.errors import InputError
 from ...core.system import SemiDiscreteSystem
 from .. import compat
@@ -22,27 +22,13 @@ from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
 from ..matrices.petsc_rows import aij_of
 from ..mesh.communicators import MpiComm, kept
 from ..mesh.group_checks import cells_of
-from ..mesh.nodal_space import NodalSpace, bounding_box, parts_of
-from ..mesh.numbering import facet_rows, numbered
-from ..mesh.tagged_mesh import Cells, Facets, node_numbers
+from ..mesh.nodal_space import NodalSpace, bounding_box
+from ..mesh.numbering import NodeTable, facet_rows, node_numbers
+from ..mesh.tagged_mesh import Cells, Facets
 from .dirichlet import GivenValues
 from .hierarchical import Hierarchy, needs_hierarchy
 from .loads import Prescribed
 from .ties import PLACE_TOLERANCE, Links, Tied, linked
-
-
-def body_numbers(mesh: Any) -> Indices:
-    """Return the body (0, 1, ...) of each local geometry node. Collective.
-
-    Bodies are in the order of their least node number.
-    """
-    cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
-    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    # there are such also where there are no ghost cells
-    ghosts = numbers[mesh.geometry.index_map().size_local :]
-    shared = np.flatnonzero(np.isin(numbers, np.concatenate(mesh.comm.allgather(ghosts))))
-    return parts_of(MpiComm(mesh.comm), first.ravel(), cells[:, 1:].ravel(), numbers, shared)
-
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +53,7 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     """
     space = space_of("bodies_of", system)
     cells_of("bodies_of", "cells", cells, space.mesh)
-    body = body_numbers(space.mesh)[compat.geometry_dofmap(space.mesh)[:, 0]]
+    body = space.body_of_block[compat.cell_blocks(space.V)[:, 0]]
     inside = np.isin(np.arange(len(body)), cells.indices)
     mine, rest = (
         np.unique(np.concatenate(from_each(space.comm, body[part]))) for part in (inside, ~inside)
@@ -117,31 +103,33 @@ class FemSpace(NodalSpace):
         nodes: numbers of the nodes of the owned blocks, those of the mesh (``numbering``: of
             mid-points too).
         points: their coordinates (k, d).
-        node_of_block: the numbers, those of ghosts too.
+        node_of_block, body_of_block: numbers and bodies of nodes, those of ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
     """
 
     def __init__(
         self,
-        mesh: Any,
+        V: Any,
+        nodes: NodeTable,
         prescribed: Sequence[Prescribed | GivenValues],
         tied: Sequence[Tied] = (),
+        *,
         degree: int = 1,
-        V: Any = None,
         quadrature_degree: int | None = None,
     ) -> None:
-        optional(whole, "assemble", "quadrature_degree", quadrature_degree)
-        self.mesh, self.degree = mesh, degree
-        self.V = compat.vector_space(mesh, degree) if V is None else V
+        self.V = V
+        self.degree = degree
+        mesh = V.mesh
+        self.mesh = mesh
         self.comm: MpiComm = MpiComm(kept(mesh.comm))
         self.algebra = PetscAlgebra(self.comm.mpi)
         self.dimension: int = mesh.geometry.dim
-        owned = self.V.dofmap.index_map.size_local
-        numbers, points = numbered(self.V)
-        self.node_of_block: Indices = numbers
-        self.nodes: Indices = numbers[:owned]
-        self.points: Array = points[:owned]
+        owned = nodes.owned
+        self.node_of_block: Indices = nodes.numbers
+        self.body_of_block: Indices = nodes.bodies
+        self.nodes: Indices = nodes.numbers[:owned]
+        self.points: Array = nodes.points[:owned]
         self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
         self.prescribed, self.ties = prescribed, tuple(tied)
         self.held = np.zeros((owned, self.dimension), dtype=bool)
@@ -301,17 +289,13 @@ class FemSpace(NodalSpace):
         """Return the positions (rows, d) of the nodes of the free unknowns [m]."""
         return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
 
-    @cached_property
+    @property
     def body_of_node(self) -> Indices:
         """Return the body of every owned node.
 
         Bodies are parts of the mesh that share no node, in the order of node numbers.
         """
-        body = np.empty_like(self.node_of_block)
-        body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[
-            compat.geometry_dofmap(self.mesh)[:, :1]
-        ]
-        return body[: len(self.nodes)]
+        return self.body_of_block[: len(self.nodes)]
 
     @property
     def bodies(self) -> Indices:

@@ -18,7 +18,7 @@ from ...core.errors import InputError
 from .. import compat
 from ..body.space import FemSpace
 from ..mesh.nodal_space import parts_of
-from ..mesh.tagged_mesh import node_numbers
+from ..mesh.numbering import node_numbers
 from .nodes import Nodes
 
 NAMED = 4  # hinges that a message names

@@ -28,6 +28,7 @@ from ...meshes.rows import found_in, number_alike
 from .. import compat
 from ..compat import Indices
 from .communicators import MpiComm
+from .numbering import node_numbers
 
 MOST_NAMED = 20  # values of tags in a message
 
@@ -224,24 +225,6 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
         "give a script of vi_contact.meshes, BlockMesh(…) for example",
     )
     return _distribute(comm, lambda: arrays_from_script(mesh))
-
-
-def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """Return the numbers of local geometry nodes (owned, then ghosts) as in the input.
-
-    They count from 0, the rank among the nodes in use.
-
-    Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is
-    numbered in their order.
-    """
-    instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
-    given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
-    if (
-        mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX)
-        < mesh.geometry.index_map().size_global
-    ):
-        return given
-    return np.searchsorted(np.unique(np.concatenate(mesh.comm.allgather(given))), given)
 
 
 @stage("mesh")

@@ -18,7 +18,7 @@ from ...core.algebra import Array, Indices, Mask, from_each
 from .. import compat
 from ..body.loads import BodyForce, Pressure, TangentialTraction, Traction
 from ..body.space import FemSpace
-from ..mesh.tagged_mesh import node_numbers
+from ..mesh.numbering import node_numbers
 
 
 def work_beyond(
