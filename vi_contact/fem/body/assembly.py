@@ -10,14 +10,16 @@ P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
 import ufl
+from dolfinx.mesh import Mesh
 
 from ...core.algebra import Array, from_each
-from ...core.checks import optional, whole
+from ...core.checks import instance
 from ...core.collective import Parts, agree
 from ...core.quantities import Unit
 from ...core.stages import stage
@@ -33,20 +35,21 @@ from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
 from .assembly_checks import (
     check_body,
-    check_boundaries,
     check_initial,
     check_nodes,
     check_ratios,
     refuse_folded,
 )
+from .conditions import as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
-from .dirichlet import refuse_contradictions, taken, taken_space
+from .dirichlet import given_space, given_values, refuse_contradictions, refuse_uneven
+from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
-from .loads import Prescribed, as_tuple, evaluate
+from .loads import Prescribed, evaluate
 from .own_forms import Forms, OwnForms
-from .space import FemSpace
+from .space import FemSpace, translations
 from .ties import Tied
 
 Field = tuple[float, ...] | Callable[[Array], Array]
@@ -121,149 +124,213 @@ def assemble(
             that no law reads, dashpots on held facets, groups without facets or cells, of another
             mesh or kind, contradictions.
     """
-    if hasattr(mesh, "comm"):
-        agree(
-            MpiComm(mesh.comm),
-            "assemble",
-            {
-                "material": material,
-                "forms": Parts(forms),
-                "section": section,
-                "clamped": as_tuple(clamped),
-                "prescribed": as_tuple(prescribed),
-                "tied": as_tuple(tied),
-                "dashpots": as_tuple(dashpots),
-                "loads": as_tuple(loads),
-                "damping": damping,
-                "initial_displacement": initial_displacement,
-                "initial_velocity": initial_velocity,
-                "base_inertia": base_inertia,
-                "degree": degree,
-                "quadrature_degree": quadrature_degree,
-                "integration": integration,
-            },
-        )
-    V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
-    optional(whole, "assemble", "quadrature_degree", quadrature_degree)
-    section, damping = check_body(
-        mesh, material, forms, section, damping, base_inertia, degree, integration
+    instance(
+        "assemble", "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]"
     )
-    held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
-    check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
+    comm = MpiComm(mesh.comm)
+    agree(
+        comm,
+        "assemble",
+        {
+            "material": material,
+            "forms": Parts(forms),
+            "section": section,
+            "clamped": clamped,
+            "prescribed": prescribed,
+            "tied": tied,
+            "dashpots": dashpots,
+            "loads": loads,
+            "damping": damping,
+            "initial_displacement": initial_displacement,
+            "initial_velocity": initial_velocity,
+            "base_inertia": base_inertia,
+            "degree": degree,
+            "quadrature_degree": quadrature_degree,
+            "integration": integration,
+        },
+    )
+
+    # what is given: kinds, groups, conditions that go together
+    bcs = as_tuple(bcs)
+    refuse_uneven(comm, bcs)
+    if bcs or space is not None:
+        space, degree = given_space(mesh, space, bcs)
+    section, damping = check_body(
+        mesh,
+        material,
+        forms,
+        section,
+        damping,
+        base_inertia=base_inertia,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
+        integration=integration,
+    )
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
-    V = compat.vector_space(mesh, degree) if V is None else V
+    conditions = gather_conditions(
+        mesh, clamped=clamped, prescribed=prescribed, tied=tied, dashpots=dashpots, loads=loads
+    )
+
+    # unknowns: nodes, which of their components are held or tied, and the elimination of these
+    V = compat.vector_space(mesh, degree) if space is None else space
     nodes = number_nodes(V)
-    check_nodes(MpiComm(mesh.comm), nodes, degree)
+    check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    given = (*(Prescribed(facets) for facets in held), *moved, *taken(mesh, V, as_tuple(bcs)))
+    blocks = [compat.owned_facet_dofs(V, one.facets.indices) for one in conditions.held]
+    supports = [
+        one.support(on_facets, mesh.geometry.dim)
+        for one, on_facets in zip(conditions.held, blocks, strict=True)
+    ]
+    if bcs:
+        supports += [one.support(nodes.owned) for one in given_values(mesh, V, bcs)]
     space = FemSpace(
-        V, nodes, given, as_tuple(tied), degree=degree, quadrature_degree=quadrature_degree
+        V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
     )
-    refuse_contradictions(space)
-    body = _stated(
-        space, material, forms, section, damping, boundaries, selective=integration == "selective"
-    )
-    algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
-    absorbers = [DashpotMatrix(space, body, one) for one in boundaries]
-    acting = [one.dashpots.loads(one, body) for one in absorbers]
-    load = assemble_loads(space, section, as_tuple(loads))
+    if bcs:
+        refuse_contradictions(space)
     rigid = np.column_stack([space.restrict(one) for one in space.translations])
-    # one after the other: each is large before it is reduced
-    K, pull = _reduced(body.matrix("K"), space, algebra, 0)
-    damper = _damper(body, absorbers)
-    C, viscous = _reduced(damper, space, algebra, 1) if damper is not None else (None, ())
-    # momenta, less M r: what accelerated prescribed nodes pull on the free ones
-    mass = body.matrix("M")
-    momenta = (
-        [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
+
+    # the body: weak forms of its materials or of the user, absorbing boundaries, loads
+    materials = [] if material is None else cell_materials(mesh, material)
+    body = (
+        ElasticForms(space, materials, section, damping, selective=integration == "selective")
+        if forms is None
+        else OwnForms(space, forms, materials, section, damping)
     )
-    M, inertial = _reduced(mass, space, algebra, 2)
-    load = replace(
-        load,
-        inertial=inertial,
-        viscous=(*viscous, *(one for part in acting for one in part.viscous)),
-        general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
-    )
+    body.boundaries = conditions.dashpots
+    check_ratios(body, forms is None)
+    algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
+    absorbers = [DashpotMatrix(space, body, one) for one in conditions.dashpots]
+    acting: list[Any] = [one.dashpots.loads(one, body) for one in absorbers]
+    load = assemble_loads(space, section, conditions.loads)
+    u0 = _initial(space, "initial displacement", initial_displacement)
+    v0 = _initial(space, "initial velocity", initial_velocity)
+
+    reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
+    M, K = reduced.M, reduced.K
     system = SemiDiscreteSystem(
         algebra=algebra,
         M=M,
-        C=C,
+        C=reduced.C,
         K=K,
-        load=load,
+        load=replace(
+            load,
+            inertial=reduced.inertial,
+            viscous=(*reduced.viscous, *(one for part in acting for one in part.viscous)),
+            general=(
+                *load.general,
+                *reduced.elastic,
+                *(one for part in acting for one in part.elastic),
+            ),
+        ),
         influence=rigid,
-        base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)])
-        if momenta
-        else None,
-        u0=_initial(space, "initial displacement", initial_displacement),
-        v0=_initial(space, "initial velocity", initial_velocity),
+        base_mass=None
+        if reduced.momenta is None
+        else reduced.momenta - np.column_stack([M @ r for r in rigid.T]),
+        u0=u0,
+        v0=v0,
         space=space,
         floating=floats(Unheld(algebra, M, K, rigid, space.bodies, space.coordinates)),
         tied=space.tied_unknowns,
-        absolute=any(one.lets_waves_in for one in boundaries),
+        absolute=any(one.lets_waves_in for one in conditions.dashpots),
         notes=describe_boundaries(
-            boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
+            conditions.dashpots, comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
         ),
-        companions=tuple(one for part in (*moved, *acting) for one in part.companions),
+        companions=tuple(
+            one for part in (*conditions.prescribed, *acting) for one in part.companions
+        ),
     )
     body.own(system)
-    del absorbers, damper, mass
+    del absorbers, reduced
     give_back(mesh.comm)
     return system
 
 
-def _stated(
-    space: FemSpace,
-    material: Materials | None,
-    forms: Forms | None,
-    section: Section,
-    damping: Damping,
-    boundaries: tuple[Dashpots, ...],
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """Hold the matrices of the free unknowns, and what held ones pull on them.
+
+    Attributes:
+        M, C, K: mass, damping (None where nothing damps) and stiffness.
+        elastic, viscous, inertial: loads of prescribed motions U: -Pᵀ K U, -Pᵀ C U', -Pᵀ M U''.
+        momenta: (n, d) Pᵀ M of the unit translations of all nodes, None where nobody asks.
+    """
+
+    M: PetscMatrix
+    C: PetscMatrix | None
+    K: PetscMatrix
+    elastic: tuple[Callable[[float], Array], ...]
+    viscous: tuple[Callable[[float], Array], ...]
+    inertial: tuple[Callable[[float], Array], ...]
+    momenta: Array | None
+
+
+def _reduce(
+    body: ElasticForms,
+    absorbers: Sequence[DashpotMatrix],
+    algebra: PetscAlgebra,
     *,
-    selective: bool,
-) -> ElasticForms:
-    """Return the forms of the materials, or the user's own.
+    base_inertia: bool,
+) -> _Reduced:
+    """Assemble K, C and M of all components, and eliminate those that are held or tied. Collective.
 
-    The user's own have those of the materials beside them.
+    Args:
+        body: its forms.
+        absorbers: matrices of its absorbing boundaries.
+        algebra: how the matrices are stored.
+        base_inertia: whether ``momenta`` are asked for.
     """
-    materials = [] if material is None else cell_materials(space.mesh, material)
-    if forms is None:
-        body = ElasticForms(space, materials, section, damping, selective=selective)
-    else:
-        body = OwnForms(space, forms, materials, section, damping)
-    body.boundaries = boundaries
-    check_ratios(body, forms is None)
-    return body
+    space = body.space
+    elimination = space.elimination
+    directions = translations(len(space.nodes), space.dimension)
+    motions = [
+        partial(space.prescribed_values, derivative=k) if space.moves else None for k in range(3)
+    ]
+    # one after the other: each is large before it is reduced
+    K, elastic = _eliminate(body.matrix("K"), elimination, algebra, motions[0])
+    C: PetscMatrix | None = None
+    viscous: tuple[Callable[[float], Array], ...] = ()
+    if body.damped or absorbers:
+        C, viscous = _eliminate(_damper(body, absorbers), elimination, algebra, motions[1])
+    mass = body.matrix("M")
+    # momenta, less M r: what accelerated prescribed nodes pull on the free ones
+    momenta = None
+    if base_inertia:
+        momenta = np.column_stack([elimination.pull(PetscMatrix(mass) @ one) for one in directions])
+    M, inertial = _eliminate(mass, elimination, algebra, motions[2])
+    return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
 
 
-def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
-    """Return C of materials and absorbing boundaries, before elimination (PETSc).
-
-    It is None where nothing damps.
-    """
-    terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
-    if not terms:
-        return None
-    return as_petsc(
-        PetscAlgebra(forms.space.mesh.comm).combine([(1.0, PetscMatrix(one)) for one in terms])
-    ).mat
+def _damper(body: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
+    """Return C of materials and absorbing boundaries, before elimination (PETSc)."""
+    terms = [body.matrix("C")] if body.damped else []
+    terms += [absorber.mat for absorber in absorbers]
+    algebra = PetscAlgebra(body.space.mesh.comm)
+    return as_petsc(algebra.combine([(1.0, PetscMatrix(term)) for term in terms])).mat
 
 
-def _reduced(
-    full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
+def _eliminate(
+    full: Any,
+    elimination: Elimination,
+    algebra: PetscAlgebra,
+    motion: Callable[[float], Array] | None,
 ) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
-    """Return (Pᵀ A P as the algebra stores it, the load of prescribed motions).
+    """Return a matrix without held and tied components, and the load of prescribed motions.
 
-    The full matrix is destroyed.
+    Of A = K, C, M and the derivative k = 0, 1, 2 of U it is PᵀAP and -PᵀA U^(k)(t).
+
+    Args:
+        full: A, a PETSc matrix of all components; it is destroyed.
+        elimination: P.
+        algebra: how the matrix is stored.
+        motion: t -> U^(k)(t) (full,), None where nothing that is held moves.
     """
     pull: tuple[Callable[[float], Array], ...] = ()
-    if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
-        matrix, held = (
-            PetscMatrix(moved(space.held_columns(full), space.comm.mpi)),
-            space.held.ravel(),
-        )
-        pull = (lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative)[held]),)
-    part = space.reduced(full)
+    if motion is not None:
+        matrix = PetscMatrix(moved(elimination.held_columns(full), algebra.comm.mpi))
+        pull = (lambda t: -elimination.pull(matrix @ motion(t)[elimination.held]),)
+    part = elimination.reduce(full)
     full.destroy()
     return algebra.held(moved(part, algebra.comm.mpi)), pull
 

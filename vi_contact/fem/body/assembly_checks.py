@@ -4,8 +4,7 @@ These are kinds of objects, groups of this mesh, conditions that do not contradi
 """
 
 import logging
-from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import total
-from ...core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
+from ...core.checks import check_word, flag, instance, optional, provides, several, shown, whole
 from ...core.errors import InputError
 from ...laws.materials import (
     BLIND_TO_RATIOS,
@@ -29,19 +28,14 @@ from ...laws.materials import (
 )
 from .. import compat
 from ..mesh.communicators import MpiComm
-from ..mesh.group_checks import cells_of, facets_of, field_given
+from ..mesh.group_checks import cells_of, field_given
 from ..mesh.numbering import NodeTable
-from .dashpots import Dashpots
 from .form_checks import refuse_complex
 from .forms import KINDS, ElasticForms
-from .linear_forms import LOADS
-from .loads import Prescribed
 from .own_forms import Forms
-from .ties import Tied
 
 log = logging.getLogger(__name__)
 OWNER = "assemble"
-SIDES = ("facets", "first", "second")  # attributes of conditions and loads that are boundary groups
 LOCKING = (
     0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
 )
@@ -53,22 +47,24 @@ def check_body(
     forms: Any,
     section: Any,
     damping: Any,
+    *,
     base_inertia: Any,
-    degree: Any = 1,
-    integration: Any = "full",
+    degree: Any,
+    quadrature_degree: Any,
+    integration: Any,
 ) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None.
 
     Raises:
         InputError: objects of another kind, cells of another mesh.
     """
-    instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(
             f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
             f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}"
         )
     _check_degree(degree)
+    optional(whole, OWNER, "quadrature_degree", quadrature_degree)
     refuse_complex("assemble")
     optional(
         instance,
@@ -300,101 +296,6 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
             stiff,
             LOCKING,
         )
-
-
-def check_boundaries(
-    mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
-) -> None:
-    """Raise InputError, on all ranks, for conditions and loads that do not fit. Collective.
-
-    They are of another kind or on groups of another mesh, or prescribed displacements that
-    contradict each other on the same facets. All are tuples.
-    """
-    for group in clamped:
-        facets_of(OWNER, "clamped", group, mesh)
-    for name, items, kinds in (
-        ("prescribed", prescribed, (Prescribed,)),
-        ("tied", tied, (Tied,)),
-        ("dashpots", dashpots, (Dashpots,)),
-        ("loads", loads, LOADS),
-    ):
-        remedy = (
-            f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
-        )
-        for item in items:
-            instance(OWNER, name, item, kinds, remedy)
-            for group in (getattr(item, one, None) for one in SIDES):
-                if group is not None:
-                    facets_of(OWNER, f"the facets of {name}", group, mesh)
-    _refuse_repeated(loads=loads, dashpots=dashpots)
-    _refuse_empty(mesh, clamped, prescribed, tied, dashpots, loads)
-    conditions = [Prescribed(group) for group in clamped] + list(prescribed)
-    refuse(_contradictions(conditions, tied, dashpots), MpiComm(mesh.comm))
-
-
-def _refuse_repeated(**lists: Sequence[Any]) -> None:
-    """Raise InputError for an object that a list names twice: it would act twice."""
-    for name, items in lists.items():
-        for one, other in combinations(items, 2):
-            if one is other:
-                raise InputError(
-                    f"assemble: {name} names one {type(one).__name__} twice, which would act "
-                    "twice; leave it out once, or give one of twice the size"
-                )
-
-
-def _refuse_empty(
-    mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
-) -> None:
-    """Raise InputError, on all ranks, for a boundary group without facets on any rank.
-
-    It holds and loads nothing.
-    """
-    own = {
-        "clamped": clamped,
-        "prescribed": prescribed,
-        "tied": tied,
-        "dashpots": dashpots,
-        "loads": loads,
-    }
-    found = [
-        (name, group)
-        for name, items in own.items()
-        for item in items
-        for group in (
-            [item] if name == "clamped" else [getattr(item, side, None) for side in SIDES]
-        )
-        if group is not None
-    ]
-    counts = mesh.comm.allreduce(np.array([len(group.indices) for _, group in found], dtype=float))
-    for (name, group), count in zip(found, counts, strict=True):
-        if not count:
-            raise InputError(
-                f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has "
-                "no effect; correct the group, or leave it out"
-            )
-
-
-def _contradictions(
-    held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
-) -> Iterator[str]:
-    """Return pairs of conditions on the same facets of this rank that contradict.
-
-    These are other values of one component, ties and dashpots.
-    """
-    for one, two in combinations(held, 2):
-        if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
-            yield (
-                f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share "
-                "facets on which different displacements are prescribed: leave out one of the two"
-            )
-    sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]
-    for side, absorbing in product(sides, damped):
-        if len(np.intersect1d(side.indices, absorbing.facets.indices)):
-            yield (
-                f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the "
-                "waves through the ties: leave out one of the two"
-            )
 
 
 def check_initial(mesh: Mesh, **values: Any) -> None:

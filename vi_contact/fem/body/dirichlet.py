@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask, largest, max_abs
+from ...core.algebra import Array, Indices, Mask, from_each, largest, max_abs
 from ...core.checks import provides, refuse
 from ...core.errors import InputError
 from .. import compat
 from ..mesh.communicators import MpiComm
 from ..mesh.numbering import facet_rows
+from .loads import Support
 
 REMEDY = (
     "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or "
@@ -38,12 +39,17 @@ class GivenValues:
     values: Array
     moves: bool
 
-    def places(self, space: Any) -> tuple[Indices, Indices]:
-        """Return (owned blocks, components) of what is held."""
-        blocks, components = np.nonzero(self.mask[: len(space.nodes)])
-        return blocks, components
+    def support(self, owned: int) -> Support:
+        """Return what is held of a displacement space.
 
-    def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
+        ``owned``: how many blocks of unknowns this rank owns.
+        """
+        blocks, components = np.nonzero(self.mask[:owned])
+        return Support(self, (blocks, components), self.moves)
+
+    def at(
+        self, points: Array, places: tuple[Any, Any], t: float, derivative: int
+    ) -> tuple[Any, str]:
         """Return (the values, or zero rates, at the places; no defect)."""
         return (0.0 if derivative else self.values[places]), ""
 
@@ -53,33 +59,38 @@ class GivenValues:
         return [(facets[held[:, c]], (c,)) for c in range(space.dimension)]
 
 
-def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any, int]:
-    """Return (the user's space, or that of the conditions without one; its degree).
-
-    It is (None, degree) without both.
-    """
-    counts = mesh.comm.allgather(len(bcs)) if hasattr(mesh, "comm") else [0]
+def refuse_uneven(comm: MpiComm, bcs: Sequence[Any]) -> None:
+    """Raise InputError, on all ranks, where some have more conditions than others. Collective."""
+    counts = from_each(comm, len(bcs))
     if min(counts) < max(counts):
         raise InputError(
             f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give "
             "all ranks the same list, also where a rank has none of its unknowns"
         )
+
+
+def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
+    """Return (the user's space, or that of the conditions without one; its degree). Collective.
+
+    Args:
+        mesh: that of the body.
+        V: the user's space, or None.
+        bcs: ``dirichletbc`` objects, at least one where V is None.
+
+    Raises:
+        InputError: a space of another mesh or kind, and what is no dirichletbc.
+    """
     for bc in bcs:
         provides("assemble", "bcs", bc, ("dof_indices", "function_space", "g"), REMEDY)
         if not compat.is_on(bc.function_space, mesh):
             raise InputError(f"assemble: a dirichletbc of bcs is on another mesh; {REMEDY}")
     if V is None:
-        made = (compat.vector_space(mesh, one) for one in (1, 2)) if bcs else ()
-        found = [
-            (one, k)
-            for k, one in enumerate(made, 1)
-            if _block_of(one, bcs[0].function_space) is not None
-        ]
-        if bcs and not found:
-            raise InputError(
-                f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}"
-            )
-        return found[0] if found else (None, degree)
+        # the space of the conditions is known by its blocks: try both degrees
+        for k in (1, 2):
+            known = compat.vector_space(mesh, k)
+            if _block_of(known, bcs[0].function_space) is not None:
+                return known, k
+        raise InputError(f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}")
     provides(
         "assemble",
         "space",
@@ -103,7 +114,7 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
     )
 
 
-def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
+def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
     """Return what conditions hold of a displacement's space.
 
     InputError, on all ranks, for one of another space, one that holds nothing, and values that are
@@ -147,9 +158,8 @@ def refuse_contradictions(space: Any) -> None:
     """
     given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
     held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
-    for values, one in zip(held, space.prescribed, strict=False):
-        places = one.places(space)
-        values[places] = one.at(space, places, 0.0, 0)[0]
+    for values, support in zip(held, space.supports, strict=False):
+        values[support.places] = support.at(space.points, 0.0, 0)[0]
     for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
         moves = space.prescribed[i].moves and callable(space.prescribed[i].displacement)
         apart = np.abs(held[i] - held[j])

@@ -27,6 +27,7 @@ from .space import FemSpace
 
 Material = LinearElastic | Orthotropic | Heterogeneous
 Materials = Material | Sequence[tuple[Cells, Material]]
+FIELDS = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
 KINDS = (LinearElastic, Orthotropic, Heterogeneous)
 
 
@@ -67,37 +68,45 @@ class ElasticForms:
         *,
         selective: bool = False,
     ) -> None:
-        self.space, self.section, self.damping, space.forms = space, section, damping, self
-        self.dilatation = MeanDilatation(space.V) if selective else None
-        self.u, self.v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
-        self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
+        self.space = space
+        self.section = section
+        self.damping = damping
         self.materials = tuple(materials)
+        space.forms = self
+        self.dilatation = MeanDilatation(space.V) if selective else None
+        self.u = ufl.TrialFunction(space.V)
+        self.v = ufl.TestFunction(space.V)
+        self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
+
+        # fields that are constant on cells, or linear in them where a material varies inside
         degree = int(any(isinstance(one, Heterogeneous) and one.varies for _, one in materials))
         cells = compat.lagrange(space.mesh, degree, continuous=False)
-        names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
-        values = [_constants(cells, where, one) for where, one in materials]
-        found = getattr(damping, "viscosities", None)
-        self.viscous = found if found and any(found) else None  # (lambda_v, mu_v) [Pa s]
+        self.fields = {name: compat.function(cells) for name in FIELDS} if materials else {}
+        table = compat.cell_blocks(cells)
+        dofs = [table[where] for where, _ in materials]
+        values: list[Any] = [
+            one.at(cells, where) if isinstance(one, Heterogeneous) else _constants(one)
+            for where, one in materials
+        ]
+
+        # what the law of damping makes of them: a ratio may be zero in all cells of some ranks
+        viscosities = getattr(damping, "viscosities", None)
+        self.viscous = viscosities if viscosities and any(viscosities) else None  # [Pa s]
         damped = self.viscous is not None or any(
             np.any(one) for each in values for one in damping.coefficients(each)
         )
-        # a ratio may be zero in all cells of some ranks
         self.damped = bool(largest(space.comm, damped))
-        ratios = [
-            _largest_ratio(cells, where, one)
-            for (where, _), one in zip(materials, values, strict=True)
-        ]
+        ratios = [_largest_ratio(one.xi, where) for one, where in zip(values, dofs, strict=True)]
         self.largest_ratio = float(largest(space.comm, max(ratios, default=0.0)))
-        self.fields = {name: compat.function(cells) for name in names} if materials else {}
+
+        # fill the fields, times the thickness
         if not self.damped and materials:
             self.fields["alpha_rho"] = self.fields["beta"]  # zeros
-        for (where, _), one in zip(materials, values, strict=True):
-            dofs = compat.cell_blocks(cells)[where]
-            for name, value in zip(
-                names, _fields(one, section, damping, space.dimension), strict=True
-            ):
+        for where, one in zip(dofs, values, strict=True):
+            constants = _fields(one, section, damping, space.dimension)
+            for name, value in zip(FIELDS, constants, strict=True):
                 value = section.thickness * value if name != "beta" else value
-                self.fields[name].x.array[dofs] = value[dofs] if np.ndim(value) else value
+                self.fields[name].x.array[where] = value[where] if np.ndim(value) else value
         self._anisotropic: Any = None
         if any(isinstance(one, Orthotropic) for _, one in materials):
             self._anisotropic = _anisotropic(
@@ -221,7 +230,9 @@ class ElasticForms:
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
-        matrix = compat.assemble_matrix(self.space.compiled(self.bilinear(name)))
+        matrix = compat.assemble_matrix(
+            compat.compile_form(self.bilinear(name), self.space.quadrature_degree)
+        )
         if self.dilatation is not None and name != "M":
             self.dilatation.add(
                 matrix, self.fields["lame"], self.fields["beta"] if name == "C" else None
@@ -237,29 +248,29 @@ def cell_constants(space: Any, material: Materials) -> Array:
     place = compat.cell_blocks(space)[:, 0]
     found = np.empty((4, len(place)))
     for where, one in cell_materials(space.mesh, material):
-        known = _constants(space, where, one)
+        known = one.at(space, where) if isinstance(one, Heterogeneous) else _constants(one)
         for row, value in zip(found, (known.E, known.nu, known.rho, known.xi), strict=True):
             row[where] = value[place[where]] if np.ndim(value) else value
     return found
 
 
-def _constants(space: Any, cells: Any, material: Material) -> Any:
-    """Return the material, or its values at all unknowns of the space. Collective.
-
-    It is the values where it is given by functions or has no Lamé constants.
-    """
-    if isinstance(material, Heterogeneous):
-        return material.at(space, cells)
+def _constants(material: LinearElastic | Orthotropic) -> Any:
+    """Return the material, or values where it has no Lamé constants."""
     if isinstance(material, Orthotropic):
         return ElasticValues(np.nan, np.nan, material.rho, material.xi)
     return material
 
 
-def _largest_ratio(space: Any, cells: Any, values: Any) -> float:
-    """Return the largest damping ratio of a material in these local cells."""
-    if np.ndim(values.xi):
-        return float(np.max(values.xi[np.ravel(compat.cell_blocks(space)[cells])], initial=0.0))
-    return float(values.xi) if len(cells) else 0.0
+def _largest_ratio(xi: Any, dofs: Any) -> float:
+    """Return the largest damping ratio of a material.
+
+    Args:
+        xi: a number, or values at all unknowns of the cellwise space.
+        dofs: (cells, n) the unknowns of its cells.
+    """
+    if np.ndim(xi):
+        return float(np.max(xi[np.ravel(dofs)], initial=0.0))
+    return float(xi) if len(dofs) else 0.0
 
 
 def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ...core.algebra import Array, Comm
+from ...core.algebra import Array, Comm, Indices
 from ...core.checks import ended, function, number, optional, refuse, shown
 from ...core.quantities import Unit
 from .. import compat
@@ -107,23 +107,35 @@ class Prescribed:
         """Return whether it moves: False for a clamped part."""
         return any(value is not _zero for value in self.motions)
 
-    def places(self, space: Any) -> tuple[Any, Any]:
-        """Return (owned blocks, components) of a FemSpace that are held.
+    def support(self, blocks: Indices, dimension: int) -> "Support":
+        """Return what is held of a displacement space.
 
-        They are indices of an array of nodal values.
+        Args:
+            blocks: (k,) owned blocks of unknowns on the facets.
+            dimension: d, components of a block.
+
+        Raises:
+            InputError: a component that does not exist.
         """
-        held = components_of("prescribed", self.components, space.dimension)
-        return space.facet_blocks(self.facets.indices)[:, None], held
+        held = components_of("prescribed", self.components, dimension)
+        return Support(self, (blocks[:, None], held), self.moves)
 
-    def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
-        """Return (values of the motion or a rate at the places, what is wrong with them).
+    def at(
+        self, points: Array, places: tuple[Any, Any], t: float, derivative: int
+    ) -> tuple[Any, str]:
+        """Return values of the motion or a rate at the places, and what is wrong with them.
 
-        What is wrong is an empty text where nothing is.
+        Args:
+            points: (owned nodes, d) coordinates [m].
+            places: owned blocks (k, 1) and components that are held.
+            t: time [s].
+            derivative: 0 for U, 1 for U', 2 for U''.
+
+        Returns:
+            values (k, components), and a sentence, empty where nothing is wrong.
         """
         name = f"prescribed motion on '{self.facets.name}'"
-        motion, defect = evaluate_here(
-            name, self.motions[derivative], space.points[places[0][:, 0]], t
-        )
+        motion, defect = evaluate_here(name, self.motions[derivative], points[places[0][:, 0]], t)
         return motion[:, places[1]], defect
 
     def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, Any]]:
@@ -150,6 +162,34 @@ class Prescribed:
         return apart or all(
             _same(one, two) for one, two in zip(self.motions, other.motions, strict=True)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """Hold a condition on displacements, and which components of nodes it holds on this rank.
+
+    Attributes:
+        condition: a ``Prescribed``, or ``GivenValues`` of a dirichletbc.
+        places: (owned blocks, components), indices of an array of nodal values.
+        moves: whether it moves what it holds.
+    """
+
+    condition: Any
+    places: tuple[Any, Any]
+    moves: bool
+
+    def at(self, points: Array, t: float, derivative: int) -> tuple[Any, str]:
+        """Return values of the motion or a rate at the places, and what is wrong with them.
+
+        Args:
+            points: (owned nodes, d) coordinates [m].
+            t: time [s].
+            derivative: 0 for U, 1 for U', 2 for U''.
+
+        Returns:
+            values at the places, and a sentence, empty where nothing is wrong.
+        """
+        return self.condition.at(points, self.places, t, derivative)
 
 
 def _same(one: Value, other: Value) -> bool:
@@ -272,10 +312,3 @@ class BodyForce(ActingLoad):
 
     value: Annotated[Value, Unit("N/m³")]
     history: Callable[[float], float] | None = None
-
-
-def as_tuple(items: Any) -> tuple[Any, ...]:
-    """Return one item or a sequence of items, as a tuple; None is none."""
-    if items is None:
-        return ()
-    return tuple(items) if isinstance(items, list | tuple) else (items,)

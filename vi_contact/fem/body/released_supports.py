@@ -153,7 +153,7 @@ def removed_support(
     size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))
     untied = np.isin(old.nodes, np.setdiff1d(old.tied_nodes, new.tied_nodes)), slice(None)
     for name, places in [
-        *((one.name, one.places(old)) for one in old.prescribed),
+        *((support.condition.name, support.places) for support in old.supports),
         ("tied", untied),
     ]:
         own = np.zeros_like(old.points)

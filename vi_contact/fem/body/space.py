@@ -9,26 +9,22 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-import ufl
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices, Mask, from_each, total
 from ...core.checks import instance, refuse
 from ...core.errors import InputError
 from ...core.system import SemiDiscreteSystem
 from .. import compat
-from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
-from ..matrices.petsc_rows import aij_of
+from ..matrices.petsc_algebra import PetscAlgebra
 from ..mesh.communicators import MpiComm, kept
 from ..mesh.group_checks import cells_of
 from ..mesh.nodal_space import NodalSpace, bounding_box
 from ..mesh.numbering import NodeTable, facet_rows, node_numbers
 from ..mesh.tagged_mesh import Cells, Facets
-from .dirichlet import GivenValues
+from .elimination import Elimination
 from .hierarchical import Hierarchy, needs_hierarchy
-from .loads import Prescribed
-from .ties import PLACE_TOLERANCE, Links, Tied, linked
+from .loads import Support
+from .ties import PLACE_TOLERANCE, UNTIED, Links, Tied, link
 
 log = logging.getLogger(__name__)
 
@@ -83,108 +79,131 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
         )
 
 
+def translations(nodes: int, dimension: int) -> list[Array]:
+    """Return the unit translation of so many nodes in every direction, full vectors."""
+    return [np.tile(e, nodes) for e in np.eye(dimension)]
+
+
 class FemSpace(NodalSpace):
     """Number the nodal unknowns of a displacement space.
 
-    The prescribed and the tied ones are eliminated.
-
-    "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations
-    solve for.
+    The held and the tied components are eliminated (``body.elimination``).
 
     Attributes:
-        V: the DOLFINx function space, the user's if given; dimension d.
-        free: (owned full,) mask of free components.
-        held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of
-            another node.
+        V: the DOLFINx function space; dimension d.
+        supports: what holds components of nodes, and which; prescribed: their conditions.
+        moves: whether some support moves what it holds.
+        held, tied: (owned nodes, d) masks of components that are held, or follow those of another
+            node.
+        free: (owned full,) mask of the other components.
         tied_nodes: numbers of all nodes that move together with another, on every rank.
+        tied_unknowns: mask of the free unknowns of such nodes, None without ties.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
             -1 where held.
         degree: 1 for P1 and Q1, 2 for P2 and Q2.
-        nodes: numbers of the nodes of the owned blocks, those of the mesh (``numbering``: of
+        quadrature_degree: that of all its forms; None: as UFL estimates it.
+        nodes: numbers of the nodes of the owned blocks, those of the mesh (``mesh.numbering``: of
             mid-points too).
         points: their coordinates (k, d).
         node_of_block, body_of_block: numbers and bodies of nodes, those of ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks.
+        forms: the ElasticForms of the system made on it; stress output needs them.
+        stands: (k, d) where supports hold nodes that an earlier stage had moved [m], or None.
     """
 
     def __init__(
         self,
         V: Any,
         nodes: NodeTable,
-        prescribed: Sequence[Prescribed | GivenValues],
+        supports: Sequence[Support],
         tied: Sequence[Tied] = (),
         *,
         degree: int = 1,
         quadrature_degree: int | None = None,
     ) -> None:
+        """Give numbers to the unknowns. Collective.
+
+        Args:
+            V: the DOLFINx function space of the displacement.
+            nodes: its nodes.
+            supports: what holds components of them.
+            tied: boundaries that move together.
+            degree: that of V, 1 or 2.
+            quadrature_degree: that of all forms, None for UFL's estimate.
+        """
         self.V = V
+        self.mesh = V.mesh
         self.degree = degree
-        mesh = V.mesh
-        self.mesh = mesh
-        self.comm: MpiComm = MpiComm(kept(mesh.comm))
+        self.quadrature_degree = quadrature_degree
+        self.comm: MpiComm = MpiComm(kept(self.mesh.comm))
         self.algebra = PetscAlgebra(self.comm.mpi)
-        self.dimension: int = mesh.geometry.dim
-        owned = nodes.owned
+        self.dimension: int = self.mesh.geometry.dim
         self.node_of_block: Indices = nodes.numbers
         self.body_of_block: Indices = nodes.bodies
-        self.nodes: Indices = nodes.numbers[:owned]
-        self.points: Array = nodes.points[:owned]
+        self.nodes: Indices = nodes.numbers[: nodes.owned]
+        self.points: Array = nodes.points[: nodes.owned]
         self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
-        self.prescribed, self.ties = prescribed, tuple(tied)
-        self.held = np.zeros((owned, self.dimension), dtype=bool)
-        self._where_held = [one.places(self) for one in prescribed]
-        for places in self._where_held:
-            self.held[places] = True
-        links = linked(tied, self.dimension, PLACE_TOLERANCE * self.size, self._everywhere)
+        self.supports = tuple(supports)
+        self.prescribed = tuple(support.condition for support in supports)
+        self.moves = any(support.moves for support in supports)
+        self.ties = tuple(tied)
+        shape = (nodes.owned, self.dimension)
+
+        # what is held and what follows is eliminated; the rest is free
+        self.held = np.zeros(shape, dtype=bool)
+        for support in supports:
+            self.held[support.places] = True
+        links = self._links() if tied else UNTIED
         self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
-        self._leader = links.of_nodes(self.dimension)
-        self.tied: Mask = self._followers(links)
+        self._leader = links.of_nodes(self.dimension) if tied else {}
+        self.tied: Mask = self._followers(links) if tied else np.zeros(shape, dtype=bool)
         self.free: Mask = ~(self.held | self.tied).ravel()
+
+        # free components are numbered over all ranks, those that follow have the number of another
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]
         self.unknowns = int(total(self.comm, self.free.sum()))
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
-        self.numbers: Indices = self._numbers(links)
-        self._P = PetscMatrix(self._selection()) if tied else None
-        self.forms: Any = (
-            None  # the ElasticForms of the system made on it; stress output needs them
+        first = int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
+        numbers = np.where(self.free, first + self.free_index, -1)
+        if tied:
+            numbers = self._following(links, numbers)
+        self.numbers: Indices = numbers.reshape(shape)
+        together = np.isin(self.nodes, self.tied_nodes)
+        self.tied_unknowns: Mask | None = (
+            np.repeat(together, self.dimension)[self.free] if tied else None
         )
-        self.quadrature_degree = quadrature_degree  # of all its forms; None: as UFL estimates it
-        self.stands: Array | None = (
-            None  # (k, d) where supports hold nodes that an earlier stage had moved [m]
+        self.elimination = Elimination(
+            self.comm,
+            self.free,
+            self.held.ravel(),
+            followed=self.numbers.ravel() if tied else None,
+            unknowns=self.unknowns,
         )
-
-    def compiled(self, form: Any) -> Any:
-        """Return a form compiled.
-
-        Its integrals have the degree of the space, if any, unless they say their own.
-        """
-        degree = self.quadrature_degree
-        if degree is None:
-            return compat.compile_form(form)
-        integrals = [
-            one
-            if "quadrature_degree" in one.metadata()
-            else one.reconstruct(metadata={**one.metadata(), "quadrature_degree": degree})
-            for one in form.integrals()
-        ]
-        return compat.compile_form(ufl.Form(integrals))
+        self.forms: Any = None
+        self.stands: Array | None = None
 
     @property
     def translations(self) -> list[Array]:
         """Return the unit translation in every direction, full vectors."""
-        return [np.tile(e, len(self.nodes)) for e in np.eye(self.dimension)]
+        return translations(len(self.nodes), self.dimension)
 
     @property
     def bytes(self) -> int:
         """Return the bytes of the mesh on this rank."""
         return compat.mesh_bytes(self.mesh)
 
+    def compiled(self, form: Any) -> Any:
+        """Return a form compiled.
+
+        Its integrals have the degree of the space, if any, unless they say their own.
+        """
+        return compat.compile_form(form, self.quadrature_degree)
+
     def facet_blocks(self, facets: Any) -> Indices:
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
-        blocks = compat.facet_dofs(self.V, facets)
-        return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
+        return compat.owned_facet_dofs(self.V, facets)
 
     def corners_of_facets(self, facets: Any) -> Indices:
         """Return the numbers (k, n) of the contact nodes on each of these facets. Collective.
@@ -204,13 +223,20 @@ class FemSpace(NodalSpace):
     def hierarchy(self) -> Hierarchy | None:
         """Return the hierarchy of P2 tetrahedra, None of other cells.
 
-        Collective when first
-        asked.
+        Collective when first asked.
         """
         return Hierarchy(self) if needs_hierarchy(self.V) else None
 
+    # Ties
+    # ----------------------------------------------------------------------------------------------
+
+    def _links(self) -> Links:
+        """Return which unknowns move as others do, on every rank. Collective."""
+        sides = [(self._everywhere(tie.first), self._everywhere(tie.second)) for tie in self.ties]
+        return link(self.ties, sides, self.dimension, PLACE_TOLERANCE * self.size)
+
     def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
-        """(original numbers, points) of the nodes of facets, ascending, on every rank."""
+        """Return (original numbers, points) of the nodes of facets, ascending, on every rank."""
         blocks = self.facet_blocks(facets.indices)
         parts = self.comm.bcast(self.comm.gather((self.nodes[blocks], self.points[blocks])))
         numbers, points = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -223,17 +249,33 @@ class FemSpace(NodalSpace):
         Raises:
             InputError: some of those that move as one are held.
         """
-        held = [
-            self._of_unknowns(numbers, self.held) > 0.0
-            for numbers in (links.followers, links.leaders)
-        ]
-        for number in links.followers[held[0] != held[1]]:
+        followers = self._of_unknowns(links.followers, self.held) > 0.0
+        leaders = self._of_unknowns(links.leaders, self.held) > 0.0
+        for number in links.followers[followers != leaders]:
             raise InputError(
                 f"component {number % self.dimension} of a tied node is prescribed on one side "
                 "only: prescribe both sides alike, or tie the other components (components=)"
             )
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
-        return np.isin(ids, links.followers[~held[0]])
+        return np.isin(ids, links.followers[~followers])
+
+    def _following(self, links: Links, numbers: Indices) -> Indices:
+        """Return the unknown of every owned component, where those that follow have one too.
+
+        Args:
+            links: what follows what.
+            numbers: (full,) the unknown of every owned component, -1 where it is not free; it is
+                overwritten.
+        """
+        d = self.dimension
+        leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
+        blocks = self.blocks_of(links.followers // d)
+        owned = blocks >= 0
+        row = (d * blocks + links.followers % d)[owned]
+        leader = leaders[owned]
+        follows = self.tied.ravel()[row]
+        numbers[row[follows]] = leader[follows]
+        return numbers
 
     def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
         """Return owned nodal values (k, d) of unknowns, on every rank.
@@ -248,41 +290,12 @@ class FemSpace(NodalSpace):
 
         It is -1 for those tied in part.
         """
-        return (
-            np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
-            if self._leader
-            else nodes
-        )
+        if not self._leader:
+            return nodes
+        return np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
 
-    def _numbers(self, links: Links) -> Indices:
-        """Return the unknown of every owned component, numbered over all ranks."""
-        d, first = self.dimension, int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
-        numbers = np.where(self.free, first + self.free_index, -1)
-        leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
-        where = self.blocks_of(links.followers // d)
-        row, leader = (d * where + links.followers % d)[where >= 0], leaders[where >= 0]
-        follows = self.tied.ravel()[row]
-        numbers[row[follows]] = leader[follows]
-        return numbers.reshape(-1, d)
-
-    def _selection(self) -> Any:
-        """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
-        rows, column = len(self.free), self.numbers.ravel()
-        kept = np.flatnonzero(column >= 0)
-        ones = sp.csr_matrix(
-            (np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns)
-        )
-        return aij_of(ones, self.comm.mpi, len(self.ids))
-
-    @property
-    def tied_unknowns(self) -> Mask | None:
-        """Return the free unknowns of nodes that move together with others.
-
-        It is None when no boundaries are tied.
-        """
-        if self._P is None:
-            return None
-        return np.repeat(np.isin(self.nodes, self.tied_nodes), self.dimension)[self.free]
+    # Free unknowns
+    # ----------------------------------------------------------------------------------------------
 
     @property
     def coordinates(self) -> Array:
@@ -313,10 +326,10 @@ class FemSpace(NodalSpace):
         """
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
-        for condition, places in zip(self.prescribed, self._where_held, strict=True):
-            values[places] = 0.0
-            if condition.moves:
-                values[places], defect = condition.at(self, places, t, derivative)
+        for support in self.supports:
+            values[support.places] = 0.0
+            if support.moves:
+                values[support.places], defect = support.at(self.points, t, derivative)
                 defects.append(defect)
         if defects:
             refuse(defects, self.comm)
@@ -324,40 +337,21 @@ class FemSpace(NodalSpace):
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Expand a free vector -> nodal values (owned nodes, d), prescribed components included."""
-        full = self.prescribed_values(t, derivative)
-        if self._P is None:
-            full[self.free] = u
-        else:
-            full += self._P @ u
+        full = self.elimination.expand(u, self.prescribed_values(t, derivative))
         return full.reshape(-1, self.dimension)
 
     def pull(self, force: Array) -> Array:
-        """Pull back by Pᵀ.
-
-        This takes forces on all owned components -> on the free ones; tied nodes count at their
-        partners.
-        """
-        return force[self.free] if self._P is None else self._P.transpose_apply(force)
+        """Pull back by Pᵀ: forces on all owned components -> on the free ones."""
+        return self.elimination.pull(force)
 
     def reduced(self, full: Any) -> Any:
-        """Reduce a PETSc matrix of all components to PᵀAP of the free ones. Collective."""
-        return (
-            triple_product(full, self._P.mat)
-            if self._P is not None
-            else self._columns(full, self.free, self.free)
-        )
+        """Return PᵀAP of the free components of a PETSc matrix of all. Collective."""
+        return self.elimination.reduce(full)
 
     def held_columns(self, full: Any) -> Any:
         """Return the columns of prescribed components of a PETSc matrix of all. Collective."""
-        return self._columns(full, np.ones_like(self.free), self.held.ravel())
-
-    def _columns(self, full: Any, *chosen: Mask) -> Any:
-        first = full.getOwnershipRange()[0]
-        numbers = [(first + np.flatnonzero(mask)).astype(PETSc.IntType) for mask in chosen]
-        return full.createSubMatrix(
-            *(PETSc.IS().createGeneral(one, comm=full.comm) for one in numbers)
-        )
+        return self.elimination.held_columns(full)
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""
-        return full.ravel()[self.free]
+        return self.elimination.restrict(full)

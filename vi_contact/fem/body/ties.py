@@ -11,7 +11,7 @@ on the right comes back in from the left. Source: Zienkiewicz, Bicanic and Shen 
 with others by Kontoe et al. (2007).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +26,8 @@ from ..mesh.tagged_mesh import Facets
 PLACE_TOLERANCE = (
     1e-6  # of the body's size: nodes farther from the place of their partner have none
 )
-# original numbers, ascending, and points of nodes, on every rank
-NodesOf = Callable[[Facets], tuple[Indices, Array]]
+# original numbers (k,), ascending, and points (k, d) [m] of the nodes of a boundary
+Nodes = tuple[Indices, Array]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """Hold unknownsthat move as others do, the same arrays on every rank.
+    """Hold unknowns that move as others do, the same arrays on every rank.
 
     An unknown is node number * d + component.
     """
@@ -72,19 +72,33 @@ class Links:
         )
 
 
-def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> Links:
-    """Join the unknowns of every tie; partners are ``near`` [m] to the place that they should have.
+UNTIED = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
 
-    Collective.
+
+def link(
+    tied: Sequence[Tied], sides: Sequence[tuple[Nodes, Nodes]], dimension: int, near: float
+) -> Links:
+    """Join the unknowns of every tie.
 
     What several ties join moves as one: of the four vertical edges of a box whose sides are tied
-    both ways, three follow the one that is on no second boundary. InputError for nodes without a
-    partner, boundaries that share nodes, and a component that does not exist.
+    both ways, three follow the one that is on no second boundary.
+
+    Args:
+        tied: at least one tie.
+        sides: the nodes of both boundaries of each tie, the same on every rank.
+        dimension: d, components of a node.
+        near: how far a partner may be from the place that it should have [m].
+
+    Returns:
+        the links of all ties.
+
+    Raises:
+        InputError: nodes without a partner, boundaries that share nodes, and a component that does
+            not exist.
     """
-    if not tied:
-        return Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
-    pairs = [_pairs(tie, dimension, near, nodes) for tie in tied]
+    pairs = [_pairs(tie, *both, dimension, near) for tie, both in zip(tied, sides, strict=True)]
     first, second = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    # what hangs together through ties is one part, and moves as one
     members, index = np.unique(np.concatenate([first, second]), return_inverse=True)
     part = connected(len(members), *index.ravel().reshape(2, -1))
     order = np.lexsort((members, np.isin(members, second), part))  # of every part the leader first
@@ -94,9 +108,18 @@ def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) ->
     return Links(members[follows], leaders[follows])
 
 
-def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indices, Indices]:
-    """Return the unknowns of the first boundary, and those of the second that move alike."""
-    first, second = nodes(tie.first), nodes(tie.second)
+def _pairs(
+    tie: Tied, first: Nodes, second: Nodes, dimension: int, near: float
+) -> tuple[Indices, Indices]:
+    """Return the unknowns of the first boundary, and those of the second that move alike.
+
+    Args:
+        tie: the boundaries and components.
+        first: nodes of the first boundary.
+        second: nodes of the second one.
+        dimension: d, components of a node.
+        near: how far a partner may be from its place [m].
+    """
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
         raise InputError(
@@ -110,6 +133,7 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indi
         )
     from scipy.spatial import cKDTree
 
+    # a partner is the node next to where the first boundary, moved as a whole, has its node
     apart = second[1].mean(axis=0) - first[1].mean(axis=0)
     distance, partner = cKDTree(second[1]).query(first[1] + apart)
     worst = int(distance.argmax())
@@ -119,8 +143,7 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indi
             "the other: mesh both sides alike"
         )
     components = np.array(components_of("tied", tie.components, dimension))
-    one, two = (
-        (numbers[:, None] * dimension + components).ravel()
-        for numbers in (first[0], second[0][partner])
+    return (
+        (first[0][:, None] * dimension + components).ravel(),
+        (second[0][partner][:, None] * dimension + components).ravel(),
     )
-    return one, two

@@ -149,7 +149,7 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
     There are some where what they face, or bubbles are measured from, is moved.
     """
     parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
-    moves = bool(parts) and any(condition.moves for condition in space.prescribed)
+    moves = bool(parts) and space.moves
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
