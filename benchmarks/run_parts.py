@@ -25,7 +25,7 @@ from typing import Any
 from step_cost import SCHEME, block, wall  # first: it sets the number of threads
 
 import vi_contact as vc
-from vi_contact.fem.petsc_algebra import PetscMatrix
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 from vi_contact.kernels.contact_last import ContactLast
 from vi_contact.run.march import March
 from vi_contact.solvers import certified, condensed

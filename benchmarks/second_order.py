@@ -45,7 +45,7 @@ from demos.exact.bar import ThrownBar  # noqa: E402
 from demos.problems.bar import Bar, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core.system import SemiDiscreteSystem  # noqa: E402
-from vi_contact.fem.petsc_algebra import as_petsc  # noqa: E402
+from vi_contact.fem.matrices.petsc_algebra import as_petsc  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 
 Row = dict[str, Any]

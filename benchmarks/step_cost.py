@@ -50,7 +50,7 @@ from demos.problems.wall import Wall, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
-from vi_contact.fem.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
+from vi_contact.fem.matrices.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.kernels import contact_last  # noqa: E402
 from vi_contact.kernels.compiler import addresses, load_cholmod  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402

@@ -16,7 +16,7 @@ from .core import Touching as Touching
 from .core import ViContactError as ViContactError
 from .core.version import __version__ as __version__
 from .fem.contact.points import contact_points as contact_points
-from .fem.own_matrices import system_from_arrays as system_from_arrays
+from .fem.matrices.own_matrices import system_from_arrays as system_from_arrays
 from .ground_motion import GroundMotion as GroundMotion
 from .ground_motion import read_record as read_record
 from .laws import ComponentReset as ComponentReset

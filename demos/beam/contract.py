@@ -38,7 +38,7 @@ from vi_contact.core.protocols import FrictionLaw, Frictionless
 from vi_contact.core.step import Scheme
 from vi_contact.core.system import Load
 from vi_contact.fem.contact.points import contact_points
-from vi_contact.fem.own_matrices import system_from_arrays
+from vi_contact.fem.matrices.own_matrices import system_from_arrays
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march
 from vi_contact.schemes.midpoint import Midpoint

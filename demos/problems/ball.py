@@ -23,10 +23,10 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import MassLaw
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Prescribed
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
 
 QUARTERS = 4.0

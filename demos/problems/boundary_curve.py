@@ -9,9 +9,8 @@ import numpy.typing as npt
 from demos.problems.loose_segments import from_segments
 from vi_contact.bem.boundary_mesh import BoundaryMesh
 from vi_contact.core.errors import InputError
-from vi_contact.fem import compat
-from vi_contact.fem.groups import facets_of
-from vi_contact.fem.mesh import Facets, node_numbers
+from vi_contact.fem import Facets, compat, node_numbers
+from vi_contact.fem.mesh.group_checks import facets_of
 
 
 def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]]:

@@ -21,12 +21,13 @@ from vi_contact.core.protocols import Excitation, FrictionLaw, Frictionless, Imp
 from vi_contact.core.step import Columns, Recorder, Report, Row, State
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.conditions import as_tuple
+from vi_contact.fem.body.loads import Prescribed
 from vi_contact.fem.contact.frames import FemSurface
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.pairs import contact_pair
-from vi_contact.fem.loads import Prescribed, as_tuple
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass

@@ -10,9 +10,9 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import check_word
 from vi_contact.core.errors import InputError
 from vi_contact.core.protocols import Excitation
-from vi_contact.fem.dashpots import CompliantBase, Dashpots
-from vi_contact.fem.loads import Prescribed
-from vi_contact.fem.ties import Tied
+from vi_contact.fem.body.dashpots import CompliantBase, Dashpots
+from vi_contact.fem.body.loads import Prescribed
+from vi_contact.fem.body.ties import Tied
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.soil.free_field import FreeField
 from vi_contact.soil.moving_base import BaseMotion, base_motion

@@ -21,9 +21,9 @@ from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
 from vi_contact.core.quantities import Positive, Unit
 from vi_contact.core.step import Columns, Report, Row, State
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic, PlaneStrain
 
 

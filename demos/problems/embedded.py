@@ -19,11 +19,11 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import FrictionLaw, Frictionless, MassLaw
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Traction
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.pairs import contact_pair
-from vi_contact.fem.loads import Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic, PlaneStrain
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded

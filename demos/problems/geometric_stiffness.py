@@ -26,8 +26,8 @@ from vi_contact.core.state_checks import check_problem_given, check_sizes
 from vi_contact.core.step import State
 from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.fem import compat
-from vi_contact.fem.petsc_algebra import PetscMatrix
-from vi_contact.fem.space import FemSpace, known_matrices, space_of
+from vi_contact.fem.body.space import FemSpace, known_matrices, space_of
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:

@@ -31,10 +31,10 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Excitation
 from vi_contact.core.step import Columns, Report, Row, State
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.run.static import static_equilibrium

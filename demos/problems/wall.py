@@ -19,11 +19,11 @@ from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.engineering.modal import lowest_frequency
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.communicators import MpiComm
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.communicators import MpiComm
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass

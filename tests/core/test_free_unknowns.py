@@ -39,8 +39,8 @@ def large(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
             raise AssertionError("factorised")
 
         monkeypatch.setattr(sizes, "OWN_UNKNOWNS", 0)
-        monkeypatch.setattr("vi_contact.fem.petsc_algebra.PetscFactor.__init__", refuse)
-        monkeypatch.setattr("vi_contact.fem.copied_factor.ContactLast", refuse)
+        monkeypatch.setattr("vi_contact.fem.matrices.petsc_algebra.PetscFactor.__init__", refuse)
+        monkeypatch.setattr("vi_contact.fem.matrices.copied_factor.ContactLast", refuse)
 
     yield begin
 

@@ -14,9 +14,9 @@ from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.fem import compat
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.mesh import Cells
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed, Traction
+from vi_contact.fem.mesh.tagged_mesh import Cells
 from vi_contact.laws.materials import (
     LinearElastic,
     MassProportional,

@@ -26,7 +26,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.fem.mesh import Facets
+from vi_contact.fem.mesh.tagged_mesh import Facets
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.two_blocks import Blocks

@@ -16,12 +16,12 @@ from mpi4py import MPI
 from vi_contact.core.algebra import Array
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed, Traction
+from vi_contact.fem.body.space import bodies_of
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
-from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.space import bodies_of
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.laws.weight import with_weight

@@ -360,7 +360,7 @@ def test_contact_between_dashpots(comm):
 @pytest.mark.two_ranks
 def test_the_base_says_what_it_expects(comm, caplog):
     """In the log, and in the summary of a run; a second shaking is refused."""
-    with caplog.at_level(logging.INFO, logger="vi_contact.fem.dashpots"):
+    with caplog.at_level(logging.INFO, logger="vi_contact.fem.body.dashpots"):
         system = soil_on_compliant_base(comm, soil.upgoing(vc.Ricker(1.0, 10.0), dt=1e-3))
     assert comm.rank or "expects the upgoing motion, half the velocity of an outcrop" in caplog.text
     run = vc.simulate(linear(system), dt=1e-3, steps=2, progress=False)

@@ -15,7 +15,7 @@ import vi_contact as vc
 from demos.problems.geometric_stiffness import initial_stress_matrix
 from vi_contact import fem
 from vi_contact.core.errors import InputError
-from vi_contact.fem.petsc_algebra import PetscMatrix, as_petsc
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix, as_petsc
 from vi_contact.meshes.block import BlockMesh
 
 COMM = MPI.COMM_WORLD

@@ -19,9 +19,14 @@ import vi_contact as vc
 from vi_contact import fem, meshes
 from vi_contact.core import packages
 from vi_contact.core.errors import InputError
-from vi_contact.fem import direct
-from vi_contact.fem.petsc_algebra import PREFIX, PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
-from vi_contact.fem.petsc_rows import aij_of
+from vi_contact.fem.matrices import direct
+from vi_contact.fem.matrices.petsc_algebra import (
+    PREFIX,
+    PetscAlgebra,
+    PetscMatrix,
+    UnsymmetricAlgebra,
+)
+from vi_contact.fem.matrices.petsc_rows import aij_of
 from vi_contact.kernels import compiler
 from vi_contact.solvers import ReducedNewton, SemismoothNewton, TaoTron
 from vi_contact.solvers.volume.failures import raised
@@ -205,7 +210,7 @@ def test_singular_is_said_of_singular_matrices(algebra, value, missing, monkeypa
 def test_no_cause_is_guessed(monkeypatch):
     """An order of elimination that PETSc does not know is what PETSc says, and no word of a
     singular matrix."""
-    monkeypatch.setattr("vi_contact.fem.petsc_algebra.ordering", lambda: "of nobody")
+    monkeypatch.setattr("vi_contact.fem.matrices.petsc_algebra.ordering", lambda: "of nobody")
     with pytest.raises(
         InputError, match=r"cannot factorise the effective matrix \(error 63, .*of nobody"
     ) as said:

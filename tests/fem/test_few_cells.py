@@ -16,7 +16,7 @@ from fem_problems import CONCRETE, block
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.output.fields import XDMF
 from vi_contact.laws.excitation import Harmonic

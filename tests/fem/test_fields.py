@@ -24,9 +24,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.surfaces import empty_surface
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Prescribed
 from vi_contact.fem.output.fields import XDMF, VonMises
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section

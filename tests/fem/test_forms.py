@@ -25,8 +25,8 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.ledger import energy_balance
 from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.fem import Forms, compat
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 from vi_contact.fem.output.fields import XDMF, VonMises
-from vi_contact.fem.petsc_algebra import PetscMatrix
 from vi_contact.laws import (
     KelvinVoigt,
     LinearElastic,

@@ -20,7 +20,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.fem.initial_strains import InitialStrains
+from vi_contact.fem.body.initial_strains import InitialStrains
 from vi_contact.fem.output.fields import VonMises
 from vi_contact.laws.materials import LinearElastic, PlaneStress
 from vi_contact.laws.orthotropic import Orthotropic

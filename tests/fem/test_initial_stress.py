@@ -20,11 +20,11 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.initial_strains import InitialStrain
+from vi_contact.fem.body.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.initial_strains import InitialStrain
-from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.petsc_algebra import PetscMatrix
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 from vi_contact.run.march import march
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

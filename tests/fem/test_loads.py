@@ -14,8 +14,8 @@ from mpi4py import MPI
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.system import Load
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.loads import BodyForce, Prescribed, TangentialTraction, Traction
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed, TangentialTraction, Traction
 from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

@@ -19,10 +19,10 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Frictionless
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair, side_of
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic

@@ -22,7 +22,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.fem.contact.clipping import areas, hats, overlaps, rule, without
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.matching import Matched, Side
@@ -30,8 +31,7 @@ from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.nodes import Nodes, joined_nodes
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.mesh import Facets, build_mesh
+from vi_contact.fem.mesh.tagged_mesh import Facets, build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic

@@ -17,12 +17,12 @@ from vi_contact import AnalyticGap
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.communicators import MpiComm
+from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.contact.faces import boundary
 from vi_contact.fem.contact.nodes import asked, slots_of
 from vi_contact.fem.contact.surface import contact_surface, nodes_on
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.communicators import MpiComm
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh

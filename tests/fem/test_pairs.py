@@ -20,14 +20,14 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.fem.contact import matching
 from vi_contact.fem.contact.matching import NodeToNode
 from vi_contact.fem.contact.nodes import Nodes
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen

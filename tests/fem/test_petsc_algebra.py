@@ -11,8 +11,8 @@ from petsc4py import PETSc
 
 from vi_contact.core.algebra import Array, SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError
-from vi_contact.fem.communicators import MpiComm
-from vi_contact.fem.petsc_algebra import RIGHT_SIDES, PetscAlgebra, PetscMatrix
+from vi_contact.fem.matrices.petsc_algebra import RIGHT_SIDES, PetscAlgebra, PetscMatrix
+from vi_contact.fem.mesh.communicators import MpiComm
 
 COMM = MPI.COMM_WORLD
 N = 200

@@ -19,8 +19,8 @@ import vi_contact as vc
 from demos.problems.frame_elements import frame, line
 from vi_contact import fem, meshes
 from vi_contact.core.errors import InputError
-from vi_contact.fem.petsc_algebra import PetscMatrix
-from vi_contact.fem.petsc_rows import aij_of, rows_of
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
+from vi_contact.fem.matrices.petsc_rows import aij_of, rows_of
 from vi_contact.solvers import Lemke
 
 COMM = MPI.COMM_WORLD

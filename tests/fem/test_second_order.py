@@ -19,12 +19,12 @@ from two_bodies import SOFT, blocks
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed, Traction
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.mesh import Facets, build_mesh
+from vi_contact.fem.mesh.tagged_mesh import Facets, build_mesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.run.static import static_equilibrium

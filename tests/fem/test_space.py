@@ -10,9 +10,9 @@ from mpi4py import MPI
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.mesh import Facets
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed, Traction
+from vi_contact.fem.mesh.tagged_mesh import Facets
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
 

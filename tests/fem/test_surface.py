@@ -17,10 +17,10 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import AnalyticGap, HalfSpace, Touching
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.mesh import Facets
+from vi_contact.fem.mesh.tagged_mesh import Facets
 from vi_contact.laws.materials import PlaneStress
 
 COMM = MPI.COMM_WORLD

@@ -17,7 +17,7 @@ from vi_contact.core.algebra import largest, total
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import Touching
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from demos.problems.boundary_curve import boundary_curve
 from vi_contact.core.errors import InputError
-from vi_contact.fem.mesh import node_numbers
+from vi_contact.fem.mesh.numbering import node_numbers
 
 COMM = MPI.COMM_WORLD
 

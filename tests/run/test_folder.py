@@ -134,7 +134,7 @@ def test_strict_json() -> None:
 
 def test_every_rank_gets_the_sentence(comm: Any) -> None:
     """What fails on rank 0 is raised on every rank, as one sentence; nobody waits."""
-    from vi_contact.fem.communicators import MpiComm
+    from vi_contact.fem.mesh.communicators import MpiComm
 
     ranks = MpiComm(comm)
 

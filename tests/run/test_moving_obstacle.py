@@ -16,9 +16,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.ledger import energy_balance
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.laws.materials import LinearElastic, Rayleigh

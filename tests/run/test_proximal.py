@@ -21,11 +21,11 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import State, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.mesh import Cells, build_mesh
+from vi_contact.fem.mesh.tagged_mesh import Cells, build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh

@@ -18,7 +18,7 @@ from demos.problems.channel import Channel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks

@@ -271,7 +271,7 @@ def test_a_file_system_without_locks(
 
 def test_all_ranks_are_refused(comm: Any, shared_tmp: Path) -> None:
     """A folder that rank 0 finds locked."""
-    from vi_contact.fem.communicators import MpiComm
+    from vi_contact.fem.mesh.communicators import MpiComm
 
     holder = open(shared_tmp / folder_lock.LOCK, "wb") if comm.rank == 0 else None  # noqa: SIM115
     if holder is not None:

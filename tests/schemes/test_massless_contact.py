@@ -17,9 +17,9 @@ from vi_contact.core import sizes
 from vi_contact.core.algebra import Array, EffectiveMatrix, SerialAlgebra, total
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State, StepProblem
+from vi_contact.fem.body.loads import BodyForce, Traction
 from vi_contact.fem.contact.pairs import contact_pair
-from vi_contact.fem.loads import BodyForce, Traction
-from vi_contact.fem.petsc_algebra import PetscAlgebra
+from vi_contact.fem.matrices.petsc_algebra import PetscAlgebra
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh

@@ -18,7 +18,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.step import PreparedSolver
-from vi_contact.fem import copied_factor, petsc_algebra
+from vi_contact.fem.matrices import copied_factor, petsc_algebra
 from vi_contact.kernels.contact_last import ContactLast
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 

@@ -23,8 +23,8 @@ from vi_contact.core import sizes
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.surfaces import ContactSurface
 from vi_contact.core.verify import kkt_residual
-from vi_contact.fem.communicators import MpiComm
-from vi_contact.fem.petsc_algebra import PetscAlgebra, PetscMatrix
+from vi_contact.fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix
+from vi_contact.fem.mesh.communicators import MpiComm
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import Redistributed
 from vi_contact.run.march import march

@@ -24,7 +24,7 @@ from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.petsc_algebra import PetscMatrix
+from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 from vi_contact.solvers import NSGS, FixedPoint, FrictionNewton, GivenForces
 
 COMM = MPI.COMM_WORLD

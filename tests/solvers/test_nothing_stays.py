@@ -18,10 +18,10 @@ from dataclasses import replace
 from mpi4py import MPI
 from fem_problems import thrown_box
 import vi_contact as vc
-from vi_contact.fem import compact
-from vi_contact.fem.communicators import give_back, kept
+from vi_contact.fem.matrices import half
+from vi_contact.fem.mesh.communicators import give_back, kept
 
-compact.COMPACT = 0
+half.COMPACT = 0
 for mu in (0.0, 0.3):
     friction = vc.Coulomb(mu) if mu else vc.Frictionless()
     for solver in (vc.Condensed(), vc.Iterative(), vc.Volume()):

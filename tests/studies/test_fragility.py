@@ -16,7 +16,7 @@ pytest.importorskip("dolfinx")
 
 from vi_contact.core.errors import InputError
 from vi_contact.engineering import lowest_frequency
-from vi_contact.fem.mesh import alone
+from vi_contact.fem.mesh.tagged_mesh import alone
 from vi_contact.ground_motion import Record, write_at2
 from vi_contact.plots.studies import plot_fragility
 from vi_contact.studies import IDA, fragility_curve, read_case, record_set, run_ida

@@ -20,11 +20,11 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import Scheme, Solver, State
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed
-from vi_contact.fem.mesh import build_mesh
-from vi_contact.fem.petsc_algebra import as_petsc
+from vi_contact.fem.matrices.petsc_algebra import as_petsc
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass

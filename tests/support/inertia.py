@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from vi_contact.core.obstacles import Touching
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 
 FINER = BODIES | {

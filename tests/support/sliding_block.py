@@ -16,10 +16,10 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Excitation
 from vi_contact.core.step import State
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
 from vi_contact.meshes.block import BlockMesh

@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.laws.materials import LinearElastic
 
 COMM = MPI.COMM_WORLD

@@ -12,8 +12,8 @@ from fem_problems import field
 from vi_contact.core.algebra import Array, largest
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks

@@ -173,7 +173,7 @@ def _parallel(matrix: Any, of_node: int) -> tuple[slice, EffectiveMatrix, Any]:
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    from vi_contact.fem.petsc_algebra import PetscAlgebra, PetscMatrix
+    from vi_contact.fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix
 
     comm, n = MPI.COMM_WORLD, matrix.shape[0]
     nodes = n // of_node  # a rank owns whole nodes

@@ -34,11 +34,11 @@ from mpi4py import MPI
 from vi_contact.core.algebra import Array
 from vi_contact.core.obstacles import AnalyticGap
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Traction
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh

@@ -24,9 +24,9 @@ from demos.problems.square import concrete
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.loads import Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Traction
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_of

@@ -32,9 +32,9 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed, Traction
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Prescribed, Traction
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed

@@ -20,9 +20,9 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import FrictionLaw
 from vi_contact.core.step import State
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Traction
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Traction
 from vi_contact.laws.friction import Coulomb, Tresca
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.static import quasi_static, static_equilibrium

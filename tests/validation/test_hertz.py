@@ -27,10 +27,10 @@ from demos.exact.hertz import HertzPoint, contact_modulus
 from meshes.ball import BallMesh
 from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed, Traction
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed

@@ -19,11 +19,11 @@ from spheres import hertz
 from demos.exact.hertz import HertzPoint, contact_modulus
 from meshes.ball import BallMesh
 from vi_contact.core.problem import ContactProblem
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import Prescribed, Traction
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
-from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_from_script
 from vi_contact.run.static import static_equilibrium

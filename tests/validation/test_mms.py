@@ -27,8 +27,8 @@ from mpi4py import MPI
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import State
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.fem.assembly import assemble
-from vi_contact.fem.loads import BodyForce, Prescribed
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed

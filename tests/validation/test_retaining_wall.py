@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.fem.mesh import Facets
+from vi_contact.fem.mesh.tagged_mesh import Facets
 from vi_contact.ground_motion import read_record
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded

@@ -32,9 +32,9 @@ from vi_contact.core.algebra import total
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.fem.assembly import assemble
+from vi_contact.fem.body.assembly import assemble
+from vi_contact.fem.body.loads import BodyForce, Prescribed
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.run.march import march
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

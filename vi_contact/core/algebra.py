@@ -2,7 +2,7 @@
 
 Everything above this file (schemes, condensed solver, recorders) is written against the protocols
 below and never asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and
-needs no finite element package; ``fem.petsc_algebra`` serves any number of ranks. Rules: a vector
+needs no finite element package; ``fem.matrices`` serves any number of ranks. Rules: a vector
 is the float64 array of its owned entries; scalars returned by ``dot`` and by ``Comm`` are the same
 number on every rank.
 """

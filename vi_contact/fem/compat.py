@@ -330,11 +330,20 @@ def _as_table(rows: Any, layout: Any) -> Indices:
 # --------------------------------------------------------------------------------------------------
 
 
-def compile_form(ufl_form: ufl.Form) -> Any:
+def compile_form(ufl_form: ufl.Form, degree: int | None = None) -> Any:
     """Generate, compile and load the code of a variational form. Collective.
 
-    The code is cached on disk by the form's signature.
+    The code is cached on disk by the form's signature. ``degree``: that of the integrals that do
+    not say their own; None leaves it to UFL's estimate.
     """
+    if degree is not None:
+        integrals = [
+            integral
+            if "quadrature_degree" in integral.metadata()
+            else integral.reconstruct(metadata={**integral.metadata(), "quadrature_degree": degree})
+            for integral in ufl_form.integrals()
+        ]
+        ufl_form = ufl.Form(integrals)
     comm = ufl_form.ufl_domain().ufl_cargo().comm
     return _compiling(comm, lambda: fem.form(ufl_form))
 
@@ -401,6 +410,12 @@ def facet_dofs(space: Any, facets: Indices) -> Indices:
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     return fem.locate_dofs_topological(space, tdim - 1, np.asarray(facets, dtype=np.int32))
+
+
+def owned_facet_dofs(space: Any, facets: Indices) -> npt.NDArray[np.int64]:
+    """Return the owned blocks of unknowns on the facets, wherever these are owned. Collective."""
+    blocks = facet_dofs(space, facets)
+    return np.asarray(blocks[blocks < space.dofmap.index_map.size_local], dtype=np.int64)
 
 
 def nodal(space: Any) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Comm, Factor, Indices, Mask, largest
+from ..core.algebra import Algebra, Array, Comm, Factor, Indices, Mask, Matrix, largest
 from ..core.system import SemiDiscreteSystem
 from .mass_transfer import rigid_motions
 
@@ -28,12 +28,29 @@ class FreeMotions:
     momenta: Array
 
 
-def floating(system: SemiDiscreteSystem) -> SemiDiscreteSystem:
-    """Return the system, told whether some rigid motion of a body of it meets no stiffness.
+@dataclass(frozen=True, eq=False)
+class Unheld:
+    """Hold what says which bodies nothing holds: their matrices, and where their unknowns are.
 
-    Collective.
+    Attributes:
+        algebra: that of the matrices.
+        M, K: mass [kg] and stiffness [N/m].
+        influence: (n, d) rigid unit translation in each direction.
+        bodies: (n,) the body of each unknown.
+        points: (n, d) the place of each unknown [m].
     """
-    return system.changed(floating=any(body.motions.shape[1] for body in free_motions(system)))
+
+    algebra: Algebra
+    M: Matrix
+    K: Matrix
+    influence: Array
+    bodies: Indices
+    points: Array
+
+
+def floats(equations: Unheld) -> bool:
+    """Say whether some rigid motion of a body meets no stiffness. Collective."""
+    return any(body.motions.shape[1] for body in _motions_of(equations))
 
 
 def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
@@ -42,10 +59,22 @@ def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     Unknowns that are no displacements, such as rotations, which no ``influence`` moves, take the
     values that cost the least energy. Collective.
     """
-    comm, bodies = system.algebra.comm, rows_of_bodies(system)
+    space = system.space
+    bodies = np.asarray(space.bodies)
+    return _motions_of(
+        Unheld(system.algebra, system.M, system.K, system.influence, bodies, space.coordinates)
+    )
+
+
+def _motions_of(system: Unheld) -> Iterator[FreeMotions]:
+    """Yield the free motions of every body, from its matrices. Collective."""
+    comm = system.algebra.comm
+    bodies = _rows_by_body(comm, system.bodies)
     motions = _rigid(system, bodies)
-    stiffness, mass = np.abs(system.K.diagonal())[:, None], system.M.diagonal()[:, None]
+    stiffness = np.abs(system.K.diagonal())[:, None]
+    mass = system.M.diagonal()[:, None]
     pulls = np.column_stack([system.K @ w for w in motions.T])
+    # of each body: wᵀKw says which motions are free, wᵀMw makes them orthonormal
     for rows in bodies:
         w = motions[rows]
         form, size, inertia = comm.sum(
@@ -59,18 +88,24 @@ def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
 
 def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
     """Return the owned unknowns of every body of all ranks. Collective."""
-    numbers = np.asarray(system.space.bodies)
-    counts = np.bincount(numbers, minlength=bodies_in(system.algebra.comm, numbers))
+    return _rows_by_body(system.algebra.comm, np.asarray(system.space.bodies))
+
+
+def _rows_by_body(comm: Comm, numbers: Indices) -> list[Indices]:
+    """Return the owned unknowns of every body, given the body of each. Collective."""
+    counts = np.bincount(numbers, minlength=bodies_in(comm, numbers))
     return np.split(np.argsort(numbers, kind="stable"), np.cumsum(counts)[:-1])
 
 
-def _rigid(system: SemiDiscreteSystem, bodies: list[Indices]) -> Array:
+def _rigid(system: Unheld, bodies: list[Indices]) -> Array:
     """Rigid motions of all bodies about their middles, in one vector each: bodies share no unknown.
 
     Each moves by another amount, so that what K ties to another body does not go with it.
     """
-    comm, points = system.algebra.comm, system.space.coordinates
-    place, amount = np.zeros_like(points), np.zeros((system.rows, 1))
+    comm = system.algebra.comm
+    points = system.points
+    place = np.zeros_like(points)
+    amount = np.zeros((len(points), 1))
     for rows, factor in zip(
         bodies, np.random.default_rng(0).uniform(1.0, 2.0, len(bodies)), strict=True
     ):
@@ -86,7 +121,7 @@ def _rigid(system: SemiDiscreteSystem, bodies: list[Indices]) -> Array:
     return motions
 
 
-def _factor(system: SemiDiscreteSystem, stiffness: Array, other: Mask) -> Factor:
+def _factor(system: Unheld, stiffness: Array, other: Mask) -> Factor:
     """Solve for unknowns that are no displacements, also where nothing resists them."""
     algebra, soft, every = system.algebra, stiffness[other], np.arange(np.count_nonzero(other))
     shift = algebra.local(every, every, np.where(soft > 0.0, SOFT * soft, 1.0), len(every))

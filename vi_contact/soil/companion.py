@@ -22,7 +22,7 @@ from ..core.problem import ContactProblem
 from ..core.step import Scheme, State
 from ..core.surfaces import empty_surface
 from ..core.system import Load
-from ..fem.own_matrices import system_from_arrays
+from ..fem.matrices.own_matrices import system_from_arrays
 from ..laws.mass import ConsistentMass
 from ..run.march import march
 from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps

@@ -26,9 +26,9 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import EXCITATION, Excitation
 from ..fem import compat
-from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
-from ..fem.petsc_algebra import PetscMatrix
-from ..fem.space import FemSpace
+from ..fem.body.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
+from ..fem.body.space import FemSpace
+from ..fem.matrices.petsc_algebra import PetscMatrix
 from ..laws.materials import Section
 from .companion import CompanionRun
 from .moving_base import BaseMotion, GroundFrame

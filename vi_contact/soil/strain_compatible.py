@@ -15,11 +15,11 @@ from ..core.checks import at, refuse
 from ..core.errors import InputError
 from ..core.quantities import RATIO, Positive, Remedy
 from ..fem import compat
-from ..fem.communicators import MpiComm
-from ..fem.forms import KINDS, Materials, cell_constants
-from ..fem.groups import cells_of
-from ..fem.heterogeneous import Heterogeneous
-from ..fem.mesh import Cells
+from ..fem.body.forms import KINDS, Materials, cell_constants
+from ..fem.body.heterogeneous import Heterogeneous
+from ..fem.mesh.communicators import MpiComm
+from ..fem.mesh.group_checks import cells_of
+from ..fem.mesh.tagged_mesh import Cells
 from ..laws.materials import LinearElastic
 from ..run.recorders import LargestStrain
 from .curves import SoilCurves

@@ -14,10 +14,10 @@ from ..core.algebra import Array, Mask, largest, max_abs, total
 from ..core.checks import at, refuse, shown
 from ..core.errors import InputError
 from ..fem import compat
-from ..fem.communicators import MpiComm, kept
-from ..fem.form_checks import refuse_not_linear
-from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from ..fem.petsc_rows import moved
+from ..fem.body.form_checks import refuse_not_linear
+from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..fem.matrices.petsc_rows import moved
+from ..fem.mesh.communicators import MpiComm, kept
 from .rounding import OFF, size_of_field
 
 KINDS = ("functional", "linear form", "bilinear form")

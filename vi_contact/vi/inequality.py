@@ -18,8 +18,8 @@ from ..core.checks import instance, shown, whole
 from ..core.collective import agree
 from ..core.errors import StepFailure
 from ..fem import compat
-from ..fem.communicators import MpiComm, kept
-from ..fem.form_checks import refuse_complex
+from ..fem.body.form_checks import refuse_complex
+from ..fem.mesh.communicators import MpiComm, kept
 from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
 from .forms import Problem, given_alike, refused

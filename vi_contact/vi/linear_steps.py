@@ -13,8 +13,8 @@ from ..core.errors import InputError, StepFailure
 from ..core.matrix_checks import SYMMETRIC, asymmetry
 from ..core.step import StepProblem
 from ..core.surfaces import empty_surface
-from ..fem.communicators import MpiComm
-from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
+from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
+from ..fem.mesh.communicators import MpiComm
 from ..solvers.volume.route import Method, ReducedNewton, SemismoothNewton, TaoTron, Volume
 from .forms import refused
 from .judged import Judged

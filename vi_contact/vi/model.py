@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from ..core.algebra import Array, Mask
 from ..core.matrix_checks import GOLDEN
-from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..solvers.volume.options import OptionLayers
 from .judged import Judged
 

@@ -3,7 +3,7 @@
 These are dual conditions of tetrahedra of second order.
 
 With the hats phi_i of vertices and the bubbles b_k = 4 phi_a phi_b of the edges of contact facets,
-displacements are sum phi_i v_i + sum b_k e_k (``fem.hierarchical``). The gap of a condition is the
+displacements are sum phi_i v_i + sum b_k e_k (``body.hierarchical``). The gap of a condition is the
 mean of the gap with the weight psi_i,
 
     gap_i = gap0_i - n·(v_i + sum_k c_ik e_k)
@@ -26,10 +26,10 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, from_each
 from ...core.checks import at, refuse
 from .. import compat
-from ..hierarchical import Hierarchy
-from ..mesh import Facets
-from ..numbering import facet_rows
-from ..space import FemSpace
+from ..body.hierarchical import Hierarchy
+from ..body.space import FemSpace
+from ..mesh.numbering import facet_rows
+from ..mesh.tagged_mesh import Facets
 from .faces import outward
 from .frames import Facing
 from .nodes import Nodes, Rows

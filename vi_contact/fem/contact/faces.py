@@ -20,9 +20,9 @@ from ...core.checks import at, number
 from ...core.errors import InputError
 from ...meshes.rows import connected, number_alike
 from .. import compat
-from ..mesh import Facets
-from ..numbering import facet_rows, is_curved
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..mesh.numbering import facet_rows, is_curved
+from ..mesh.tagged_mesh import Facets
 from .nodes import Nodes
 
 log = logging.getLogger(__name__)

@@ -27,7 +27,7 @@ from ...core.surfaces import (
     same_node,
     tangential_columns,
 )
-from ..nodal_space import NodalSpace
+from ..mesh.nodal_space import NodalSpace
 from .borrowing import Borrowed
 from .nodes import Nodes, asked, joined_nodes
 

@@ -16,9 +16,9 @@ from ...core.algebra import Array, Comm, Indices, Mask, from_each
 from ...core.checks import at
 from ...core.errors import InputError
 from .. import compat
-from ..mesh import node_numbers
-from ..nodal_space import parts_of
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..mesh.nodal_space import parts_of
+from ..mesh.numbering import node_numbers
 from .nodes import Nodes
 
 NAMED = 4  # hinges that a message names

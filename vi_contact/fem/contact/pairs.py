@@ -29,8 +29,8 @@ from ...core.stages import stage
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...meshes.rows import number_alike
-from ..mesh import Facets
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..mesh.tagged_mesh import Facets
 from .borrowing import Borrowed, borrowed
 from .bubbles import averaged
 from .counting import census_of_all, tell

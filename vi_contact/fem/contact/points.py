@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from ...core.obstacles import Obstacle, admissible_gap, facing
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
-from ..own_matrices import MatrixSpace
+from ..matrices.own_matrices import MatrixSpace
 from .frames import Facing, NodalConditions, snapped, surface_of
 from .nodes import Nodes
 

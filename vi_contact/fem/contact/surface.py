@@ -20,9 +20,9 @@ from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
 from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
-from ..groups import facets_of
-from ..mesh import Facets
-from ..space import FemSpace, space_of
+from ..body.space import FemSpace, space_of
+from ..mesh.group_checks import facets_of
+from ..mesh.tagged_mesh import Facets
 from .borrowing import borrowed
 from .bubbles import averaged
 from .counting import census_on_ranks, tell
@@ -149,7 +149,7 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
     There are some where what they face, or bubbles are measured from, is moved.
     """
     parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
-    moves = bool(parts) and any(condition.moves for condition in space.prescribed)
+    moves = bool(parts) and space.moves
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}

@@ -130,9 +130,7 @@ def watched_nodes(
 
     Collective.
     """
-    if not largest(space.comm, len(nodes.numbers)) or not any(
-        one.moves for one in space.prescribed
-    ):
+    if not largest(space.comm, len(nodes.numbers)) or not space.moves:
         return ()
     return (Watched(space, name, nodes, directions, gap0, facing, side),)
 
@@ -144,9 +142,9 @@ def clamped_or_prescribed(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, 
     "prescribed", the others "clamped".
     """
     moved = np.zeros(len(space.nodes), dtype=bool)
-    for one in space.prescribed:
-        if one.moves:
-            moved[one.places(space)[0]] = True
+    for support in space.supports:
+        if support.moves:
+            moved[support.places[0]] = True
     blocks = space.blocks_of(nodes.numbers)
     here = np.flatnonzero(mask & (blocks >= 0))  # a rank may have no nodes
     driven = np.zeros(len(blocks), dtype=bool)

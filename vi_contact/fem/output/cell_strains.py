@@ -5,8 +5,8 @@ import ufl
 
 from ...core.algebra import Array
 from .. import compat
-from ..petsc_algebra import PetscMatrix
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..matrices.petsc_algebra import PetscMatrix
 
 
 class CellStrains:

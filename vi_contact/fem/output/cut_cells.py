@@ -16,9 +16,9 @@ import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each
 from .. import compat
-from ..loads import BodyForce, Pressure, TangentialTraction, Traction
-from ..mesh import node_numbers
-from ..space import FemSpace
+from ..body.loads import BodyForce, Pressure, TangentialTraction, Traction
+from ..body.space import FemSpace
+from ..mesh.numbering import node_numbers
 
 
 def work_beyond(

@@ -37,8 +37,8 @@ from ...core.own_files import inner_folder, make_inner_folder, remove
 from ...core.problem import ContactProblem
 from ...core.quantities import Positive
 from ...core.step import Report, State
-from ..nodal_space import NodalSpace
-from ..own_matrices import MatrixSpace
+from ..matrices.own_matrices import MatrixSpace
+from ..mesh.nodal_space import NodalSpace
 
 log = logging.getLogger(__name__)
 
@@ -371,7 +371,7 @@ def _cells_of_body(problem: ContactProblem) -> Cells:
     The order is that of VTK.
     """
     from .. import compat
-    from ..space import known_matrices, space_of
+    from ..body.space import known_matrices, space_of
 
     space = space_of("XDMF", problem.system)
     if space.forms.tells_stress:

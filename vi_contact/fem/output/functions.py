@@ -29,7 +29,7 @@ from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
-from ..space import FemSpace, known_matrices, space_of
+from ..body.space import FemSpace, known_matrices, space_of
 from .fields import between, blocks_of_conditions, nodal_contact
 
 NAMES = ("u", "v", "stress", "contact_pressure")

@@ -23,12 +23,13 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Balance, Report, State
 from .. import compat
+from ..body.conditions import as_tuple
+from ..body.initial_strains import InitialStrain
+from ..body.linear_forms import LOADS, LinearForm, Loads
+from ..body.loads import evaluate
+from ..body.space import known_matrices, space_of
 from ..contact.surface import moved_by_held
-from ..groups import facets_of
-from ..initial_strains import InitialStrain
-from ..linear_forms import LOADS, LinearForm, Loads
-from ..loads import as_tuple, evaluate
-from ..space import known_matrices, space_of
+from ..mesh.group_checks import facets_of
 
 log = logging.getLogger(__name__)
 
@@ -200,13 +201,12 @@ class NodalWork:
         def between(value: Callable[[float], Any]) -> Any:
             return value(t1) if late == 1.0 else (1.0 - late) * value(t0) + late * value(t1)
 
-        moves = any(condition.moves for condition in space.prescribed)
         motion = []
         for k, x in enumerate((balance.u, balance.v, balance.a)):
             free = problem.cartesian(x)
             motion.append(
                 between(partial(space.expand, free, derivative=k))
-                if moves
+                if space.moves
                 else space.expand(free, t1, k)
             )
         motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity

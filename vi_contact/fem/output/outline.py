@@ -8,9 +8,9 @@ import ufl
 
 from ...core.algebra import Array
 from .. import compat
+from ..body.space import FemSpace
 from ..compat import Indices
-from ..mesh import Facets
-from ..space import FemSpace
+from ..mesh.tagged_mesh import Facets
 
 
 def cell_volumes(mesh: Any) -> Array:

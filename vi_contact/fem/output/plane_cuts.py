@@ -9,9 +9,9 @@ from scipy.linalg import block_diag
 from ...core.algebra import Array
 from ...core.errors import InputError
 from .. import compat
-from ..groups import cells_of
-from ..mesh import Cells
-from ..space import FemSpace
+from ..body.space import FemSpace
+from ..mesh.group_checks import cells_of
+from ..mesh.tagged_mesh import Cells
 from .cut_cells import work_beyond
 from .nodal_work import Rigid, rigid_motions
 

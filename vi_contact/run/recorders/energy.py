@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from ...core.ledger import Energies, energies, energy_balance
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
-from ...core.ledger import Energies, energies, energy_balance
 
 
 class Energy:

@@ -8,8 +8,8 @@ from ...core.algebra import Array, largest
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
+from ...fem.body.space import space_of
 from ...fem.output.cell_strains import CellStrains
-from ...fem.space import space_of
 
 
 class LargestStrain:

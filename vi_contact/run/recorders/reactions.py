@@ -12,10 +12,10 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
-from ...fem.groups import facets_of
-from ...fem.mesh import Facets
+from ...fem.body.space import FemSpace
+from ...fem.mesh.group_checks import facets_of
+from ...fem.mesh.tagged_mesh import Facets
 from ...fem.output.nodal_work import Loads, NodalWork, check_actions
-from ...fem.space import FemSpace
 
 
 @dataclass

@@ -13,8 +13,8 @@ from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
-from ...fem.groups import cells_of
-from ...fem.mesh import Cells
+from ...fem.mesh.group_checks import cells_of
+from ...fem.mesh.tagged_mesh import Cells
 from ...fem.output.nodal_work import Loads, NodalWork, check_actions
 from ...fem.output.plane_cuts import find_cut
 

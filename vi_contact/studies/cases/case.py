@@ -30,11 +30,11 @@ from ...core.state_checks import initial_state
 from ...core.step import Recorder, Scheme, Solver, State
 from ...core.surfaces import ContactSurface, empty_surface
 from ...engineering.checks.comparison import Check
-from ...fem.assembly import assemble
-from ...fem.communicators import MpiComm
+from ...fem.body.assembly import assemble
+from ...fem.body.heterogeneous import Heterogeneous
 from ...fem.contact.joined import joined_surfaces
-from ...fem.heterogeneous import Heterogeneous
-from ...fem.mesh import Tags, build_mesh, read_mesh
+from ...fem.mesh.communicators import MpiComm
+from ...fem.mesh.tagged_mesh import Tags, build_mesh, read_mesh
 from ...laws.materials import LinearElastic
 from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript

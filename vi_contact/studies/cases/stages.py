@@ -24,8 +24,8 @@ from ...core.own_files import inner_folder, is_own, make_inner_folder, read_text
 from ...core.problem import ContactProblem
 from ...core.state_checks import initial_state
 from ...core.step import State
-from ...fem.communicators import MpiComm
-from ...fem.released_supports import release, removed_support, same_supports, started
+from ...fem.body.released_supports import release, removed_support, same_supports, started
+from ...fem.mesh.communicators import MpiComm
 from ...run.files.checkpoint import state_checksum
 from ...run.files.folder import (
     CHECKPOINT,

@@ -20,7 +20,7 @@ from typing import Any
 from ...core.errors import InputError, ViContactError
 from ...core.files import on_root, to_json, write_atomically
 from ...core.own_files import inner_folder, make_inner_folder
-from ...fem.communicators import MpiComm
+from ...fem.mesh.communicators import MpiComm
 from ...run.files.folder import locked, move_run, remove_if_empty, remove_run, run_folder
 from ...run.recorders import Contact, Energy
 from ...run.simulate import Solution

@@ -26,7 +26,7 @@ from ...core.arguments import check_fields, checked
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...core.own_files import inner_folder, is_own
-from ...fem.mesh import alone
+from ...fem.mesh.tagged_mesh import alone
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ...run.files.folder import LOCK, locked
 from ...run.files.reading import read_run

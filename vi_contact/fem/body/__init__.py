@@ -1,0 +1,1 @@
+"""Assemble bodies: unknowns, supports, materials, loads, and their M, C and K."""

@@ -1,0 +1,401 @@
+"""Assemble the semi-discrete system of a linear elastic body.
+
+It is M u'' + C u' + K u = f(t) (boundary method, eqs. 7-10a).
+
+    sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
+    K = ∫ sigma(u):eps(v),   C = alpha M + beta K
+
+integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u =
+P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, Any
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
+
+from ...core.algebra import Array, from_each
+from ...core.checks import instance
+from ...core.collective import Parts, agree
+from ...core.quantities import Unit
+from ...core.stages import stage
+from ...core.system import Load, SemiDiscreteSystem
+from ...laws.free_motions import Unheld, floats
+from ...laws.materials import Damping, Section
+from .. import compat
+from ..matrices.half import algebra_for
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..matrices.petsc_rows import moved
+from ..mesh.communicators import MpiComm, give_back
+from ..mesh.numbering import number_nodes
+from ..mesh.tagged_mesh import Cells, Facets
+from .assembly_checks import (
+    check_body,
+    check_initial,
+    check_nodes,
+    check_ratios,
+    refuse_folded,
+)
+from .conditions import as_tuple, gather_conditions
+from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
+from .dirichlet import given_space, given_values, refuse_contradictions, refuse_uneven
+from .elimination import Elimination
+from .forms import ElasticForms, Materials, cell_materials
+from .initial_strains import InitialStrain, InitialStrains
+from .linear_forms import AnyLoad, LinearForm, Loads
+from .loads import Prescribed, evaluate
+from .own_forms import Forms, OwnForms
+from .space import FemSpace, translations
+from .ties import Tied
+
+Field = tuple[float, ...] | Callable[[Array], Array]
+Initial = Field | Sequence[tuple[Cells, Field]] | None
+
+LIGHTER = (
+    "inertia load of the ground motion: the convention of the catalogue's reference numbers, which "
+    "leave out the mass that elements share with the base"
+)
+
+
+@stage("assembling")
+def assemble(
+    mesh: Any,
+    material: Materials | None = None,
+    *,
+    forms: Forms | None = None,
+    section: Section | None = None,
+    clamped: Facets | Sequence[Facets] = (),
+    prescribed: Prescribed | Sequence[Prescribed] = (),
+    tied: Tied | Sequence[Tied] = (),
+    dashpots: Dashpots | Sequence[Dashpots] = (),
+    loads: Loads = (),
+    damping: Damping | None = None,
+    initial_displacement: Annotated[Initial, Unit("m")] = None,
+    initial_velocity: Annotated[Initial, Unit("m/s")] = None,
+    base_inertia: bool = True,
+    degree: int = 1,
+    quadrature_degree: int | None = None,
+    integration: str = "full",
+    space: Any = None,
+    bcs: Any = (),
+) -> SemiDiscreteSystem:
+    """Assemble the system of a body, on the free unknowns.
+
+    Args:
+        mesh: DOLFINx mesh (``read_mesh``) with cells of first order or, with degree 2, of second
+            order too.
+        degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2
+            (docs/guide/second_order.md).
+        material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that
+            cover the mesh.
+        forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
+            where they have no mass, and the wave speeds that dashpots and free fields need.
+        section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
+        space: the user's own DOLFINx space V of the displacement, which sets the degree.
+        bcs: ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
+            values; where two meet, the last one counts.
+        clamped: facets with u = 0.
+        prescribed: facets that move (eq. 3) or are held in some components.
+        dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts
+            as damping.
+        tied: boundaries whose opposite nodes move together.
+        damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or
+            DampingRatio, which alone reads the xi of materials.
+        loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
+        base_inertia: whether the inertia load of a ground motion counts the mass that elements
+            share with prescribed nodes. True is right for motions relative to the ground; False is
+            the load of docs/start/first_wall.md.
+        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
+            hexahedra, where each cell has one mean value of tr eps (``dilatation``).
+        initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
+            pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
+            start from zero.
+        initial_velocity: the like for the velocity.
+        quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with
+            parallel sides.
+
+    Raises:
+        InputError: cells without a material, of an order that does not fit the degree, or folded;
+            NaN in data, components that do not exist, a damping law that damps nothing, ratios xi
+            that no law reads, dashpots on held facets, groups without facets or cells, of another
+            mesh or kind, contradictions.
+    """
+    instance(
+        "assemble", "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]"
+    )
+    comm = MpiComm(mesh.comm)
+    agree(
+        comm,
+        "assemble",
+        {
+            "material": material,
+            "forms": Parts(forms),
+            "section": section,
+            "clamped": clamped,
+            "prescribed": prescribed,
+            "tied": tied,
+            "dashpots": dashpots,
+            "loads": loads,
+            "damping": damping,
+            "initial_displacement": initial_displacement,
+            "initial_velocity": initial_velocity,
+            "base_inertia": base_inertia,
+            "degree": degree,
+            "quadrature_degree": quadrature_degree,
+            "integration": integration,
+        },
+    )
+
+    # what is given: kinds, groups, conditions that go together
+    bcs = as_tuple(bcs)
+    refuse_uneven(comm, bcs)
+    if bcs or space is not None:
+        space, degree = given_space(mesh, space, bcs)
+    section, damping = check_body(
+        mesh,
+        material,
+        forms,
+        section,
+        damping,
+        base_inertia=base_inertia,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
+        integration=integration,
+    )
+    check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
+    conditions = gather_conditions(
+        mesh, clamped=clamped, prescribed=prescribed, tied=tied, dashpots=dashpots, loads=loads
+    )
+
+    # unknowns: nodes, which of their components are held or tied, and the elimination of these
+    V = compat.vector_space(mesh, degree) if space is None else space
+    nodes = number_nodes(V)
+    check_nodes(comm, nodes, degree)
+    if nodes.curved:
+        refuse_folded(mesh)
+    blocks = [compat.owned_facet_dofs(V, one.facets.indices) for one in conditions.held]
+    supports = [
+        one.support(on_facets, mesh.geometry.dim)
+        for one, on_facets in zip(conditions.held, blocks, strict=True)
+    ]
+    if bcs:
+        supports += [one.support(nodes.owned) for one in given_values(mesh, V, bcs)]
+    space = FemSpace(
+        V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
+    )
+    if bcs:
+        refuse_contradictions(space)
+    rigid = np.column_stack([space.restrict(one) for one in space.translations])
+
+    # the body: weak forms of its materials or of the user, absorbing boundaries, loads
+    materials = [] if material is None else cell_materials(mesh, material)
+    body = (
+        ElasticForms(space, materials, section, damping, selective=integration == "selective")
+        if forms is None
+        else OwnForms(space, forms, materials, section, damping)
+    )
+    body.boundaries = conditions.dashpots
+    check_ratios(body, forms is None)
+    algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
+    absorbers = [DashpotMatrix(space, body, one) for one in conditions.dashpots]
+    acting: list[Any] = [one.dashpots.loads(one, body) for one in absorbers]
+    load = assemble_loads(space, section, conditions.loads)
+    u0 = _initial(space, "initial displacement", initial_displacement)
+    v0 = _initial(space, "initial velocity", initial_velocity)
+
+    reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
+    M, K = reduced.M, reduced.K
+    system = SemiDiscreteSystem(
+        algebra=algebra,
+        M=M,
+        C=reduced.C,
+        K=K,
+        load=replace(
+            load,
+            inertial=reduced.inertial,
+            viscous=(*reduced.viscous, *(one for part in acting for one in part.viscous)),
+            general=(
+                *load.general,
+                *reduced.elastic,
+                *(one for part in acting for one in part.elastic),
+            ),
+        ),
+        influence=rigid,
+        base_mass=None
+        if reduced.momenta is None
+        else reduced.momenta - np.column_stack([M @ r for r in rigid.T]),
+        u0=u0,
+        v0=v0,
+        space=space,
+        floating=floats(Unheld(algebra, M, K, rigid, space.bodies, space.coordinates)),
+        tied=space.tied_unknowns,
+        absolute=any(one.lets_waves_in for one in conditions.dashpots),
+        notes=describe_boundaries(
+            conditions.dashpots, comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
+        ),
+        companions=tuple(
+            one for part in (*conditions.prescribed, *acting) for one in part.companions
+        ),
+    )
+    body.own(system)
+    del absorbers, reduced
+    give_back(mesh.comm)
+    return system
+
+
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """Hold the matrices of the free unknowns, and what held ones pull on them.
+
+    Attributes:
+        M, C, K: mass, damping (None where nothing damps) and stiffness.
+        elastic, viscous, inertial: loads of prescribed motions U: -Pᵀ K U, -Pᵀ C U', -Pᵀ M U''.
+        momenta: (n, d) Pᵀ M of the unit translations of all nodes, None where nobody asks.
+    """
+
+    M: PetscMatrix
+    C: PetscMatrix | None
+    K: PetscMatrix
+    elastic: tuple[Callable[[float], Array], ...]
+    viscous: tuple[Callable[[float], Array], ...]
+    inertial: tuple[Callable[[float], Array], ...]
+    momenta: Array | None
+
+
+def _reduce(
+    body: ElasticForms,
+    absorbers: Sequence[DashpotMatrix],
+    algebra: PetscAlgebra,
+    *,
+    base_inertia: bool,
+) -> _Reduced:
+    """Assemble K, C and M of all components, and eliminate those that are held or tied. Collective.
+
+    Args:
+        body: its forms.
+        absorbers: matrices of its absorbing boundaries.
+        algebra: how the matrices are stored.
+        base_inertia: whether ``momenta`` are asked for.
+    """
+    space = body.space
+    elimination = space.elimination
+    directions = translations(len(space.nodes), space.dimension)
+    motions = [
+        partial(space.prescribed_values, derivative=k) if space.moves else None for k in range(3)
+    ]
+    # one after the other: each is large before it is reduced
+    K, elastic = _eliminate(body.matrix("K"), elimination, algebra, motions[0])
+    C: PetscMatrix | None = None
+    viscous: tuple[Callable[[float], Array], ...] = ()
+    if body.damped or absorbers:
+        C, viscous = _eliminate(_damper(body, absorbers), elimination, algebra, motions[1])
+    mass = body.matrix("M")
+    # momenta, less M r: what accelerated prescribed nodes pull on the free ones
+    momenta = None
+    if base_inertia:
+        momenta = np.column_stack([elimination.pull(PetscMatrix(mass) @ one) for one in directions])
+    M, inertial = _eliminate(mass, elimination, algebra, motions[2])
+    return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
+
+
+def _damper(body: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
+    """Return C of materials and absorbing boundaries, before elimination (PETSc)."""
+    terms = [body.matrix("C")] if body.damped else []
+    terms += [absorber.mat for absorber in absorbers]
+    algebra = PetscAlgebra(body.space.mesh.comm)
+    return as_petsc(algebra.combine([(1.0, PetscMatrix(term)) for term in terms])).mat
+
+
+def _eliminate(
+    full: Any,
+    elimination: Elimination,
+    algebra: PetscAlgebra,
+    motion: Callable[[float], Array] | None,
+) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
+    """Return a matrix without held and tied components, and the load of prescribed motions.
+
+    Of A = K, C, M and the derivative k = 0, 1, 2 of U it is PᵀAP and -PᵀA U^(k)(t).
+
+    Args:
+        full: A, a PETSc matrix of all components; it is destroyed.
+        elimination: P.
+        algebra: how the matrix is stored.
+        motion: t -> U^(k)(t) (full,), None where nothing that is held moves.
+    """
+    pull: tuple[Callable[[float], Array], ...] = ()
+    if motion is not None:
+        matrix = PetscMatrix(moved(elimination.held_columns(full), algebra.comm.mpi))
+        pull = (lambda t: -elimination.pull(matrix @ motion(t)[elimination.held]),)
+    part = elimination.reduce(full)
+    full.destroy()
+    return algebra.held(moved(part, algebra.comm.mpi)), pull
+
+
+def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
+    """Assemble f(t) on the free unknowns.
+
+    It is that of tractions, body forces, linear forms and initial strains.
+    """
+    constant = np.zeros(len(space.ids))
+    separable: list[tuple[Array, Callable[[float], float]]] = []
+    general: list[Callable[[float], Array]] = []
+    if strained := [one for one in loads if isinstance(one, InitialStrain)]:
+        space.forms.initial = InitialStrains(space.forms, strained)
+    for load in loads:
+        at = _integrated(space, section, load)
+        if load.history is not None:
+            separable.append((at(0.0), load.history))
+        elif load.is_constant:
+            constant += at(0.0)
+        else:
+            general.append(at)
+    return Load(constant, tuple(separable), tuple(general))
+
+
+def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
+    """Return t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here.
+
+    Of a form it is its own.
+    """
+    if isinstance(load, InitialStrain):
+        return lambda t: space.forms.initial.forces(t, only=load)
+    if isinstance(load, LinearForm):
+        full = load.full(space, section.thickness)
+        return lambda t: space.pull(full(t))
+    g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
+    form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
+    matrix = PetscMatrix(compat.assemble_matrix(space.compiled(form)))
+
+    def at(t: float) -> Array:
+        values = evaluate(type(load).__name__, load.value, space.points, t, space.comm)
+        return space.pull(section.thickness * (matrix @ values.ravel()))
+
+    return at
+
+
+def _initial(space: FemSpace, name: str, value: Initial) -> Array:
+    """Return initial values on the free unknowns."""
+    if value is None:
+        return np.zeros(len(space.ids))
+    if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
+        pairs: Any = value
+        values = np.zeros((len(space.nodes), space.dimension))
+        for cells, one in pairs:
+            blocks = np.unique(compat.cell_blocks(space.V)[cells.indices])
+            shared = np.concatenate(
+                from_each(space.comm, space.node_of_block[blocks[blocks >= len(values)]])
+            )
+            touched = np.isin(space.nodes, shared)  # by cells of other ranks
+            touched[blocks[blocks < len(values)]] = True
+            values[touched] = _nodal(space, name, one)[touched]
+        return space.restrict(values)
+    return space.restrict(_nodal(space, name, value))
+
+
+def _nodal(space: FemSpace, name: str, value: Any) -> Array:
+    field: Any = (lambda points, t: value(points)) if callable(value) else value
+    return evaluate(name, field, space.points, 0.0, space.comm)

@@ -1,0 +1,320 @@
+"""Check what a body is assembled of.
+
+These are kinds of objects, groups of this mesh, conditions that do not contradict.
+"""
+
+import logging
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
+
+from ...core.algebra import total
+from ...core.checks import check_word, flag, instance, optional, provides, several, shown, whole
+from ...core.errors import InputError
+from ...laws.materials import (
+    BLIND_TO_RATIOS,
+    Damping,
+    DampingRatio,
+    LinearElastic,
+    NoDamping,
+    PlaneStrain,
+    PlaneStress,
+    Rayleigh,
+    Section,
+    Solid,
+)
+from .. import compat
+from ..mesh.communicators import MpiComm
+from ..mesh.group_checks import cells_of, field_given
+from ..mesh.numbering import NodeTable
+from .form_checks import refuse_complex
+from .forms import KINDS, ElasticForms
+from .own_forms import Forms
+
+log = logging.getLogger(__name__)
+OWNER = "assemble"
+LOCKING = (
+    0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
+)
+
+
+def check_body(
+    mesh: Any,
+    material: Any,
+    forms: Any,
+    section: Any,
+    damping: Any,
+    *,
+    base_inertia: Any,
+    degree: Any,
+    quadrature_degree: Any,
+    integration: Any,
+) -> tuple[Section, Damping]:
+    """Return (section, damping), the usual for None.
+
+    Raises:
+        InputError: objects of another kind, cells of another mesh.
+    """
+    if mesh.topology.dim != mesh.geometry.dim:
+        raise InputError(
+            f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
+            f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}"
+        )
+    _check_degree(degree)
+    optional(whole, OWNER, "quadrature_degree", quadrature_degree)
+    refuse_complex("assemble")
+    optional(
+        instance,
+        OWNER,
+        "forms",
+        forms,
+        Forms,
+        "give fem.Forms(stiffness=…, mass=…), or leave them out",
+    )
+    _check_material(mesh, material, forms)
+    if section is None:
+        section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
+    damping = NoDamping() if damping is None else damping
+    _check_section(section, mesh.geometry.dim)
+    _check_damping(damping, section, forms)
+    flag(OWNER, "base_inertia", base_inertia)
+    found = (
+        [material]
+        if material is None or isinstance(material, KINDS)
+        else [one for _, one in material]
+    )
+    _check_integration(
+        mesh, found if forms is None else [forms], section, damping, degree, integration
+    )
+    thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
+    if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
+        _tell_locking([one for one in found if isinstance(one, LinearElastic)])
+    return section, damping
+
+
+def _check_material(mesh: Any, material: Any, forms: Any) -> None:
+    """Raise InputError unless there are forms, a material, or pairs of cells and materials."""
+    if material is None and forms is None:
+        raise InputError("assemble: neither a material nor forms are given; give one of them")
+    if material is not None and not isinstance(material, KINDS):
+        remedy = "give a LinearElastic, Orthotropic or Heterogeneous, or (cells, material) pairs"
+        for pair in several(OWNER, "material", material, remedy):
+            cells, one = _pair("material", pair, remedy)
+            cells_of(OWNER, "the cells of a material", cells, mesh)
+            instance(OWNER, "material", one, KINDS, remedy)
+
+
+def _check_section(section: Any, dimension: int) -> None:
+    """Raise InputError unless the section is one of a body of this dimension."""
+    provides(
+        OWNER,
+        "section",
+        section,
+        ("thickness", "elastic_constants"),
+        "give PlaneStrain(), PlaneStress() or None",
+    )
+    if dimension == 3 and isinstance(section, PlaneStrain | PlaneStress):
+        raise InputError(
+            f"assemble: {section} is a section of a plane body and this one has three dimensions; "
+            "give Solid(), or leave it out"
+        )
+    if dimension == 2 and isinstance(section, Solid):
+        raise InputError(
+            "assemble: Solid() is for a body in space and this one is plane; give PlaneStrain() or "
+            "PlaneStress(thickness)"
+        )
+
+
+def _check_damping(damping: Any, section: Any, forms: Any) -> None:
+    """Raise InputError unless the damping is one, and goes with the forms and the section."""
+    provides(
+        OWNER,
+        "damping",
+        damping,
+        ("coefficients",),
+        "give Rayleigh(alpha, beta), MassProportional(c) or None",
+    )
+    if forms is not None and not (
+        isinstance(damping, Rayleigh | NoDamping) or hasattr(damping, "viscosities")
+    ):
+        raise InputError(
+            f"assemble: {damping} needs the density of a material and forms=… have none; give "
+            "Rayleigh(alpha, beta), KelvinVoigt(…), or Forms(…, damping=)"
+        )
+    if isinstance(section, PlaneStress) and any(getattr(damping, "viscosities", ())):
+        raise InputError(
+            f"assemble: {damping} does not go with PlaneStress, where the strain across the panel "
+            "would need its own motion; give Rayleigh(0, beta), or another section"
+        )
+
+
+def check_ratios(body: ElasticForms, of_materials: bool) -> None:
+    """Raise InputError, on all ranks, for a damping law that damps nothing.
+
+    So it does for damping ratios that no law reads.
+
+    body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
+    those of materials, and not the user's own forms.
+    """
+    law, ratio = body.damping, body.largest_ratio
+    if isinstance(law, DampingRatio) and not any(
+        callable(one.xi) or one.xi for _, one in body.materials
+    ):
+        raise InputError(
+            f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; "
+            "give LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)"
+        )
+    rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
+    damps = body.damped if of_materials else rayleigh or body.viscous is not None
+    if not isinstance(law, NoDamping | DampingRatio) and not damps:
+        raise InputError(
+            f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above "
+            "zero, or leave damping out"
+        )
+    if ratio and isinstance(law, BLIND_TO_RATIOS):
+        raise InputError(
+            f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not "
+            "read; give damping=DampingRatio(frequency), or leave xi out"
+        )
+    _refuse_ratio_behind(body)
+
+
+def _refuse_ratio_behind(body: ElasticForms) -> None:
+    """Raise InputError for a ratio of a material that only dashpots have.
+
+    They have no damping but their own.
+    """
+    inside = [one for _, one in body.materials]
+    for boundary in body.boundaries:
+        behind = boundary.material
+        if behind is not None and behind.xi and behind not in inside:
+            raise InputError(
+                f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' "
+                f"has the damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out "
+                "there"
+            )
+
+
+def _check_degree(degree: Any) -> None:
+    """Raise InputError unless the degree is 1 or 2."""
+    if isinstance(degree, bool) or degree not in (1, 2):
+        raise InputError(
+            f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
+        )
+
+
+def check_nodes(comm: MpiComm, nodes: NodeTable, degree: int) -> None:
+    """Raise InputError, on all ranks, for cells of another order than the degree. Collective.
+
+    So it does where a rank owns nodes of which it has no cell, as parts of meshes may leave them.
+
+    Args:
+        comm: the communicator of the mesh.
+        nodes: those of the displacement's space.
+        degree: that of the displacement, 1 or 2.
+    """
+    lonely = round(total(comm, nodes.lonely))
+    if lonely:
+        raise InputError(
+            f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, "
+            "as create_submesh may leave them; write the part to a file and read it, or use fewer "
+            "ranks"
+        )
+    if nodes.curved and degree == 1:
+        raise InputError(
+            "assemble: the mesh has cells of second order; give degree=2, or mesh it in first order"
+        )
+    if nodes.curved and not nodes.complete:
+        raise InputError(
+            "assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it "
+            "with complete cells of first or second order"
+        )
+
+
+def refuse_folded(mesh: Mesh) -> None:
+    """Raise InputError, on all ranks, for curved cells that are folded. Collective.
+
+    The Jacobian J of such a cell changes its sign: |∫ sign(det J)| < ∫ 1 over the cell.
+    """
+    size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
+    signed, whole = (
+        compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
+        for one in (det / abs(det), 1.0)
+    )
+    folded = mesh.comm.allreduce(int(np.sum(np.abs(signed) < (1.0 - 1e-9) * whole)))
+    if folded:
+        raise InputError(
+            f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its "
+            "sign; mesh them finer, or with straight sides"
+        )
+
+
+def _check_integration(
+    mesh: Mesh,
+    materials: Sequence[Any],
+    section: Section,
+    damping: Damping,
+    degree: int,
+    integration: Any,
+) -> None:
+    """Raise InputError for a word of integration that is none.
+
+    So it does where cells cannot or need not be integrated selectively.
+    """
+    check_word("integration of assemble", integration, ("full", "selective"))
+    if integration == "full":
+        return
+    if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
+        raise InputError(
+            "assemble: integration='selective' needs quadrilaterals or hexahedra, because other "
+            "cells lock with it too; take degree=2"
+        )
+    if degree == 2 or isinstance(section, PlaneStress):
+        raise InputError(
+            "assemble: integration='selective' is for degree=1 in plane strain or in space: "
+            "neither degree=2 nor plane stress locks; leave it out"
+        )
+    if any(getattr(damping, "viscosities", ())) or not all(
+        isinstance(one, LinearElastic) for one in materials
+    ):
+        raise InputError(
+            "assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
+            "damping; take degree=2 for others"
+        )
+
+
+def _tell_locking(materials: Sequence[LinearElastic]) -> None:
+    """Warn of materials that first-order cells cannot deform without changing their volume."""
+    stiff = max((one.nu for one in materials), default=0.0)
+    if stiff > LOCKING:
+        log.warning(
+            "Poisson's ratio %.10g locks first-order cells, so displacements are too small: give "
+            "at most %g, integration='selective' (quadrilaterals and hexahedra) or degree=2",
+            stiff,
+            LOCKING,
+        )
+
+
+def check_initial(mesh: Mesh, **values: Any) -> None:
+    """Raise InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
+    for name, value in (
+        (f"initial_{name}", value) for name, value in values.items() if value is not None
+    ):
+        fields = [value]
+        if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
+            pairs = [_pair(name, pair, "give (cells, value) pairs") for pair in value]
+            fields = [field for _, field in pairs]
+            for cells, _ in pairs:
+                cells_of(OWNER, f"the cells of {name}", cells, mesh)
+        for field in fields:
+            field_given(OWNER, name, field)
+
+
+def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
+    found = several(OWNER, f"a pair of {name}", pair, remedy)
+    if len(found) != 2:
+        raise InputError(f"{OWNER}: a pair of {name} has {len(found)} members; {remedy}")
+    return found[0], found[1]

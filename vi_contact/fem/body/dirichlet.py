@@ -1,0 +1,200 @@
+"""Take Dirichlet data as a user of DOLFINx has them.
+
+They are ``dirichletbc`` objects on the displacement's space, or parts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, Indices, Mask, from_each, largest, max_abs
+from ...core.checks import provides, refuse
+from ...core.errors import InputError
+from .. import compat
+from ..mesh.communicators import MpiComm
+from ..mesh.numbering import facet_rows
+from .loads import Support
+
+REMEDY = (
+    "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or "
+    "on V.sub(i)"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class GivenValues:
+    """Hold components of nodes as a ``Prescribed`` at rest does.
+
+    They are those of a ``dirichletbc``, as they were when given.
+
+    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not
+    zero.
+    """
+
+    name: str
+    mask: Mask
+    values: Array
+    moves: bool
+
+    def support(self, owned: int) -> Support:
+        """Return what is held of a displacement space.
+
+        ``owned``: how many blocks of unknowns this rank owns.
+        """
+        blocks, components = np.nonzero(self.mask[:owned])
+        return Support(self, (blocks, components), self.moves)
+
+    def at(
+        self, points: Array, places: tuple[Any, Any], t: float, derivative: int
+    ) -> tuple[Any, str]:
+        """Return (the values, or zero rates, at the places; no defect)."""
+        return (0.0 if derivative else self.values[places]), ""
+
+    def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, tuple[int, ...]]]:
+        """Return, for each component, the facets of which every node is held in it."""
+        held = self.mask[facet_rows(space.V, facets)].all(axis=1)
+        return [(facets[held[:, c]], (c,)) for c in range(space.dimension)]
+
+
+def refuse_uneven(comm: MpiComm, bcs: Sequence[Any]) -> None:
+    """Raise InputError, on all ranks, where some have more conditions than others. Collective."""
+    counts = from_each(comm, len(bcs))
+    if min(counts) < max(counts):
+        raise InputError(
+            f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give "
+            "all ranks the same list, also where a rank has none of its unknowns"
+        )
+
+
+def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
+    """Return (the user's space, or that of the conditions without one; its degree). Collective.
+
+    Args:
+        mesh: that of the body.
+        V: the user's space, or None.
+        bcs: ``dirichletbc`` objects, at least one where V is None.
+
+    Raises:
+        InputError: a space of another mesh or kind, and what is no dirichletbc.
+    """
+    for bc in bcs:
+        provides("assemble", "bcs", bc, ("dof_indices", "function_space", "g"), REMEDY)
+        if not compat.is_on(bc.function_space, mesh):
+            raise InputError(f"assemble: a dirichletbc of bcs is on another mesh; {REMEDY}")
+    if V is None:
+        # the space of the conditions is known by its blocks: try both degrees
+        for k in (1, 2):
+            known = compat.vector_space(mesh, k)
+            if _block_of(known, bcs[0].function_space) is not None:
+                return known, k
+        raise InputError(f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}")
+    provides(
+        "assemble",
+        "space",
+        V,
+        ("dofmap", "ufl_element", "component"),
+        "give a DOLFINx function space, or None",
+    )
+    if not compat.is_on(V, mesh):
+        raise InputError("assemble: space is on another mesh; give a space on this one")
+    for k in (1, 2):
+        known = compat.vector_space(mesh, k)
+        if (
+            V.ufl_element() == known.ufl_element()
+            and _block_of(known, V) is not None
+            and not len(V.component())
+        ):
+            return V, k
+    raise InputError(
+        f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 "
+        f"with {mesh.geometry.dim} components, not a part of another space"
+    )
+
+
+def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
+    """Return what conditions hold of a displacement's space.
+
+    InputError, on all ranks, for one of another space, one that holds nothing, and values that are
+    not finite. Collective.
+    """
+    comm, d, found = MpiComm(mesh.comm), mesh.geometry.dim, []
+    for k, bc in enumerate(bcs):
+        name, block = f"bcs[{k}]", _block_of(V, bc.function_space)
+        if block is None:
+            raise InputError(
+                f"assemble: {name} is on another space than the displacement's; {REMEDY}"
+            )
+        dofs, values = compat.bc_values(bc, d * len(block))
+        known = block[dofs // d] >= 0
+        where = block[dofs[known] // d], dofs[known] % d
+        mask, given = np.zeros(
+            (2, V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts, d)
+        )
+        mask[where], given[where] = 1.0, values[known]
+        defect = (
+            ""
+            if np.all(np.isfinite(values))
+            else f"assemble: {name} has NaN or infinite values; correct them"
+        )
+        refuse([defect], comm)
+        if not largest(comm, len(dofs)):
+            raise InputError(
+                f"assemble: {name} prescribes no unknown on any rank; check how its dofs were "
+                "located"
+            )
+        found.append(GivenValues(name, mask > 0.0, given, bool(largest(comm, max_abs(values)))))
+    return tuple(found)
+
+
+def refuse_contradictions(space: Any) -> None:
+    """Raise InputError, on all ranks, where conditions contradict. Collective.
+
+    A dirichletbc and a ``Prescribed`` then hold the same components of nodes, or one those of the
+    other and more, at different values, as every function of time may become. Conditions that only
+    meet do not contradict.
+    """
+    given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
+    held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
+    for values, support in zip(held, space.supports, strict=False):
+        values[support.places] = support.at(space.points, 0.0, 0)[0]
+    for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
+        moves = space.prescribed[i].moves and callable(space.prescribed[i].displacement)
+        apart = np.abs(held[i] - held[j])
+        both, *each = space.comm.sum(
+            np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])])
+        )
+        if both and both in each and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
+            raise InputError(
+                f"assemble: {space.prescribed[j].name} and what is prescribed on "
+                f"'{space.prescribed[i].name}' differ at an unknown of both: leave one of them out"
+            )
+
+
+def _block_of(V: Any, S: Any) -> Indices | None:
+    """Return the block of V that each block of a space is, -1 without cells. Collective.
+
+    The space is S = V or V.sub(i). It is None, on all ranks, where S is of another kind. Spaces
+    made twice may be numbered differently.
+    """
+    d, theirs, mine, rows = (
+        V.mesh.geometry.dim,
+        S.dofmap.index_map,
+        compat.cell_blocks(V),
+        compat.blocks_of_cells(S),
+    )
+    fits = (
+        S.dofmap.index_map_bs == d
+        and S.dofmap.bs == (1 if len(S.component()) else d)
+        and rows.shape == mine.shape
+    )
+    block = np.full(theirs.size_local + theirs.num_ghosts, -1, dtype=np.int64)
+    if fits:
+        block[rows] = mine
+        fits = (
+            np.array_equal(block[rows], mine)
+            and V.dofmap.index_map.size_global == theirs.size_global
+        )
+    return None if largest(MpiComm(V.mesh.comm), not fits) else block

@@ -1,0 +1,155 @@
+"""Check the forms that a user gives for a body.
+
+They are functions, bilinear, of this mesh; matrices are finite, masses positive.
+"""
+
+from collections.abc import Callable
+from inspect import signature
+from typing import Any
+
+import numpy as np
+import ufl
+from petsc4py import PETSc
+from ufl.algorithms import compute_form_data
+from ufl.algorithms.check_arities import ArityMismatch
+
+from ...core.algebra import largest
+from ...core.checks import function, instance, on_all
+from ...core.errors import InputError
+from ...core.matrix_checks import SYMMETRIC, asymmetry, probe
+from .. import compat
+from ..matrices.petsc_algebra import PetscMatrix
+from .space import FemSpace
+
+PROBES = 4
+
+
+def refuse_complex(owner: str) -> None:
+    """Raise InputError where PETSc computes with complex numbers.
+
+    Inequalities have no meaning there.
+    """
+    if np.issubdtype(PETSc.ScalarType, np.complexfloating):
+        raise InputError(
+            f"{owner}: this PETSc computes with complex numbers, of which none is less than "
+            "another; use DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)"
+        )
+
+
+def takes(name: str, call: Any, *arguments: str) -> None:
+    """Raise InputError unless this is a function of so many arguments."""
+    remedy = f"give a function of {' and '.join(arguments)}"
+    function("Forms", name, call, remedy)
+    try:
+        signature(call).bind(*arguments)
+    except TypeError as error:
+        raise InputError(
+            f"Forms: {name} cannot be called with ({', '.join(arguments)}), {error}; {remedy}"
+        ) from None
+    except ValueError:  # of a function in C: it tells when it is called
+        return
+
+
+def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
+    """Return call(*arguments), a form linear in all of them on the mesh of the space. Collective.
+
+    Raises:
+        InputError: on all ranks otherwise; it begins with ``said``.
+    """
+    form = on_all(space.comm, said, lambda: call(*arguments))
+    instance(
+        said,
+        "what it returns",
+        form,
+        ufl.Form,
+        "return an integral, such as ufl.inner(…, …) * ufl.dx",
+    )
+    if set(on_all(space.comm, said, form.arguments)) != set(arguments):
+        raise InputError(
+            f"{said} is not a form in the given trial and test functions; return one that is not "
+            "zero and is linear in each of them"
+        )
+    on_all(space.comm, said, lambda: refuse_not_linear(said, form))
+    own = space.mesh.ufl_domain().ufl_id()
+    functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
+    if any(one.ufl_id() != own for one in form.ufl_domains()) or any(
+        V.mesh is not space.mesh for V in functions
+    ):
+        raise InputError(
+            f"{said} is of another mesh; give measures and Functions of the mesh of the body"
+        )
+    if any(one.integral_type() == "interior_facet" for one in form.integrals()):
+        maps = space.V.dofmap.index_map, space.mesh.topology.index_map(space.mesh.topology.dim)
+        nodes, cells = space.comm.sum(np.array([one.num_ghosts for one in maps]))
+        if nodes and not cells:  # no rank knows both cells of a facet between ranks
+            raise InputError(
+                f"{said} integrates over interior facets (dS), which on several ranks needs a mesh "
+                "with ghost_mode=shared_facet"
+            )
+    return form
+
+
+def refuse_not_linear(said: str, form: Any) -> None:
+    """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
+    try:
+        compute_form_data(form)
+    except (ArityMismatch, TypeError, ValueError):
+        # the first is no Exception; others where UFL words it and fails
+        raise InputError(
+            f"{said} is not linear in u or in v; return a sum of products of one and the other"
+        ) from None
+
+
+def matrix_of(name: str, space: FemSpace, compiled: Callable[[], Any]) -> Any:
+    """Return the assembled matrix of a form, finite. Collective."""
+    matrix = compat.assemble_matrix(on_all(space.comm, f"Forms: {name}", compiled))
+    if not np.isfinite(matrix.norm(PETSc.NormType.FROBENIUS)):
+        raise InputError(
+            f"Forms: {name} has NaN or infinite entries; check its Functions and Constants"
+        )
+    return matrix
+
+
+def is_symmetric(matrix: Any, space: FemSpace) -> bool:
+    """Return whether a full matrix is symmetric to round-off. Collective."""
+    return asymmetry(PetscMatrix(matrix), space.comm, _numbers(space)) <= SYMMETRIC
+
+
+def refuse_masses(matrix: Any, space: FemSpace) -> None:
+    """Raise InputError unless a full mass matrix is symmetric and positive.
+
+    Its diagonal and some products tell.
+    """
+    M = PetscMatrix(matrix)
+    if not is_symmetric(matrix, space):
+        raise InputError(
+            "Forms: mass is not symmetric; give a form in which u and v may be exchanged"
+        )
+    least = -largest(space.comm, -np.min(M.diagonal(), initial=np.inf))
+    motions = [*space.translations, *(probe(_numbers(space), j) for j in range(PROBES))]
+    energies = [space.comm.sum(np.array([w @ (M @ w)]))[0] for w in motions]
+    if not (least > 0.0 and min(energies) > 0.0):
+        raise InputError(
+            "Forms: mass is not positive: some motion would have a kinetic energy of zero or less; "
+            "give a density above zero everywhere"
+        )
+
+
+def _numbers(space: FemSpace) -> Any:
+    """Numbers of all owned components, prescribed ones too."""
+    return (space.nodes[:, None] * space.dimension + np.arange(space.dimension)).ravel()
+
+
+def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
+    """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3).
+
+    Collective.
+    """
+    d, u = space.dimension, compat.function(space.V)
+    stress = on_all(space.comm, "Forms: stress", lambda: call(u))
+    shape = getattr(stress, "ufl_shape", None)
+    if shape != (d, d) and not (d == 2 and shape == (3, 3)):
+        more = " or, with sigma_zz, (3, 3)" if d == 2 else ""
+        raise InputError(
+            f"Forms: stress has shape {shape}; return a tensor of shape {(d, d)}{more}"
+        )

@@ -1,0 +1,118 @@
+"""Give tetrahedra of second order unknowns of a hierarchy.
+
+Contact and mass may then live at their vertices.
+
+    u_m = e_m + (v_a + v_b) / 2   at the mid-point m of every edge a-b
+
+v are displacements of vertices, e what edges bend beside them: a field is that of first order plus
+one bubble an edge. Rigid translations have e = 0, so that row sums of a mass matrix in these
+unknowns are those of first order, positive, where nodal ones of vertices are negative (tetrahedra)
+or zero (triangles). Rotations have e = 0 too where edges are straight. The nodal unknowns are u = H
+û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H.
+"""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Mask, Matrix
+from .. import compat
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
+from ..mesh.numbering import supports
+
+TETRAHEDRON = 10  # nodes of one of degree 2
+
+
+def needs_hierarchy(V: Any) -> bool:
+    """Say whether vertices have no weight of their own in a pressure on the sides of cells.
+
+    This is so for P2 tetrahedra.
+    """
+    return V.mesh.topology.dim == 3 and len(supports(V)) == TETRAHEDRON
+
+
+class Hierarchy:
+    """Hold the edges of a space of P2 fields and the change of its unknowns.
+
+    Collective, as all it does.
+
+    Attributes:
+        vertices: the P1 space, and the owned blocks of ``V`` that its own are.
+        H, back: H and H⁻¹ = 2 - H.
+    """
+
+    def __init__(self, space: Any) -> None:
+        V, self._space = space.V, space
+        blocks, around = compat.cell_blocks(V), supports(V)
+        places = [place for place, one in enumerate(around) if len(one) == 2]
+        self._mids, found = np.unique(blocks[:, places], return_index=True)
+        cell, place = np.divmod(found, len(places))
+        self._ends = blocks[cell[:, None], np.array([around[p] for p in places])[place]]
+        first = compat.vector_space(V.mesh)
+        rows = np.empty(int(compat.cell_blocks(first).max(initial=-1)) + 1, dtype=np.int64)
+        rows[compat.cell_blocks(first)] = blocks[:, : len(compat.sub_entities(V.mesh, 0))]
+        self.vertices = first, rows[: first.dofmap.index_map.size_local]
+        self.H, self.back = self._shares(0.5), self._shares(-0.5)
+
+    def with_ghosts(self, values: Any) -> Array:
+        """Return owned nodal values (k, c), c <= d, followed by those of the ghosts."""
+        found = compat.function(self._space.V)
+        rows = found.x.array.reshape(-1, self._space.dimension)[:, : values.shape[1]]
+        rows[: len(values)] = values
+        found.x.scatter_forward()
+        return rows.copy()
+
+    def bent(self, nodal: Array) -> Array:
+        """Return owned nodal displacements (k, d) with e in the place of those of mid-points."""
+        every = self.with_ghosts(nodal)
+        every[self._mids] -= every[self._ends].mean(axis=1)
+        return every[: len(nodal)]
+
+    def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
+        """Return owned nodal values (k, c)at mid-points too.
+
+        They are given with a ``mean`` of the ends of edges at mid-points that are known.
+        """
+        every, found = (
+            self.with_ghosts(nodal),
+            self.with_ghosts(known[:, None])[self._mids, 0] > 0.0,
+        )
+        every[self._mids[found]] = mean(every[self._ends[found]], axis=1)
+        return every[: len(nodal)]
+
+    def around(self, turn: Matrix | None, dual: Matrix | None) -> tuple[Matrix, Matrix]:
+        """Return (T, T⁻ᵀ) of u = T û.
+
+        The nodal unknowns of û are turned by ``turn`` and forces by ``dual``.
+        """
+        return _product(self.H, turn), _product(
+            PetscMatrix(self.back.mat.transpose(PETSc.Mat())), dual
+        )
+
+    def _shares(self, share: float) -> PetscMatrix:
+        """Return the identity and, in rows of mid-points, so much at the ends of their edges."""
+        space, algebra = self._space, PetscAlgebra(self._space.comm.mpi)
+        n, d, owned = len(space.ids), space.dimension, self._mids < len(space.nodes)
+        own = space.free_index.reshape(-1, d)[self._mids[owned]]
+        ends = self.with_ghosts(space.numbers).astype(np.int64)[self._ends[owned]]
+        columns = np.concatenate(
+            [np.where(own >= 0, own + algebra.first(n), -1)[:, None], ends], axis=1
+        )
+        values = np.broadcast_to(np.array([1.0, share, share])[:, None], columns.shape)
+        free = own >= 0
+        row = np.broadcast_to((np.cumsum(free).reshape(free.shape) - 1)[:, None], columns.shape)
+        used = (columns >= 0) & free[:, None]
+        entries = sp.csr_matrix(
+            (values[used], (row[used], columns[used])), shape=(free.sum(), space.unknowns)
+        )
+        return as_petsc(algebra.replaced_rows(n, own[free], entries))
+
+
+def _product(A: PetscMatrix, B: Matrix | None) -> Matrix:
+    """Return A B, or A; a copy.
+
+    What PETSc makes holds both for as long as it lives.
+    """
+    return A if B is None else PetscMatrix(A.mat.matMult(as_petsc(B).mat).duplicate(copy=True))

@@ -1,0 +1,314 @@
+"""Describe what acts on a body.
+
+It is prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
+
+Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values
+(k, d). They are interpolated at the nodes and then integrated exactly, so a load costs one sparse
+product a step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
+
+from ...core.algebra import Array, Comm, Indices
+from ...core.checks import ended, function, number, optional, refuse, shown
+from ...core.quantities import Unit
+from .. import compat
+from ..mesh.group_checks import components_given, components_of, facets_of, field_given
+from ..mesh.tagged_mesh import Facets
+
+Field = Callable[[Array, float], Array]
+Value = tuple[float, ...] | Field
+
+
+def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
+    """Evaluate the value at this rank's points, (k, d).
+
+    InputError on all ranks for NaN, other shapes. Collective.
+    """
+    result, defect = evaluate_here(name, value, points, t)
+    refuse([defect], comm)
+    return result
+
+
+def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
+    """Return (values at the points, what is wrong with them or an empty text).
+
+    The values are zeros where something is wrong.
+    """
+    if len(points) == 0:
+        return np.zeros_like(points), ""  # users' functions need not cope with no points
+    try:
+        result = (
+            np.asarray(value(points, t))
+            if callable(value)
+            else np.tile(np.asarray(value), (len(points), 1))
+        )
+    except Exception as error:
+        # of a user's function, at the points of one rank: the others must not wait for it
+        return np.zeros_like(points), ended(f"{name} at t = {t:g} s", error)
+    if result.dtype.kind not in "iuf":
+        defect = f"{name} returned {shown(result)}: return real numbers"
+    elif result.shape != points.shape:
+        shape = f"shape {result.shape} for {len(points)} points"
+        defect = f"{name} returned {shape}: return {points.shape[1]} components per point"
+    elif not np.all(np.isfinite(result)):
+        defect = (
+            f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data"
+        )
+    else:
+        return result.astype(float, copy=False), ""
+    return np.zeros_like(points), defect
+
+
+def _zero(points: Array, t: float) -> Array:
+    return np.zeros_like(points)
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Prescribe u_i = U_i(x, t) on facets, with the velocity and acceleration of the same motion.
+
+    ``components``: which displacement components are prescribed (all when None); the others stay
+    free (rollers). The mass and damping of the boundary nodes enter the equations, so all three
+    time functions are needed; left out they are zero (a clamped part, or a displacement constant in
+    time).
+    """
+
+    facets: Facets
+    displacement: Annotated[Value, Unit("m")] = _zero
+    velocity: Annotated[Value, Unit("m/s")] = _zero
+    acceleration: Annotated[Value, Unit("m/s²")] = _zero
+    components: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        facets_of("Prescribed", "facets", self.facets)
+        for name in ("displacement", "velocity", "acceleration"):
+            field_given("Prescribed", name, getattr(self, name))
+        components_given("Prescribed", self.components)
+
+    @property
+    def name(self) -> str:
+        """Return the name of the facets."""
+        return self.facets.name
+
+    @property
+    def motions(self) -> tuple[Value, Value, Value]:
+        """Return the motion and its rates (U, U', U'')."""
+        return self.displacement, self.velocity, self.acceleration
+
+    @property
+    def moves(self) -> bool:
+        """Return whether it moves: False for a clamped part."""
+        return any(value is not _zero for value in self.motions)
+
+    def support(self, blocks: Indices, dimension: int) -> "Support":
+        """Return what is held of a displacement space.
+
+        Args:
+            blocks: (k,) owned blocks of unknowns on the facets.
+            dimension: d, components of a block.
+
+        Raises:
+            InputError: a component that does not exist.
+        """
+        held = components_of("prescribed", self.components, dimension)
+        return Support(self, (blocks[:, None], held), self.moves)
+
+    def at(
+        self, points: Array, places: tuple[Any, Any], t: float, derivative: int
+    ) -> tuple[Any, str]:
+        """Return values of the motion or a rate at the places, and what is wrong with them.
+
+        Args:
+            points: (owned nodes, d) coordinates [m].
+            places: owned blocks (k, 1) and components that are held.
+            t: time [s].
+            derivative: 0 for U, 1 for U', 2 for U''.
+
+        Returns:
+            values (k, components), and a sentence, empty where nothing is wrong.
+        """
+        name = f"prescribed motion on '{self.facets.name}'"
+        motion, defect = evaluate_here(name, self.motions[derivative], points[places[0][:, 0]], t)
+        return motion[:, places[1]], defect
+
+    def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, Any]]:
+        """Return which of the facets are held, in which components."""
+        held = components_of("prescribed", self.components, space.dimension)
+        return [(np.intersect1d(facets, self.facets.indices), held)]
+
+    @property
+    def companions(self) -> tuple[Any, ...]:
+        """Return the motions that are marched beside the run.
+
+        They are objects whose methods are given, as ``BaseMotion``.
+        """
+        owners = {
+            id(owner): owner
+            for owner in (getattr(value, "__self__", None) for value in self.motions)
+        }
+        return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
+
+    def same_motion(self, other: "Prescribed") -> bool:
+        """Return whether both say the same of the components that both prescribe."""
+        mine, theirs = self.components, other.components
+        apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
+        return apart or all(
+            _same(one, two) for one, two in zip(self.motions, other.motions, strict=True)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """Hold a condition on displacements, and which components of nodes it holds on this rank.
+
+    Attributes:
+        condition: a ``Prescribed``, or ``GivenValues`` of a dirichletbc.
+        places: (owned blocks, components), indices of an array of nodal values.
+        moves: whether it moves what it holds.
+    """
+
+    condition: Any
+    places: tuple[Any, Any]
+    moves: bool
+
+    def at(self, points: Array, t: float, derivative: int) -> tuple[Any, str]:
+        """Return values of the motion or a rate at the places, and what is wrong with them.
+
+        Args:
+            points: (owned nodes, d) coordinates [m].
+            t: time [s].
+            derivative: 0 for U, 1 for U', 2 for U''.
+
+        Returns:
+            values at the places, and a sentence, empty where nothing is wrong.
+        """
+        return self.condition.at(points, self.places, t, derivative)
+
+
+def _same(one: Value, other: Value) -> bool:
+    """Whether two values are one, or equal constants; a function that is not given is zero."""
+    if callable(one) or callable(other):
+        return bool(one == other) or (_at_rest(one) and _at_rest(other))
+    return np.array_equal(one, other)
+
+
+def _at_rest(value: Value) -> bool:
+    return value is _zero or (not callable(value) and not np.any(value))
+
+
+class ActingLoad:
+    """Say where and how a load acts in forms; by default in the whole body, and all of it."""
+
+    value: Value
+    history: Callable[[float], float] | None
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__
+        field_given(owner, "value", self.value)
+        optional(
+            function, owner, "history", self.history, "give a function of the time [s], or None"
+        )
+
+    @property
+    def is_constant(self) -> bool:
+        """Return whether one assembly serves all times."""
+        return self.history is not None or not callable(self.value)
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of integration over the part on which the load acts."""
+        return ufl.dx
+
+    def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the part that acts of a load with the values ``g``."""
+        return g
+
+
+@dataclass(frozen=True)
+class Traction(ActingLoad):
+    """Apply the traction S_i = F_i(x, t) [Pa] on facets.
+
+    ``history`` is a factor f(t) of a value constant in time.
+
+    With a history, or with a tuple, the load is assembled once; a callable without history is
+    evaluated every step.
+    """
+
+    facets: Facets
+    value: Annotated[Value, Unit("Pa")]
+    history: Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        facets_of(type(self).__name__, "facets", self.facets)
+        super().__post_init__()
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of the facets."""
+        return compat.measure(mesh, mesh.topology.dim - 1, self.facets.indices)
+
+
+@dataclass(frozen=True)
+class TangentialTraction(Traction):
+    """Apply the tangential traction S_T = C_T(x, t) on the contact boundary.
+
+    It is ``value`` less its normal part.
+    """
+
+    def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the traction less its normal part."""
+        n = ufl.FacetNormal(mesh)
+        return g - ufl.dot(g, n) * n
+
+
+@dataclass(frozen=True)
+class Pressure(Traction):
+    """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets.
+
+    Such are water, uplift in a joint.
+
+    ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all
+    nodes of the body; it is kept as the first component of a vector field. p is interpolated at
+    nodes: resultants of one that is linear between them are exact, so let a node lie at the water
+    level. ``history``: as of ``Traction``.
+    """
+
+    value: Annotated[float | Callable[[Array, float], Array], Unit("Pa")]  # type: ignore[assignment]  # what is given
+
+    def __post_init__(self) -> None:
+        given: Any = self.value
+        if callable(given):
+            function("Pressure", "value", given, "give a number or a function of points and time")
+
+            def field(points: Array, t: float) -> Array:
+                return np.multiply.outer(
+                    np.broadcast_to(given(points, t), len(points)), np.eye(points.shape[1])[0]
+                )
+
+            object.__setattr__(self, "value", field)
+        else:
+            axes = facets_of("Pressure", "facets", self.facets).mesh.geometry.dim
+            object.__setattr__(
+                self, "value", (number("Pressure", "value", given, unit="Pa"), *[0.0] * (axes - 1))
+            )
+        super().__post_init__()
+
+    def acting(self, g: Any, mesh: Mesh) -> Any:
+        """Return the traction -p n."""
+        return -g[0] * ufl.FacetNormal(mesh)
+
+
+@dataclass(frozen=True)
+class BodyForce(ActingLoad):
+    """Apply a volume force f_i(x, t) [N/m³].
+
+    The weight of a material is BodyForce((0, -rho * 9.80665)).
+    """
+
+    value: Annotated[Value, Unit("N/m³")]
+    history: Callable[[float], float] | None = None

@@ -1,0 +1,168 @@
+"""Take the variational forms of a body from the user, in the place of a material's."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import ufl
+
+from ...core.errors import InputError
+from ...laws.materials import Damping, PlaneStrain, Rayleigh, Section
+from .. import compat
+from .form_checks import form_of, is_symmetric, matrix_of, refuse_masses, refuse_stress, takes
+from .forms import ElasticForms, Material
+from .space import FemSpace
+
+Bilinear = Callable[[Any, Any], Any]
+ROLES = {"K": "stiffness", "C": "damping", "M": "mass"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forms:
+    """State a body by weak forms.
+
+    They are functions (u, v) -> UFL form, u the trial and v the test function.
+
+        M_ij = mass(phi_j, phi_i),   K_ij = stiffness(phi_j, phi_i),   C_ij = damping(phi_j, phi_i)
+
+    With E, a stiffness, a prestress, … in Functions, Constants and expressions of the user's own.
+    The forms are integrated as they are, ``ufl.dx`` and other measures included: where a section
+    has a thickness other than 1 m it belongs into them, for contact weights, loads and dashpots are
+    multiplied by that of the section. What they hold must keep its values while the system is used:
+    reactions and section forces integrate them again.
+
+    Args:
+        stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for Volume()
+            and Lemke().
+        mass: the form of M [kg], symmetric and positive; None: the density of ``assemble(…,
+            material)``.
+        damping: the form of C [N s/m]; None: that of ``assemble(…, damping=)``, Rayleigh on these M
+            and K, or KelvinVoigt; both add up.
+        stress: u -> stress tensor [Pa], (d, d), or in the plane (3, 3) with sigma_zz; von Mises
+            stresses and stresses as Functions need it.
+
+    Raises:
+        InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms that
+            are not bilinear in u and v or on another mesh, masses that are not positive, and
+            entries that are not finite.
+    """
+
+    stiffness: Bilinear
+    mass: Bilinear | None = None
+    damping: Bilinear | None = None
+    stress: Callable[[Any], Any] | None = None
+
+    def __post_init__(self) -> None:
+        takes("stiffness", self.stiffness, "u", "v")
+        for name, arguments in (("mass", "uv"), ("damping", "uv"), ("stress", "u")):
+            if getattr(self, name) is not None:
+                takes(name, getattr(self, name), *arguments)
+
+
+class OwnForms(ElasticForms):
+    """Hold the user's forms of one body.
+
+    ``fields`` are those of the material beside them, empty where there is none.
+
+    Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective.
+    """
+
+    def __init__(
+        self,
+        space: FemSpace,
+        given: Forms,
+        materials: list[tuple[Any, Material]],
+        section: Section,
+        damping: Damping,
+    ) -> None:
+        super().__init__(space, materials, section, damping)
+        if given.mass is None and not materials:
+            raise InputError(
+                "assemble: forms=… have no mass; give Forms(…, mass=), or a material for its "
+                "density"
+            )
+        self._given, self.tells_stress = given, given.stress is not None
+        self.own_damping = given.damping is not None
+        self.densities = given.mass is None and given.damping is None
+        rayleigh = damping if isinstance(damping, Rayleigh) else Rayleigh(0.0, 0.0)
+        shares = {"M": rayleigh.alpha, "K": rayleigh.beta}
+        self.damped = given.damping is not None or any(shares.values()) or self.viscous is not None
+        if given.stress is not None:
+            refuse_stress(given.stress, space)
+        self._forms = {
+            name: self._own(name) or super(OwnForms, self).bilinear(name) for name in "KM"
+        }
+        dampers = [
+            compat.constant(space.mesh, share) * self._forms[name]
+            for name, share in shares.items()
+            if share
+        ]
+        dampers += [self._viscous_form()] if self.viscous else []
+        dampers += [] if given.damping is None else [self._own("C")]
+        if dampers:
+            self._forms["C"] = sum(dampers[1:], dampers[0])
+        self._full = {
+            name: matrix_of(ROLES[name], space, partial(space.compiled, form))
+            for name, form in self._forms.items()
+        }
+        refuse_masses(self._full["M"], space)
+        self.symmetric = all(is_symmetric(one, space) for one in self._full.values())
+        self.notes = self._notes(bool(materials))
+
+    def _own(self, name: str) -> Any:
+        """Return the form that was given for a matrix, or None."""
+        call = getattr(self._given, ROLES[name])
+        return (
+            None
+            if call is None
+            else form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
+        )
+
+    def _notes(self, material: bool) -> tuple[str, ...]:
+        mass = "the density of the material" if self._given.mass is None else "a form"
+        stress, waves = (
+            "a" if self.tells_stress else "no",
+            "the material beside them" if material else "no material",
+        )
+        notes = [
+            f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave "
+            f"speeds at boundaries by {waves}"
+        ]
+        if not self.symmetric:
+            notes.append(
+                "its matrices are not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu "
+                "is no energy"
+            )
+        if (
+            self.tells_stress
+            and isinstance(self.section, PlaneStrain)
+            and self._stress(self.u).ufl_shape == (2, 2)
+        ):
+            notes.append("von Mises stresses take sigma_zz as zero: give a stress of shape (3, 3)")
+        return tuple(notes)
+
+    def stresses(self, u: Any) -> tuple[Any, Any]:
+        """Return the stress and sigma_zz(u) times the thickness."""
+        sigma, d, h = self._stress(u), self.space.dimension, self.section.thickness
+        across = h * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
+        return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
+
+    def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
+        """Raise InputError: the forms do not tell the C of a material."""
+        raise InputError(
+            "InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0"
+        )
+
+    def _stress(self, u: Any) -> Any:
+        if self._given.stress is None:
+            raise InputError("forms=… of the system have no stress: give fem.Forms(…, stress=)")
+        return self._given.stress(u)
+
+    def bilinear(self, name: str) -> Any:
+        """Return the form of M, K or C."""
+        return self._forms[name]
+
+    def matrix(self, name: str) -> Any:
+        """Hand out a matrix that was assembled and checked, once."""
+        return self._full.pop(name)

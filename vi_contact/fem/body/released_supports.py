@@ -1,0 +1,217 @@
+"""Go from a static stage to one on other supports.
+
+Reactions of removed ones become forces, added ones hold the body.
+
+Dashpots hold no static load. A gravity stage therefore stands on rollers or clamps; where the
+dynamic stage has dashpots or free sides instead, what these supports carried goes on as the
+constant load
+
+    F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t     (zero where nothing was held)
+
+so that u_0, its stresses and its contact are an equilibrium of the new problem too. A support that
+is added holds the body where the stage before has left it: its own displacement counts from there.
+Staging as in PLAXIS, LS-DYNA (INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC).
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...core.algebra import Array, Mask, from_each, largest, max_abs
+from ...core.checks import several
+from ...core.errors import InputError
+from ...core.problem import ContactProblem
+from ...core.state_checks import check_problem_given, check_sizes
+from ...core.step import State
+from .. import compat
+from .space import FemSpace
+
+log = logging.getLogger(__name__)
+BALANCED = 1e-6  # of the largest nodal force: what may be missing where nothing was released
+
+
+def release(
+    static: ContactProblem,
+    state: State,
+    problem: ContactProblem,
+    *,
+    earlier: Sequence[ContactProblem] = (),
+) -> tuple[ContactProblem, State]:
+    """Return (problem with the reactions of removed supports as forces, its first state).
+
+    The state is at rest, after a static stage.
+
+    ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same
+    materials, loads and contact points, and a motion that starts from rest. t = 0. ``earlier``:
+    problems of the stages before ``static``, whose supports may be released already. The space of
+    ``problem`` notes where added supports hold it. InputError for another mesh or other contact
+    points, or when forces are missing where nothing was released.
+    """
+    stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
+    for one in (static, problem, *stages):
+        check_problem_given("release", one)
+    check_sizes("release", static, state)
+    before, after = _spaces(static, problem)
+    nodal = before.expand(static.cartesian(state.u), state.t)
+    added, u0 = _stand(before, after, nodal), after.restrict(nodal)
+    still = np.zeros_like(u0)
+    _, first = started(problem, u0, still, state)
+    _refuse_moved(static, state, nodal, problem, first)
+    spaces = [_spaces(one, problem)[0] for one in (static, *earlier)]
+    held = [one.held | np.isin(one.nodes, one.tied_nodes)[:, None] for one in spaces]
+    was_held = np.any([*held, _beside(after, added)], axis=0).ravel()[after.free]
+    return started(problem, u0, still, state, _missing(problem, u0, first, was_held))
+
+
+def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
+    before, after = static.system.space, problem.system.space
+    if (
+        not isinstance(before, FemSpace)
+        or not isinstance(after, FemSpace)
+        or before.mesh is not after.mesh
+    ):
+        raise InputError("release: give two problems of fem.assemble on one mesh")
+    if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
+        raise InputError(
+            "the static stage and the problem have different contact points, perhaps because "
+            "clamped nodes are left out: name the same points for both (points=)"
+        )
+    return before, after
+
+
+def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
+    """Say whether two problems of one mesh and contact hold and tie the same. Collective.
+
+    The later one stands where the earlier one does then.
+
+    Raises:
+        InputError: other contact points.
+    """
+    one, other = _spaces(before, problem)
+    if largest(
+        one.comm,
+        not (np.array_equal(one.held, other.held) and np.array_equal(one.numbers, other.numbers)),
+    ):
+        return False
+    other.stands = one.stands
+    return True
+
+
+def started(
+    problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
+) -> tuple[ContactProblem, State]:
+    """Return the problem that begins with u0, v0 and has a constant force [N] more.
+
+    u0 and v0 are on its own unknowns. That beginning has the contact of another state.
+    """
+    surface, system, load = problem.surface, problem.system, problem.system.load
+
+    def turned(x: Array) -> Array:
+        x = surface.in_frames(x)
+        return x.copy() if surface.coupling is None else 2.0 * x - surface.coupling @ x
+
+    r_t = state.r_t if problem.frictional else None
+    first = State(0.0, 0, turned(u0), turned(v0), state.r_n, state.active, r_t=r_t)
+    load = replace(load, constant=load.constant + force)
+    return replace(problem, system=system.changed(u0=u0, v0=v0, load=load)), first
+
+
+def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
+    """Return F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t.
+
+    Raises:
+        InputError: it is not zero and nothing was held.
+    """
+    elastic = problem.system.K @ u0
+    force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
+    missing = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
+    missing = problem.surface.comm.max(missing)
+    if missing[0] > BALANCED * max(missing[1:]):
+        raise InputError(
+            f"{missing[0]:.3g} N are missing where no support was released: give both stages the "
+            "same materials, loads and friction, and a motion that starts from rest"
+        )
+    log.info(
+        "supports released: their reactions remain as nodal forces, the largest %.4g N", missing[2]
+    )
+    return force
+
+
+def removed_support(
+    before: ContactProblem, after: ContactProblem, force: Array
+) -> tuple[str, float]:
+    """Return (name, reaction [N]) of the removed support with most of a force. Collective.
+
+    It is the support that ``after`` does without and that carries most of this force; "" for none.
+    The reaction is its resultant, or its largest nodal force where this is larger.
+    """
+    (old, new), found = _spaces(before, after), [("", 0.0)]
+    nodal = np.zeros(new.held.size)
+    nodal[new.free] = force
+    size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))
+    untied = np.isin(old.nodes, np.setdiff1d(old.tied_nodes, new.tied_nodes)), slice(None)
+    for name, places in [
+        *((support.condition.name, support.places) for support in old.supports),
+        ("tied", untied),
+    ]:
+        own = np.zeros_like(old.points)
+        own[places] = np.where(new.held, 0.0, nodal.reshape(own.shape))[places]
+        peak = largest(new.comm, max_abs(own.ravel()))
+        resultant = float(np.linalg.norm(new.comm.sum(own.sum(axis=0))))
+        found += [(name, max(resultant, peak))] if peak > BALANCED * size else []
+    return max(found, key=lambda one: one[1])
+
+
+def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
+    """Let what ``after`` holds in addition stay where the body is.
+
+    Returned is the (k, d) mask of what stays off its own place.
+    """
+    stays = np.where(after.held & ~before.held, nodal, 0.0)
+    if before.stands is not None:
+        stays = np.where(after.held & before.held, before.stands, stays)
+    after.stands = stays if largest(after.comm, max_abs(stays.ravel())) > 0.0 else None
+    return stays != 0.0
+
+
+def _beside(space: FemSpace, chosen: Mask) -> Mask:
+    """Return all components of the owned nodes that share a cell with chosen ones.
+
+    The cell is of any rank, the nodes are those of chosen components (k, d).
+    """
+    numbers = np.concatenate(from_each(space.comm, space.nodes[chosen.any(axis=1)]))
+    cells = space.node_of_block[compat.cell_blocks(space.V)]
+    near = np.concatenate(
+        from_each(space.comm, np.unique(cells[np.isin(cells, numbers).any(axis=1)]))
+    )
+    return np.isin(space.nodes, near)[:, None] & np.ones_like(space.held)
+
+
+def _refuse_moved(
+    static: ContactProblem, state: State, nodal: Array, problem: ContactProblem, begun: State
+) -> None:
+    """Raise InputError unless the new supports hold the body where it is.
+
+    They must hold it, and what its contact points face, where the static stage has left it.
+    """
+    there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
+    before = static.surface.gap(state.t) - static.surface.normal_values(state.u)
+    after = problem.surface.gap(0.0) - problem.surface.normal_values(begun.u)
+    away = max(max_abs((there - nodal).ravel()), max_abs(after - before))
+    distance, size = problem.surface.comm.max(np.array([away, max_abs(nodal.ravel())]))
+    if distance > BALANCED * size:
+        raise InputError(
+            f"a support or tie of the problem is {distance:.3g} m away from where the static stage "
+            "has left the body: hold or tie it there in both stages, or free it in both"
+        )
+
+
+def _contact_force(problem: ContactProblem, state: State) -> Array:
+    """B_nᵀ r_n + B_tᵀ r_t on the system's own unknowns."""
+    surface = problem.surface
+    force = surface.reaction_load(state.r_n, problem.system.rows, state.r_t)
+    if surface.coupling is not None:  # the load of relative unknowns is Rᵀ f, and R⁻¹ = 2 - R
+        force = 2.0 * force - surface.coupling.transpose_apply(force)
+    return surface.along_axes(force)

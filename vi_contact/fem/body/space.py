@@ -1,0 +1,357 @@
+"""Say what the unknowns of a finite element system mean.
+
+This is nodes, bodies, free and prescribed parts, points, output.
+"""
+
+import logging
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, Indices, Mask, from_each, total
+from ...core.checks import instance, refuse
+from ...core.errors import InputError
+from ...core.system import SemiDiscreteSystem
+from .. import compat
+from ..matrices.petsc_algebra import PetscAlgebra
+from ..mesh.communicators import MpiComm, kept
+from ..mesh.group_checks import cells_of
+from ..mesh.nodal_space import NodalSpace, bounding_box
+from ..mesh.numbering import NodeTable, facet_rows, node_numbers
+from ..mesh.tagged_mesh import Cells, Facets
+from .elimination import Elimination
+from .hierarchical import Hierarchy, needs_hierarchy
+from .loads import Support
+from .ties import PLACE_TOLERANCE, UNTIED, Links, Tied, link
+
+log = logging.getLogger(__name__)
+
+
+def space_of(owner: str, system: Any) -> "FemSpace":
+    """Return the space of a system that fem.assemble made; InputError for anything else."""
+    instance(
+        owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns"
+    )
+    if not isinstance(system.space, FemSpace) or system.space.forms is None:
+        raise InputError(f"{owner} needs a system made by fem.assemble")
+    return system.space
+
+
+def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
+    """Return the numbers of the bodies that a cell group is, parts of the mesh that share no node.
+
+    Collective.
+
+    They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part
+    of a body.
+    """
+    space = space_of("bodies_of", system)
+    cells_of("bodies_of", "cells", cells, space.mesh)
+    body = space.body_of_block[compat.cell_blocks(space.V)[:, 0]]
+    inside = np.isin(np.arange(len(body)), cells.indices)
+    mine, rest = (
+        np.unique(np.concatenate(from_each(space.comm, body[part]))) for part in (inside, ~inside)
+    )
+    if np.isin(mine, rest).any():
+        raise InputError(
+            f"bodies_of: the cell group '{cells.name}' is a part of a body and shares nodes with "
+            "other cells; give a group of whole bodies"
+        )
+    return tuple(mine.tolist())
+
+
+def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
+    """Warn when M, C or K of a system is not what fem.assemble made.
+
+    It is for outputs that go by the materials given there.
+
+    Springs added to K leave the stresses of the elements as they are; another material does not.
+    """
+    found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
+    if found and system.algebra.comm.rank == 0:
+        log.warning(
+            "%s: %s of the system is not the one that fem.assemble made: this output uses the "
+            "materials, section and damping given there",
+            owner,
+            " and ".join(found),
+        )
+
+
+def translations(nodes: int, dimension: int) -> list[Array]:
+    """Return the unit translation of so many nodes in every direction, full vectors."""
+    return [np.tile(e, nodes) for e in np.eye(dimension)]
+
+
+class FemSpace(NodalSpace):
+    """Number the nodal unknowns of a displacement space.
+
+    The held and the tied components are eliminated (``body.elimination``).
+
+    Attributes:
+        V: the DOLFINx function space; dimension d.
+        supports: what holds components of nodes, and which; prescribed: their conditions.
+        moves: whether some support moves what it holds.
+        held, tied: (owned nodes, d) masks of components that are held, or follow those of another
+            node.
+        free: (owned full,) mask of the other components.
+        tied_nodes: numbers of all nodes that move together with another, on every rank.
+        tied_unknowns: mask of the free unknowns of such nodes, None without ties.
+        numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
+            -1 where held.
+        degree: 1 for P1 and Q1, 2 for P2 and Q2.
+        quadrature_degree: that of all its forms; None: as UFL estimates it.
+        nodes: numbers of the nodes of the owned blocks, those of the mesh (``mesh.numbering``: of
+            mid-points too).
+        points: their coordinates (k, d).
+        node_of_block, body_of_block: numbers and bodies of nodes, those of ghosts too.
+        ids: rank-independent numbers of the free unknowns (node * d + component).
+        unknowns: number of free unknowns on all ranks.
+        forms: the ElasticForms of the system made on it; stress output needs them.
+        stands: (k, d) where supports hold nodes that an earlier stage had moved [m], or None.
+    """
+
+    def __init__(
+        self,
+        V: Any,
+        nodes: NodeTable,
+        supports: Sequence[Support],
+        tied: Sequence[Tied] = (),
+        *,
+        degree: int = 1,
+        quadrature_degree: int | None = None,
+    ) -> None:
+        """Give numbers to the unknowns. Collective.
+
+        Args:
+            V: the DOLFINx function space of the displacement.
+            nodes: its nodes.
+            supports: what holds components of them.
+            tied: boundaries that move together.
+            degree: that of V, 1 or 2.
+            quadrature_degree: that of all forms, None for UFL's estimate.
+        """
+        self.V = V
+        self.mesh = V.mesh
+        self.degree = degree
+        self.quadrature_degree = quadrature_degree
+        self.comm: MpiComm = MpiComm(kept(self.mesh.comm))
+        self.algebra = PetscAlgebra(self.comm.mpi)
+        self.dimension: int = self.mesh.geometry.dim
+        self.node_of_block: Indices = nodes.numbers
+        self.body_of_block: Indices = nodes.bodies
+        self.nodes: Indices = nodes.numbers[: nodes.owned]
+        self.points: Array = nodes.points[: nodes.owned]
+        self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
+        self.supports = tuple(supports)
+        self.prescribed = tuple(support.condition for support in supports)
+        self.moves = any(support.moves for support in supports)
+        self.ties = tuple(tied)
+        shape = (nodes.owned, self.dimension)
+
+        # what is held and what follows is eliminated; the rest is free
+        self.held = np.zeros(shape, dtype=bool)
+        for support in supports:
+            self.held[support.places] = True
+        links = self._links() if tied else UNTIED
+        self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
+        self._leader = links.of_nodes(self.dimension) if tied else {}
+        self.tied: Mask = self._followers(links) if tied else np.zeros(shape, dtype=bool)
+        self.free: Mask = ~(self.held | self.tied).ravel()
+
+        # free components are numbered over all ranks, those that follow have the number of another
+        ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
+        self.ids: Indices = ids.ravel()[self.free]
+        self.unknowns = int(total(self.comm, self.free.sum()))
+        self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
+        first = int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
+        numbers = np.where(self.free, first + self.free_index, -1)
+        if tied:
+            numbers = self._following(links, numbers)
+        self.numbers: Indices = numbers.reshape(shape)
+        together = np.isin(self.nodes, self.tied_nodes)
+        self.tied_unknowns: Mask | None = (
+            np.repeat(together, self.dimension)[self.free] if tied else None
+        )
+        self.elimination = Elimination(
+            self.comm,
+            self.free,
+            self.held.ravel(),
+            followed=self.numbers.ravel() if tied else None,
+            unknowns=self.unknowns,
+        )
+        self.forms: Any = None
+        self.stands: Array | None = None
+
+    @property
+    def translations(self) -> list[Array]:
+        """Return the unit translation in every direction, full vectors."""
+        return translations(len(self.nodes), self.dimension)
+
+    @property
+    def bytes(self) -> int:
+        """Return the bytes of the mesh on this rank."""
+        return compat.mesh_bytes(self.mesh)
+
+    def compiled(self, form: Any) -> Any:
+        """Return a form compiled.
+
+        Its integrals have the degree of the space, if any, unless they say their own.
+        """
+        return compat.compile_form(form, self.quadrature_degree)
+
+    def facet_blocks(self, facets: Any) -> Indices:
+        """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
+        return compat.owned_facet_dofs(self.V, facets)
+
+    def corners_of_facets(self, facets: Any) -> Indices:
+        """Return the numbers (k, n) of the contact nodes on each of these facets. Collective.
+
+        The facets are local, ghosts' too; the nodes are those that may have contact conditions:
+        all, in a hierarchy the vertices.
+        """
+        if self.degree == 1:
+            return node_numbers(self.mesh)[
+                compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
+            ]
+        return self.node_of_block[facet_rows(self.V, facets)][
+            :, : None if self.hierarchy is None else self.dimension
+        ]
+
+    @cached_property
+    def hierarchy(self) -> Hierarchy | None:
+        """Return the hierarchy of P2 tetrahedra, None of other cells.
+
+        Collective when first asked.
+        """
+        return Hierarchy(self) if needs_hierarchy(self.V) else None
+
+    # Ties
+    # ----------------------------------------------------------------------------------------------
+
+    def _links(self) -> Links:
+        """Return which unknowns move as others do, on every rank. Collective."""
+        sides = [(self._everywhere(tie.first), self._everywhere(tie.second)) for tie in self.ties]
+        return link(self.ties, sides, self.dimension, PLACE_TOLERANCE * self.size)
+
+    def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
+        """Return (original numbers, points) of the nodes of facets, ascending, on every rank."""
+        blocks = self.facet_blocks(facets.indices)
+        parts = self.comm.bcast(self.comm.gather((self.nodes[blocks], self.points[blocks])))
+        numbers, points = (np.concatenate(part) for part in zip(*parts, strict=True))
+        order = np.argsort(numbers)
+        return numbers[order], points[order]
+
+    def _followers(self, links: Links) -> Mask:
+        """Return which owned components follow another node.
+
+        Raises:
+            InputError: some of those that move as one are held.
+        """
+        followers = self._of_unknowns(links.followers, self.held) > 0.0
+        leaders = self._of_unknowns(links.leaders, self.held) > 0.0
+        for number in links.followers[followers != leaders]:
+            raise InputError(
+                f"component {number % self.dimension} of a tied node is prescribed on one side "
+                "only: prescribe both sides alike, or tie the other components (components=)"
+            )
+        ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
+        return np.isin(ids, links.followers[~followers])
+
+    def _following(self, links: Links, numbers: Indices) -> Indices:
+        """Return the unknown of every owned component, where those that follow have one too.
+
+        Args:
+            links: what follows what.
+            numbers: (full,) the unknown of every owned component, -1 where it is not free; it is
+                overwritten.
+        """
+        d = self.dimension
+        leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
+        blocks = self.blocks_of(links.followers // d)
+        owned = blocks >= 0
+        row = (d * blocks + links.followers % d)[owned]
+        leader = leaders[owned]
+        follows = self.tied.ravel()[row]
+        numbers[row[follows]] = leader[follows]
+        return numbers
+
+    def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
+        """Return owned nodal values (k, d) of unknowns, on every rank.
+
+        An unknown is node number * d + component.
+        """
+        rows = self.at_nodes(numbers // self.dimension, values.astype(float))
+        return rows[np.arange(len(numbers)), numbers % self.dimension]
+
+    def leaders(self, nodes: Indices) -> Indices:
+        """Return these node numbers, of nodes that follow another that of the other.
+
+        It is -1 for those tied in part.
+        """
+        if not self._leader:
+            return nodes
+        return np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
+
+    # Free unknowns
+    # ----------------------------------------------------------------------------------------------
+
+    @property
+    def coordinates(self) -> Array:
+        """Return the positions (rows, d) of the nodes of the free unknowns [m]."""
+        return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
+
+    @property
+    def body_of_node(self) -> Indices:
+        """Return the body of every owned node.
+
+        Bodies are parts of the mesh that share no node, in the order of node numbers.
+        """
+        return self.body_of_block[: len(self.nodes)]
+
+    @property
+    def bodies(self) -> Indices:
+        """Return the body of every free unknown."""
+        return np.asarray(np.repeat(self.body_of_node, self.dimension)[self.free])
+
+    # Vectors
+    # ----------------------------------------------------------------------------------------------
+
+    def prescribed_values(self, t: float, derivative: int = 0) -> Array:
+        """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
+
+        Where conditions meet, the later one counts; what they say is added to where an earlier
+        stage left the nodes.
+        """
+        values = np.zeros((len(self.nodes), self.dimension))
+        defects = []
+        for support in self.supports:
+            values[support.places] = 0.0
+            if support.moves:
+                values[support.places], defect = support.at(self.points, t, derivative)
+                defects.append(defect)
+        if defects:
+            refuse(defects, self.comm)
+        return (values if derivative or self.stands is None else values + self.stands).ravel()
+
+    def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
+        """Expand a free vector -> nodal values (owned nodes, d), prescribed components included."""
+        full = self.elimination.expand(u, self.prescribed_values(t, derivative))
+        return full.reshape(-1, self.dimension)
+
+    def pull(self, force: Array) -> Array:
+        """Pull back by Pᵀ: forces on all owned components -> on the free ones."""
+        return self.elimination.pull(force)
+
+    def reduced(self, full: Any) -> Any:
+        """Return PᵀAP of the free components of a PETSc matrix of all. Collective."""
+        return self.elimination.reduce(full)
+
+    def held_columns(self, full: Any) -> Any:
+        """Return the columns of prescribed components of a PETSc matrix of all. Collective."""
+        return self.elimination.held_columns(full)
+
+    def restrict(self, full: Array) -> Array:
+        """Restrict nodal values (owned nodes, d) to the free vector."""
+        return self.elimination.restrict(full)

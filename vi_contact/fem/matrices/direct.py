@@ -1,0 +1,125 @@
+"""Choose a direct factorisation among those that this PETSc was built with, and say why one failed.
+
+PETSc's own factorisation is always there. MUMPS, SuiteSparse and others are packages, which a PETSc
+may lack: whoever assumes one asks ``core.packages`` first. A cause is named only where PETSc or the
+matrix tells it.
+"""
+
+import logging
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ...core import packages
+from ...core.errors import InputError
+
+log = logging.getLogger(__name__)
+FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
+FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
+COPIED_ROWS = (
+    300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
+)
+ZERO_PIVOT = (71, 81)  # errors of PETSc: a zero pivot of LU, of Cholesky
+MEMORY = (55,)  # PETSC_ERR_MEM
+OUT_OF_MEMORY = 3  # PC_FACTOR_OUTMEMORY
+MUMPS_SINGULAR = (-6, -10)  # INFOG(1): in its structure, in its numbers
+MUMPS_MEMORY = (-8, -9, -11, -13, -14, -15, -17, -18, -19, -20)
+
+
+def ordering() -> str:
+    """Return the order of elimination that PETSc's own factorisation takes.
+
+    It is minimum degree, which is of SuiteSparse, or without it nested dissection, which is
+    PETSc's.
+    """
+    return "amd" if packages.petsc_has("amd") else "nd"
+
+
+def own_serves(mat: Any) -> bool:
+    """Say whether PETSc's own factorisation is the better one. Collective.
+
+    It is for sparse rows (2D), or few; on several ranks not too many.
+    """
+    rows = max(mat.getSize()[0], 1)
+    if mat.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > FULL_ROW * rows:
+        return bool(rows <= FEW_ROWS)
+    return bool(mat.comm.size == 1 or rows <= COPIED_ROWS)
+
+
+def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
+    """Say whether MUMPS factorises: where it is the better one, if PETSc has it.
+
+    The log says what is taken instead of what is missing, unless options of the user choose
+    (``own``). Collective.
+    """
+    serves = symmetric and own_serves(mat)
+    mumps = packages.petsc_has("mumps") and not serves
+    missing = (
+        []
+        if packages.petsc_has("cholmod") and packages.petsc_has("amd")
+        else ["SuiteSparse (CHOLMOD, AMD)"]
+    )
+    missing += [] if packages.petsc_has("mumps") or serves else ["MUMPS"]
+    if missing and not own and mat.comm.rank == 0:
+        kind = "Cholesky" if symmetric else "LU"
+        taken = "MUMPS" if mumps else f"PETSc's own {kind}, ordered by '{ordering()}'"
+        copied = "" if mat.comm.size == 1 or mumps else ", with a copy on every rank,"
+        log.info(
+            "%s%s factorises, as this PETSc has no %s", taken, copied, " and no ".join(missing)
+        )
+    return mumps
+
+
+def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
+    """Return what to raise of a factorisation that failed.
+
+    PETSc raised ``error``, or solved to numbers that are not finite. Collective where nothing was
+    raised.
+    """
+    rows = mat.getSize()[0]
+    said = "" if error is None else str(error).splitlines()[-1].split("] ", 1)[-1].strip()
+    code = 0 if error is None else error.ierr
+    reason = _reason(pc, mat) if error is None else None
+    if code in MEMORY or reason == "memory":
+        return InputError(
+            f"there is not enough memory to factorise the effective matrix of {rows} unknowns: "
+            "take Iterative(), which factorises nothing, or more memory"
+        )
+    # a row of a symmetric matrix without one: no positive definite matrix
+    no_diagonal = "missing diagonal" in said
+    if code in ZERO_PIVOT or no_diagonal or reason == "singular":
+        return InputError(
+            "the effective matrix cannot be factorised: it is singular or contains NaN: check the "
+            "materials, and that every part of the body is clamped or has mass"
+        )
+    what = f"error {code}, {said}" if error is not None else reason
+    return InputError(
+        f"PETSc cannot factorise the effective matrix ({what}): take Iterative(), which factorises "
+        "nothing, or another factorisation by PETSc's options vi_contact_factor_…"
+    )
+
+
+def _reason(pc: Any, mat: Any) -> str:
+    """Return why a factor gives numbers that are not finite.
+
+    It is memory, or the matrix, or what MUMPS says of neither.
+    """
+    found = [_failed(pc)] if mat.comm.size == 1 else mat.comm.tompi4py().allgather(_failed(pc))
+    return next((one for one in found if one != "singular"), "singular")
+
+
+def _failed(pc: Any) -> str:
+    if hasattr(pc, "getFailedReason") and pc.getFailedReason() == OUT_OF_MEMORY:
+        return "memory"
+    if pc.getType() not in ("cholesky", "lu") or pc.getFactorSolverType() != "mumps":
+        return "singular"  # PETSc's own factor stops at zero pivots only
+    info = pc.getFactorMatrix().getMumpsInfog(1)
+    if info in MUMPS_MEMORY:
+        return "memory"
+    return "singular" if info >= 0 or info in MUMPS_SINGULAR else f"MUMPS says INFOG(1) = {info}"
+
+
+def finite(x: Any) -> bool:
+    """Say whether all entries of a PETSc vector are finite. Collective."""
+    return bool(np.isfinite(x.norm()))

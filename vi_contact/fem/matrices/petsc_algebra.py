@@ -1,0 +1,352 @@
+"""Implement the algebra protocol on PETSc matrices, on any number of ranks.
+
+MUMPS factorises, vectors are of numpy.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any
+from weakref import WeakValueDictionary
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from ...core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
+from ...kernels.contact_last import ContactLast
+from ..mesh.communicators import MpiComm, give_back
+from .copied_factor import contact_last, product_of_rows
+from .direct import by_mumps, failure, finite, ordering, own_serves
+from .petsc_rows import aij_of, rows_of
+
+PREFIX = "vi_contact_factor_"
+OWN_FACTOR = {"ksp_type": "preonly", "pc_factor_mat_solver_type": "petsc"}
+# options that choose no other factor
+TUNING = ("redundant_", "mat_mumps_icntl_14", "mat_mumps_icntl_20")
+_ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its column
+RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
+
+
+def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
+    """Return room that all matrices share, and a vector in it.
+
+    A product needs it only for as long as it takes.
+    """
+    room = _ROOM.get((size, way))
+    if room is None:
+        _ROOM[size, way] = room = np.zeros(size)
+    return room, PETSc.Vec().createWithArray(room, (size, None), comm=comm)
+
+
+_ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
+
+
+class PetscMatrix:
+    """Hold an AIJ matrix behind the ``Matrix`` protocol.
+
+    ``stored`` is the PETSc object, ``mat`` too unless it is stored otherwise: then it is made anew
+    (``fem.matrices.half``).
+    """
+
+    def __init__(self, mat: Any) -> None:
+        self.stored = mat
+        sizes = mat.getLocalSize()
+        (self._in, self._x), (self._out, self._y) = (
+            _vector(mat.comm, sizes[way], way) for way in (1, 0)
+        )
+
+    @property
+    def mat(self) -> Any:
+        """Return the PETSc matrix."""
+        return self.stored
+
+    @property
+    def rows(self) -> int:
+        """Return how many rows this rank owns."""
+        return int(self.stored.getLocalSize()[0])
+
+    @property
+    def bytes(self) -> float:
+        """Return the bytes of the entries of this rank and their columns."""
+        return _ENTRY * float(self.stored.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
+
+    def __matmul__(self, x: Array) -> Array:
+        if x.ndim == 2:
+            return self._rows_by(x)
+        self._in[:] = x
+        self.stored.mult(self._x, self._y)
+        return self._out.copy()
+
+    @cached_property
+    def _rows_by(self) -> Callable[[Array], Array]:
+        return product_of_rows(self)
+
+    def transpose_apply(self, x: Array) -> Array:
+        """Return Aᵀ x."""
+        self._out[:] = x
+        self.stored.multTranspose(self._y, self._x)
+        return self._in.copy()
+
+    def diagonal(self) -> Array:
+        """Return the diagonal entries of the owned rows."""
+        return np.array(self.stored.getDiagonal().array_r)
+
+
+class PetscFactor:
+    """Hold a Cholesky factor and its substitutions.
+
+    For matrices without contact unknowns, and where CHOLMOD is not to be had: PETSc's own
+    factorisation with minimum degree ordering where it serves (``own_serves``): its substitutions
+    are 4 to 15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so
+    that results do not depend on the order of messages, as those of MUMPS do. MUMPS takes the rest:
+    large 3D matrices on several ranks, and what is too large to be copied. Where PETSc has no MUMPS
+    its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log
+    says so. Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix
+    cannot be factorised. ``symmetric`` False: LU of MUMPS.
+    """
+
+    def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
+        mat = matrix.mat
+        mat.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+        kind = "cholesky" if symmetric else "lu"
+        self._mat = mat
+        self._b, self._x = mat.createVecs()
+        self._pc = PETSc.PC().create(mat.comm)
+        self._pc.setOptionsPrefix(PREFIX)
+        self._pc.setOperators(mat)
+        self._by_blocks = by_mumps(
+            mat, symmetric=symmetric, own=bool(PETSc.Options(PREFIX).getAll())
+        )
+        defaults: dict[str, object] = {}
+        if self._by_blocks:
+            self._pc.setType(kind)
+            self._pc.setFactorSolverType("mumps")
+            # MUMPS may crash on distributed right-hand sides; on busy ranks 20 % of spare room may
+            # be too little (-9)
+            defaults = {"mat_mumps_icntl_14": 100, "mat_mumps_icntl_20": 0}
+        elif mat.comm.size == 1:
+            self._pc.setType(kind)
+            self._pc.setFactorSolverType("petsc")
+            self._pc.setFactorOrdering(ordering())
+        else:
+            self._pc.setType("redundant")
+            own = OWN_FACTOR | {"pc_type": kind, "pc_factor_mat_ordering_type": ordering()}
+            defaults = {f"redundant_{name}": value for name, value in own.items()}
+        with _default_options(defaults):
+            self._pc.setFromOptions()
+            self._by_blocks = self._by_blocks and self._pc.getType() == kind
+            self._set_up()
+
+    def _set_up(self) -> None:
+        try:
+            self._pc.setUp()
+            self._b.set(1.0)
+            # PETSc fills it with infinity when the factorisation failed
+            self._pc.apply(self._b, self._x)
+            found = finite(self._x)
+        except PETSc.Error as error:
+            raise failure(self._pc, self._mat, error) from error
+        if not found:
+            raise failure(self._pc, self._mat)
+
+    @property
+    def bytes(self) -> float:
+        """Return the bytes of the entries, an equal share on each rank.
+
+        They are 0 for factors that tell nothing, as copies.
+        """
+        if self._pc.getType() not in ("cholesky", "lu"):
+            return 0.0
+        # MUMPS counts many in millions, below zero
+        count = self._pc.getFactorMatrix().getInfo()["nz_used"]
+        return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
+
+    def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b."""
+        self._b.array[:] = b
+        self._pc.apply(self._b, self._x)
+        return np.array(self._x.array_r)
+
+    def solve_units(
+        self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
+    ) -> Array:
+        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says."""
+        size = self._x.getLocalSize()
+        rows = np.arange(size) if rows is None else rows
+        columns = np.zeros((len(rows), m))
+        for first in range(0, m, RIGHT_SIDES):
+            width = min(RIGHT_SIDES, m - first)
+            units = np.zeros((size, width))
+            mine = (slots >= first) & (slots < first + width)
+            units[owned[mine], slots[mine] - first] = 1.0
+            if self._by_blocks:
+                columns[:, first : first + width] = self._solve_block(units)[rows]
+            else:
+                for column in range(width):
+                    columns[:, first + column] = self.solve(units[:, column])[rows]
+        return columns
+
+    def _solve_block(self, values: Array) -> Array:
+        """All columns at once, as MUMPS likes it."""
+        shape = ((len(values), self._x.getSize()), (None, values.shape[1]))
+        right, solved = (PETSc.Mat().createDense(shape, comm=self._x.comm) for _ in range(2))
+        for matrix in (right, solved):
+            matrix.setUp()
+        right.getDenseArray()[:] = values
+        for matrix in (right, solved):
+            matrix.assemble()
+        self._pc.getFactorMatrix().matSolve(right, solved)
+        result = np.array(solved.getDenseArray())
+        right.destroy()
+        solved.destroy()
+        return result
+
+
+@contextmanager
+def _default_options(values: Mapping[str, object]) -> Iterator[None]:
+    """Set PETSc options of the factor that hold while it is made.
+
+    They do not where the user has given them: others may differ.
+    """
+    database = PETSc.Options(PREFIX)
+    added = [name for name in values if not database.hasName(name)]
+    for name in added:
+        database[name] = values[name]
+    try:
+        yield
+    finally:
+        for name in added:
+            del database[name]
+
+
+class PetscAlgebra:
+    """Make and combine PETSc matrices on one communicator.
+
+    ``symmetric``: whether those of its system are.
+    """
+
+    symmetric = True
+
+    def __init__(self, comm: Any) -> None:
+        self.comm = MpiComm(comm)
+
+    def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
+        """Return the sum of factor times matrix over the terms (factor, matrix)."""
+        total = None
+        give_back(self.comm.mpi)
+        for factor, matrix in terms:
+            mat = as_petsc(matrix).mat
+            own = mat is as_petsc(matrix).stored
+            if total is None:
+                total = mat.copy() if own else mat
+                total.scale(factor)
+            else:
+                # M, C and K come from the same mesh and space: same sparsity unless a basis change
+                # dropped entries
+                total.axpy(factor, mat, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+                if not own:
+                    mat.destroy()
+        if total is None:
+            raise ValueError("combine: give at least one term")
+        return self.held(total)
+
+    def held(self, mat: Any) -> PetscMatrix:
+        """Return a PETSc matrix that nobody else needs as this algebra stores it."""
+        return PetscMatrix(mat)
+
+    def congruence(self, T: Matrix, K: Matrix) -> Matrix:
+        """Return Tᵀ K T."""
+        return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
+
+    def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
+        """Return the matrix of entries between the n unknowns of one rank."""
+        places, every = (rows, self.first(n) + np.asarray(columns)), int(self.comm.mpi.allreduce(n))
+        return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, every)), self.comm.mpi))
+
+    def first(self, n: int) -> int:
+        """Return the number of the first of the n unknowns that this rank owns."""
+        return int(self.comm.mpi.exscan(n) or 0)
+
+    def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
+        """Return these owned rows of A, their columns numbered over all ranks."""
+        mat = as_petsc(A).mat
+        (start, _), (first, last) = mat.getOwnershipRange(), mat.getOwnershipRangeColumn()
+        chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
+        whole = PETSc.IS().createStride(last - first, first, 1, comm=mat.comm)
+        part = mat.createSubMatrix(chosen, whole)
+        found = rows_of(part)
+        part.destroy()
+        return found
+
+    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+        """Return the identity of n owned rows with some of them replaced."""
+        return PetscMatrix(
+            aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi)
+        )
+
+    def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
+        every = np.arange(len(mask))
+        # a row of zeros may have no diagonal entry
+        ones = self.local(every, every, mask.astype(float), len(mask))
+        mat = as_petsc(self.combine([(1.0, A), (1.0, ones)])).mat
+        rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
+        mat.zeroRowsColumns(rows, diag=1.0)
+        return PetscMatrix(mat)
+
+    def block(self, A: Matrix, mask: Mask) -> Matrix:
+        """Return the rows and columns of A of the masked unknowns."""
+        mat = as_petsc(A).mat
+        rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
+        chosen = PETSc.IS().createGeneral(rows, comm=mat.comm)
+        return PetscMatrix(mat.createSubMatrix(chosen, chosen))
+
+    def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
+        return PetscFactor(as_petsc(A))
+
+    def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
+        """Return a factor with these unknowns last, or None where there is none."""
+        mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
+        # options of the user choose the factor
+        chosen = any(not name.startswith(TUNING) for name in given)
+        serves = not chosen and (self.comm.size == 1 or own_serves(mat))
+        return contact_last(self.comm, mat, last) if serves else None
+
+    def dot(self, x: Array, y: Array) -> float:
+        """Return x·y over all ranks."""
+        return total(self.comm, x @ y)
+
+
+class UnsymmetricAlgebra(PetscAlgebra):
+    """Make and combine the matrices of a system of which some is not symmetric."""
+
+    symmetric = False
+
+    def factor(self, A: Matrix) -> Factor:
+        """Return a factor of A."""
+        return PetscFactor(as_petsc(A), symmetric=False)
+
+    def contact_last(self, A: Matrix, last: Indices) -> None:
+        """Return None: there is no factor with these unknowns last."""
+        return None
+
+
+def triple_product(K: Any, P: Any) -> Any:
+    """Return PᵀKP of PETSc matrices, a copy.
+
+    What PETSc makes holds K and P for as long as it lives.
+    """
+    give_back(K.comm)
+    product = K.PtAP(P)
+    made = product.duplicate(copy=True)
+    product.destroy()
+    return made
+
+
+def as_petsc(matrix: Matrix) -> PetscMatrix:
+    """Return the matrix as a PetscMatrix; TypeError when it belongs to another algebra."""
+    if not isinstance(matrix, PetscMatrix):
+        raise TypeError(f"PetscAlgebra got a {type(matrix).__name__}; give a PetscMatrix")
+    return matrix

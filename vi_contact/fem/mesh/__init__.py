@@ -1,0 +1,1 @@
+"""Hold nodes, cells and their named groups, shared among ranks."""

@@ -1,0 +1,255 @@
+"""Distribute meshes with named groups, read from a file or built in memory by a Gmsh script.
+
+Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError.
+Groups are recognised on each rank by the vertices of their members, numbered as in the input: a
+facet may be in several.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+
+from ...core.checks import ended, function, instance, mask, provides, refuse, shown, whole
+from ...core.collective import Parts, agree
+from ...core.errors import InputError
+from ...core.files import on_root
+from ...core.stages import stage
+from ...meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
+from ...meshes.gmsh_session import MeshScript
+from ...meshes.partition import destinations
+from ...meshes.rows import found_in, number_alike
+from .. import compat
+from ..compat import Indices
+from .communicators import MpiComm
+from .numbering import node_numbers
+
+MOST_NAMED = 20  # values of tags in a message
+
+_NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))  # destinations of no cells
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Name a part of a mesh by local numbers; each is kept once, ascending."""
+
+    name: str
+    indices: Indices
+    mesh: Mesh = field(repr=False)
+    codimension: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__
+        instance(owner, "name", self.name, str, "give a text")
+        mesh = instance(
+            owner, "mesh", self.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to"
+        )
+        count, numbers, defect = local_count(mesh, self.codimension), np.asarray(self.indices), ""
+        if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
+            defect = (
+                f"{owner}: indices is {shown(self.indices)}; give local numbers, such as "
+                "tags.find(value) returns"
+            )
+        elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
+            defect = (
+                f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but "
+                f"the mesh has {count} {owner.lower()} here, counted from 0: give numbers of this "
+                "mesh"
+            )
+        refuse([defect], MpiComm(mesh.comm))
+        object.__setattr__(self, "indices", np.unique(numbers).astype(np.int32))
+
+    @classmethod
+    def tagged(cls, name: str, meshtags: Any, value: int, mesh: Mesh) -> Self:
+        """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags.
+
+        Collective.
+
+        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
+        any rank has.
+        """
+        owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
+        instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
+        provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
+        dim, values = mesh.topology.dim - cls.codimension, np.asarray(meshtags.values)
+        chosen = np.asarray(meshtags.indices)[
+            values == whole(owner, "value", value, least=-(2**31))
+        ]
+        defect = ""
+        if not compat.tags_of(meshtags, mesh):
+            defect = (
+                f"{owner}: the tags of '{name}' are those of another mesh; give tags of this mesh"
+            )
+        elif meshtags.dim != dim:
+            defect = (
+                f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of "
+                f"this mesh have dimension {dim}; give the tags of its {things}"
+            )
+        refuse([defect], MpiComm(mesh.comm))
+        if not mesh.comm.allreduce(len(chosen)):
+            found = np.unique(np.concatenate(mesh.comm.allgather(np.unique(values))))
+            there = ", ".join(map(str, found[:MOST_NAMED])) + (
+                ", …" if len(found) > MOST_NAMED else ""
+            )
+            raise InputError(
+                f"{owner}: no {things} have the value {value} of '{name}'; give one of "
+                f"{there or 'none'}"
+            )
+        return cls(name, chosen, mesh)
+
+    @classmethod
+    def where(cls, name: str, mesh: Mesh, marker: Callable[[npt.NDArray[np.float64]], Any]) -> Self:
+        """Return the group of the facets of the boundary, or of the cells, in a region. Collective.
+
+        Their vertices are all marked.
+
+        ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
+        it fails or marks none on any rank.
+        """
+        owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
+        instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
+        function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
+
+        def safe(x: Any) -> Any:  # the other ranks must not wait where it raises
+            try:
+                if x.shape[1]:
+                    return mask(
+                        owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],)
+                    )
+            except Exception as error:  # of a user's function, which may raise anything
+                defects.append(ended(f"{owner}: the marker of '{name}'", error))
+            return np.zeros(x.shape[1], dtype=bool)
+
+        chosen = compat.entities_where(mesh, mesh.topology.dim - cls.codimension, safe)
+        refuse(defects, MpiComm(mesh.comm))
+        if not mesh.comm.allreduce(len(chosen)):
+            of = "facets of the boundary" if cls.codimension else "cells"
+            raise InputError(
+                f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some "
+                f"{things}, coordinates compared with np.isclose"
+            )
+        return cls(name, chosen, mesh)
+
+
+@dataclass(frozen=True, eq=False)
+class Facets(Group):
+    """Name a part of the boundary or of an inner surface. Collective.
+
+    It is local facets, ghosts included; kept ascending.
+
+    ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks
+    points. InputError, on all ranks, for numbers that are no facets of this mesh.
+    """
+
+    codimension: ClassVar[int] = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Cells(Group):
+    """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
+
+    ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks
+    points. InputError, on all ranks, for numbers that are no cells of this mesh.
+    """
+
+    codimension: ClassVar[int] = 0
+
+
+def local_count(mesh: Mesh, codimension: int) -> int:
+    """Return how many cells or facets there are on this rank, ghosts included. Collective."""
+    dim = mesh.topology.dim - codimension
+    mesh.topology.create_entities(dim)
+    local = mesh.topology.index_map(dim)
+    return int(local.size_local + local.num_ghosts)
+
+
+class Tags(dict[str, Any]):
+    """Hold the groups of a mesh by name.
+
+    They are `Cells` or `Facets`, the same names on all ranks.
+
+    Raises:
+        InputError: other names.
+    """
+
+    def __missing__(self, name: str) -> Any:
+        facets = [key for key, group in self.items() if isinstance(group, Facets)]
+        cells = [key for key, group in self.items() if isinstance(group, Cells)]
+        near = " or ".join(get_close_matches(str(name), self, cutoff=0.5))
+        raise InputError(
+            f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, "
+            f"its cell groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it "
+            "in Gmsh as a physical group"
+        )
+
+
+def alone() -> MPI.Comm:
+    """Return the communicator of this process by itself."""
+    return MPI.COMM_SELF
+
+
+def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
+    """Read a mesh and its physical groups.
+
+    Cells are intervals, triangles, quadrilaterals, tetrahedra or hexahedra.
+
+    Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in
+    metres. The file is in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on
+    every rank if the file is missing, is a script, or is not a usable mesh
+    (`vi_contact.meshes.extract.extract` lists the reasons). Collective.
+    """
+    instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
+    return _distribute(comm, lambda: arrays_from_file(path))
+
+
+def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
+    """Build a mesh without a file from a script of ``vi_contact.meshes``.
+
+    Any object with `build(gmsh)` serves too.
+
+    It raises the errors of `read_mesh`. Collective.
+    """
+    if isinstance(comm, MPI.Comm):
+        agree(MpiComm(comm), "build_mesh", {"mesh": Parts(mesh)})
+    provides(
+        "build_mesh",
+        "mesh",
+        mesh,
+        ("build",),
+        "give a script of vi_contact.meshes, BlockMesh(…) for example",
+    )
+    return _distribute(comm, lambda: arrays_from_script(mesh))
+
+
+@stage("mesh")
+def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
+    instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
+    arrays = on_root(MpiComm(comm), produce)  # what rank 0 raises, all ranks raise
+    groups = comm.bcast(
+        arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0])
+    )
+    arrays = arrays or groups  # without points and cells on the others
+    cells = arrays.cells[:, compat.gmsh_order(arrays.cell, arrays.cells.shape[1])]
+    where = (
+        destinations(arrays.points, arrays.cells, arrays.cell, comm.size)
+        if comm.rank == 0
+        else _NOWHERE
+    )
+    mesh = compat.create_mesh(comm, arrays.cell, cells, arrays.points, where)
+    tags = Tags()
+    original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+    for name, members in arrays.cell_groups.items():
+        tags[name] = Cells(name, np.flatnonzero(members[original]).astype(np.int32), mesh)
+    everyone = compat.entities_to_geometry(
+        mesh, mesh.topology.dim - 1, np.arange(local_count(mesh, 1), dtype=np.int32)
+    )
+    facets, *named = number_alike(node_numbers(mesh)[everyone], *arrays.facet_groups.values())
+    for name, numbers in zip(arrays.facet_groups, named, strict=True):
+        tags[name] = Facets(name, np.flatnonzero(found_in(facets, numbers)).astype(np.int32), mesh)
+    return mesh, tags
