@@ -20,7 +20,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -59,12 +58,9 @@ def holds(value: Any, mesh: Any, depth: int = DEPTH) -> bool:
         return own is not None and (own is cpp or holds(own, mesh, depth - 1))
     if home != "vi_contact":
         return False
-    return any(holds(member, mesh, depth - 1) for member in vars_of(value))
-
-
-def vars_of(value: Any) -> Iterator[Any]:
-    """Yield the attributes that an object has, not those that it would have to compute."""
-    yield from list(getattr(value, "__dict__", {}).values())
+    # the attributes that it has, not those that it would have to compute
+    attributes = list(getattr(value, "__dict__", {}).values())
+    return any(holds(member, mesh, depth - 1) for member in attributes)
 
 
 def traced(mesh: Any, package: Path, assemble: Any) -> list[tuple[Call, bool]]:
@@ -116,8 +112,11 @@ def counts(calls: list[Call]) -> dict[str, int]:
     return {"visits": len(visits), "files": len(files), "returns": len(visits) - len(files)}
 
 
-def main(tree: Path, as_json: bool) -> None:
-    """Trace one call of ``fem.assemble`` of the package in a tree, and print what it visits."""
+def calls_of_example(tree: Path) -> list[tuple[Call, bool]]:
+    """Return the calls of ``fem.assemble`` of the wall, and whether each is handed the mesh.
+
+    ``tree``: the folder that has the package.
+    """
     sys.path.insert(0, str(tree))
     from mpi4py import MPI
 
@@ -135,12 +134,16 @@ def main(tree: Path, as_json: bool) -> None:
         make(mesh, concrete, section=section, clamped=tags["base"])
 
     assemble()
-    calls = traced(mesh, tree / "vi_contact", assemble)
+    return traced(mesh, tree / "vi_contact", assemble)
+
+
+def main(tree: Path, as_json: bool) -> None:
+    """Print what the mesh visits while ``fem.assemble`` of the package in a tree runs."""
+    calls = calls_of_example(tree)
     walk = [call for call, handed in calls if handed]
     every = [call for call, _ in calls]
-    numbers = {**counts(walk), "all_calls": counts(every)}
     if as_json:
-        print(json.dumps(numbers))
+        print(json.dumps({**counts(walk), "all_calls": counts(every)}))
         return
     for number, (file, functions) in enumerate(stays(walk), 1):
         print(f"{number:3d}  {file:30s} {' '.join(dict.fromkeys(functions))}")

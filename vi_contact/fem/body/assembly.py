@@ -55,6 +55,7 @@ from .ties import Tied
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
 
+# what the notes of a system say of base_inertia=False
 LIGHTER = (
     "inertia load of the ground motion: the convention of the catalogue's reference numbers, which "
     "leave out the mass that elements share with the base"
@@ -327,6 +328,7 @@ def _eliminate(
         motion: t -> U^(k)(t) (full,), None where nothing that is held moves.
     """
     pull: tuple[Callable[[float], Array], ...] = ()
+    # the columns of held components are kept for the load, before the full matrix goes
     if motion is not None:
         matrix = PetscMatrix(moved(elimination.held_columns(full), algebra.comm.mpi))
         pull = (lambda t: -elimination.pull(matrix @ motion(t)[elimination.held]),)
@@ -336,66 +338,84 @@ def _eliminate(
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
-    """Assemble f(t) on the free unknowns.
+    """Assemble f(t) on the free unknowns. Collective.
 
-    It is that of tractions, body forces, linear forms and initial strains.
+    Args:
+        space: the body's unknowns, whose forms tell the stress of initial strains.
+        section: its thickness.
+        loads: tractions, body forces, linear forms and initial strains.
     """
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
     if strained := [one for one in loads if isinstance(one, InitialStrain)]:
         space.forms.initial = InitialStrains(space.forms, strained)
+    # what changes with time by a factor alone is assembled once, what is constant is added up
     for load in loads:
-        at = _integrated(space, section, load)
+        force = _integrate(space, section, load)
         if load.history is not None:
-            separable.append((at(0.0), load.history))
+            separable.append((force(0.0), load.history))
         elif load.is_constant:
-            constant += at(0.0)
+            constant += force(0.0)
         else:
-            general.append(at)
+            general.append(force)
     return Load(constant, tuple(separable), tuple(general))
 
 
-def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
-    """Return t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here.
+def _integrate(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
+    """Return t -> Pᵀ ∫ interpolated value · v [N], as one product with a matrix assembled here.
 
-    Of a form it is its own.
+    Of a linear form it is its own vector.
+
+    Args:
+        space: the body's unknowns.
+        section: its thickness.
+        load: what acts.
     """
     if isinstance(load, InitialStrain):
         return lambda t: space.forms.initial.forces(t, only=load)
     if isinstance(load, LinearForm):
         full = load.full(space, section.thickness)
         return lambda t: space.pull(full(t))
-    g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
+    # ∫ g·v of nodal values g of the load: at each time only these are evaluated anew
+    g = ufl.TrialFunction(space.V)
+    v = ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
     matrix = PetscMatrix(compat.assemble_matrix(space.compiled(form)))
+    name = type(load).__name__
 
-    def at(t: float) -> Array:
-        values = evaluate(type(load).__name__, load.value, space.points, t, space.comm)
+    def force(t: float) -> Array:
+        values = evaluate(name, load.value, space.points, t, space.comm)
         return space.pull(section.thickness * (matrix @ values.ravel()))
 
-    return at
+    return force
 
 
 def _initial(space: FemSpace, name: str, value: Initial) -> Array:
-    """Return initial values on the free unknowns."""
+    """Return initial values on the free unknowns. Collective.
+
+    Args:
+        space: the body's unknowns.
+        name: what messages call the values.
+        value: a constant, a function of points, or (cells, value) pairs.
+    """
     if value is None:
         return np.zeros(len(space.ids))
-    if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
-        pairs: Any = value
-        values = np.zeros((len(space.nodes), space.dimension))
-        for cells, one in pairs:
-            blocks = np.unique(compat.cell_blocks(space.V)[cells.indices])
-            shared = np.concatenate(
-                from_each(space.comm, space.node_of_block[blocks[blocks >= len(values)]])
-            )
-            touched = np.isin(space.nodes, shared)  # by cells of other ranks
-            touched[blocks[blocks < len(values)]] = True
-            values[touched] = _nodal(space, name, one)[touched]
-        return space.restrict(values)
-    return space.restrict(_nodal(space, name, value))
+    if not (isinstance(value, Sequence) and value and isinstance(value[0], tuple)):
+        return space.restrict(_nodal(space, name, value))
+    pairs: Any = value
+    values = np.zeros((len(space.nodes), space.dimension))
+    for cells, field in pairs:
+        # nodes of the cells: of this rank's, and owned ones of cells that other ranks have
+        blocks = np.unique(compat.cell_blocks(space.V)[cells.indices])
+        ghosts = space.node_of_block[blocks[blocks >= len(values)]]
+        touched = np.isin(space.nodes, np.concatenate(from_each(space.comm, ghosts)))
+        touched[blocks[blocks < len(values)]] = True
+        values[touched] = _nodal(space, name, field)[touched]
+    return space.restrict(values)
 
 
 def _nodal(space: FemSpace, name: str, value: Any) -> Array:
+    """Return the values (k, d) of a constant or a function of points at the owned nodes."""
     field: Any = (lambda points, t: value(points)) if callable(value) else value
     return evaluate(name, field, space.points, 0.0, space.comm)

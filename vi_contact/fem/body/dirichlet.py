@@ -26,12 +26,13 @@ REMEDY = (
 
 @dataclass(frozen=True, eq=False)
 class GivenValues:
-    """Hold components of nodes as a ``Prescribed`` at rest does.
+    """Hold components of nodes at the values of a ``dirichletbc``, as they were when given.
 
-    They are those of a ``dirichletbc``, as they were when given.
-
-    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not
-    zero.
+    Attributes:
+        name: what messages call it.
+        mask: (blocks, d) which components of local blocks of V are held, ghosts too.
+        values: (blocks, d) their values [m], zero elsewhere.
+        moves: whether some value, of any rank, is not zero.
     """
 
     name: str
@@ -100,6 +101,7 @@ def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
     )
     if not compat.is_on(V, mesh):
         raise InputError("assemble: space is on another mesh; give a space on this one")
+    # the displacement's space has the element of degree 1 or 2, and is no part of another space
     for k in (1, 2):
         known = compat.vector_space(mesh, k)
         if (
@@ -115,38 +117,49 @@ def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
 
 
 def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
-    """Return what conditions hold of a displacement's space.
+    """Return what conditions hold of a displacement's space. Collective.
 
-    InputError, on all ranks, for one of another space, one that holds nothing, and values that are
-    not finite. Collective.
+    Args:
+        mesh: that of the body.
+        V: the displacement's space.
+        bcs: ``dirichletbc`` objects on V, a space like it, or a component of one.
+
+    Raises:
+        InputError: on all ranks, a condition on another space, one that holds nothing, and values
+            that are not finite.
     """
-    comm, d, found = MpiComm(mesh.comm), mesh.geometry.dim, []
+    comm = MpiComm(mesh.comm)
+    d = mesh.geometry.dim
+    local = V.dofmap.index_map
+    shape = (local.size_local + local.num_ghosts, d)
+    conditions = []
     for k, bc in enumerate(bcs):
-        name, block = f"bcs[{k}]", _block_of(V, bc.function_space)
+        name = f"bcs[{k}]"
+        block = _block_of(V, bc.function_space)
         if block is None:
             raise InputError(
                 f"assemble: {name} is on another space than the displacement's; {REMEDY}"
             )
+        # from unknowns of the condition's space to blocks and components of V
         dofs, values = compat.bc_values(bc, d * len(block))
         known = block[dofs // d] >= 0
         where = block[dofs[known] // d], dofs[known] % d
-        mask, given = np.zeros(
-            (2, V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts, d)
+        mask = np.zeros(shape, dtype=bool)
+        held = np.zeros(shape)
+        mask[where] = True
+        held[where] = values[known]
+        finite = np.all(np.isfinite(values))
+        refuse(
+            ["" if finite else f"assemble: {name} has NaN or infinite values; correct them"], comm
         )
-        mask[where], given[where] = 1.0, values[known]
-        defect = (
-            ""
-            if np.all(np.isfinite(values))
-            else f"assemble: {name} has NaN or infinite values; correct them"
-        )
-        refuse([defect], comm)
         if not largest(comm, len(dofs)):
             raise InputError(
                 f"assemble: {name} prescribes no unknown on any rank; check how its dofs were "
                 "located"
             )
-        found.append(GivenValues(name, mask > 0.0, given, bool(largest(comm, max_abs(values)))))
-    return tuple(found)
+        moves = bool(largest(comm, max_abs(values)))
+        conditions.append(GivenValues(name, mask, held, moves))
+    return tuple(conditions)
 
 
 def refuse_contradictions(space: Any) -> None:
@@ -157,34 +170,41 @@ def refuse_contradictions(space: Any) -> None:
     meet do not contradict.
     """
     given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
-    held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
-    for values, support in zip(held, space.supports, strict=False):
+    # the values that each holds at t = 0, NaN at the components that it does not hold
+    held = [np.full(space.held.shape, np.nan) for _ in given]
+    for values, support in zip(held, space.supports, strict=True):
         values[support.places] = support.at(space.points, 0.0, 0)[0]
     for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
-        moves = space.prescribed[i].moves and callable(space.prescribed[i].displacement)
+        stated = space.prescribed[i]
+        moves = stated.moves and callable(stated.displacement)
         apart = np.abs(held[i] - held[j])
+        # components that both hold, and all of each: one is a part of the other
         both, *each = space.comm.sum(
-            np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])])
+            np.array([np.isfinite(values).sum() for values in (apart, held[i], held[j])])
         )
         if both and both in each and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
             raise InputError(
                 f"assemble: {space.prescribed[j].name} and what is prescribed on "
-                f"'{space.prescribed[i].name}' differ at an unknown of both: leave one of them out"
+                f"'{stated.name}' differ at an unknown of both: leave one of them out"
             )
 
 
 def _block_of(V: Any, S: Any) -> Indices | None:
     """Return the block of V that each block of a space is, -1 without cells. Collective.
 
-    The space is S = V or V.sub(i). It is None, on all ranks, where S is of another kind. Spaces
-    made twice may be numbered differently.
+    Spaces made twice may be numbered differently.
+
+    Args:
+        V: the displacement's space.
+        S: a space like V, or V.sub(i).
+
+    Returns:
+        (blocks of S,), or None on all ranks where S is of another kind.
     """
-    d, theirs, mine, rows = (
-        V.mesh.geometry.dim,
-        S.dofmap.index_map,
-        compat.cell_blocks(V),
-        compat.blocks_of_cells(S),
-    )
+    d = V.mesh.geometry.dim
+    theirs = S.dofmap.index_map
+    mine = compat.cell_blocks(V)
+    rows = compat.blocks_of_cells(S)
     fits = (
         S.dofmap.index_map_bs == d
         and S.dofmap.bs == (1 if len(S.component()) else d)
@@ -192,6 +212,7 @@ def _block_of(V: Any, S: Any) -> Indices | None:
     )
     block = np.full(theirs.size_local + theirs.num_ghosts, -1, dtype=np.int64)
     if fits:
+        # a block has one place in every cell: the table of one space must follow from the other's
         block[rows] = mine
         fits = (
             np.array_equal(block[rows], mine)
