@@ -229,25 +229,20 @@ def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
         tmp_path, HOUSE, "run.checkpoint_every=1", "run.t_end=0.04", "stage.3.run.t_end=0.02"
     )
     whole = stopped.run(MPI.COMM_SELF, out=tmp_path / "whole", progress=False).history
-    keep = session.Session._keep
+    record = session.Session._record
     for last, begun_from in ((6, 5), (10 + 5, 10)):
         rows: list[int] = []
 
-        def kept(
-            self: Any,
-            state: Any,
-            report: Any,
-            writer: Any,
-            rows: list[int] = rows,
-            last: int = last,
+        def record_or_fail(
+            self: Any, report: Any, writer: Any, rows: list[int] = rows, last: int = last
         ) -> None:
-            rows.append(state.k)
+            rows.append(report.new.k)
             if len(rows) == last:
                 raise PowerFailure
-            keep(self, state, report, writer)
+            record(self, report, writer)
 
         with monkeypatch.context() as patched, pytest.raises(PowerFailure):
-            patched.setattr(session.Session, "_keep", kept)
+            patched.setattr(session.Session, "_record", record_or_fail)
             stopped.run(MPI.COMM_SELF, out=tmp_path / "parts", progress=False)
         assert (tmp_path / "parts" / "summary.json").is_file() == (last > 10)
         found = stopped.run(

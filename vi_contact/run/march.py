@@ -13,7 +13,7 @@ from ..core.protocols import Impact
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
-from .method import Method, checked_method
+from .method import Method, choose_method
 from .time_steps import StepPlan, TimeSteps, step_plan
 
 
@@ -31,17 +31,25 @@ def march(
 ) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.
 
-    If ``scheme`` is None, or the problem names no mass matrix, ``run.method.with_defaults`` chooses
-    them, and ``report.problem`` has them. If ``solver`` is None, it is Automatic().
+    Args:
+        problem: what is marched. If it names no mass matrix, or there is no scheme,
+            ``run.method.with_defaults`` chooses them, and ``report.problem`` has them.
+        scheme: the time scheme.
+        solver: of the steps; None means Automatic().
+        dt: constant [s], or a Schedule, or HalvedAtImpact.
+        steps: the number of base steps. The halves of a halved step are yielded one by one, and
+            ``state.k`` counts them, but they are one of the ``steps``.
+        t_end: the time [s] at which the base steps end; give it or ``steps``.
+        state: that of a static stage or a checkpoint; None means u0 and v0 of the system.
+        escalation: solvers to which a step goes in turn whose certificate exceeds ``tolerance``.
+        tolerance: of the certificate, relative.
 
-    ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base
-    steps: the halves of a halved step are yielded one by one, and ``state.k`` counts them, but they
-    are one of the ``steps``. A step whose certificate exceeds ``tolerance`` goes to the solvers of
-    ``escalation`` in turn. If all of them fail, StepFailure is raised with step, time, residuals
-    and advice. ``state`` is that of a static stage or a checkpoint. InputError is raised at the
-    call: arguments of the wrong kind, a state of another problem or inside the obstacle.
+    Raises:
+        InputError: at the call, for arguments of the wrong kind, and a state of another problem or
+            inside the obstacle.
+        StepFailure: no solver could certify a step; with step, time, residuals and advice.
     """
-    method = checked_method(
+    method = choose_method(
         "march",
         problem,
         scheme,
@@ -60,32 +68,54 @@ def march(
 class March:
     """Step along a plan, and keep the books of it.
 
-    ``prepared``: matrices and solvers by the length of their steps.
-
     Attributes, at the time a step is handed out:
-        base: base steps done. ended: whether this step ended one, so that a restart may begin here.
-        dt: the length of this step [s]. halved: attempts that were thrown away.
+        state: at its end.
+        base: base steps done.
+        ended: whether this step ended one, so that a restart may begin here.
+        dt: the length of this step [s].
+        halved: attempts that were thrown away.
+        prepared: matrices and solvers by the length of their steps.
     """
 
     def __init__(
         self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0
     ) -> None:
-        self.method, self.step_plan, self.state = method, step_plan, state
+        """Stand before the next step.
+
+        Args:
+            method: scheme, solvers and tolerance.
+            step_plan: all base steps of the run.
+            state: at the end of the last one.
+            base: how many have been made.
+            halved: attempts that have been thrown away.
+        """
+        self.method = method
+        self.step_plan = step_plan
+        self.state = state
+        self.base = base
+        self.halved = halved
+        self.ended = True
+        self.dt = float("nan")
         self.prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
-        self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
+        """Make base steps, whole or in halves, until the plan ends."""
         sizes: list[float] = []
         while self.base < self.step_plan.steps:
             dt = self.step_plan.dt(self.base)
             self.method.bind()  # another run of the problem may be under way
             if not sizes or sizes[0] != dt:
+                # A new piece of the plan: matrices of other sizes may be let go.
                 sizes = [dt / 2**level for level in range(self.step_plan.halvings + 1)]
                 self.prepared = {
                     size: self.prepared[size] for size in sizes if size in self.prepared
                 }
-            self.state, self.dt = self._restarted(dt), dt
-            levels = [0]  # how often the parts of the base step that are left were halved
+            self.state = self._state_for(dt)
+            self.dt = dt
+
+            # The parts of the base step that are left, last first: how often each was halved. A
+            # part that closes a point is thrown away, and its two halves take its place.
+            levels = [0]
             while levels:
                 level = levels.pop()
                 report = self._attempt(sizes[level], final=level == self.step_plan.halvings)
@@ -93,12 +123,15 @@ class March:
                     self.halved += 1
                     levels += [level + 1, level + 1]
                     continue
-                self.state, self.dt, self.ended = report.new, sizes[level], not levels
-                self.base += self.ended
+                self.state = report.new
+                self.dt = sizes[level]
+                self.ended = not levels
+                if self.ended:
+                    self.base += 1
                 yield report.new, report
 
-    def _restarted(self, dt: float) -> State:
-        """Return the state, with a past for this dt."""
+    def _state_for(self, dt: float) -> State:
+        """Return the state, with the scheme's memory of a past in steps of dt [s]."""
         if dt == self.dt:
             return self.state
         method = self.method
@@ -106,32 +139,40 @@ class March:
             return method.scheme.start(method.problem, self.state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
-        """Return a step of dt; None when it closes a point and is to be halved.
+        """Return a step of dt [s]; None when it closes a point and is to be halved.
 
-        Nothing has happened then.
+        Nothing has happened then. A ``final`` step is not halved any more.
 
         Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked
         once, at its end.
         """
         with together(self.method.problem.surface.comm):
-            return self._attempted(dt, final=final)
+            return self._make_step(dt, final=final)
 
-    def _attempted(self, dt: float, *, final: bool) -> Report | None:
-        problem, scheme, state = self.method.problem, self.method.scheme, self._restarted(dt)
+    def _make_step(self, dt: float, *, final: bool) -> Report | None:
+        """Do the work of ``_attempt``, in its frame of all ranks."""
+        problem, scheme = self.method.problem, self.method.scheme
+        state = self._state_for(dt)
+
+        # The scheme reduces the step to one inequality, A x = b with contact.
         A, solver = self.prepared.get(dt, (None, None))
         with together_if_own(problem.surface.comm, scheme):
-            A = scheme.effective_matrix(problem, dt) if A is None else A
+            if A is None:
+                A = scheme.effective_matrix(problem, dt)
             step = scheme.step(problem, state, A, dt)
         if solver is None:
-            solver = CertifiedSolver(
-                problem, A, step.scale, self.method.solvers, self.method.tolerance
-            )
-            self.prepared[dt] = A, solver
+            method = self.method
+            solver = CertifiedSolver(problem, A, step.scale, method.solvers, method.tolerance)
+            self.prepared[dt] = (A, solver)
+
+        # It is solved with a certificate, and thrown away if it is too long for an impact.
         if problem.surface.watched:
             problem.surface.refuse_driven(step.t)
         result, certificate, escalated = solver.solve(step)
         if not final and problem.surface.some(result.active & ~state.active):
             return None
+
+        # Displacements and velocities at its end: of the scheme, then of the impact law.
         with together_if_own(problem.surface.comm, scheme):
             free = scheme.finish(problem, state, step, result, dt)
         with together_if_own(problem.surface.comm, problem.impact or scheme):
@@ -148,15 +189,26 @@ def after_impact(
     """Return the state with the impact law applied.
 
     Points on massless supports (springs) do not collide.
+
+    Args:
+        problem: whose law it is.
+        scheme: which writes the jump of velocities into its state.
+        old: the state before the step.
+        new: the one after it, without impact.
+        dt: the length of the step [s].
     """
-    law, surface = problem.impact, problem.surface
+    law = problem.impact
+    surface = problem.surface
     if law is None:
         return new
     active = new.active & surface.rigid
     if not surface.some(active):
         return new
     impact = Impact(
-        surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active
+        before=surface.normal_values(old.v),
+        v_n=surface.normal_values(new.v),
+        active=active,
+        closing=active & ~old.active,
     )
     target = users(
         f"the impact law {type(law).__name__}",
@@ -165,4 +217,5 @@ def after_impact(
     )
     if not surface.some(~np.isnan(target)):
         return new
-    return scheme.jump(problem, new, law.apply(problem.equations, surface, new.v, target), dt)
+    v = law.apply(problem.equations, surface, new.v, target)
+    return scheme.jump(problem, new, v, dt)

@@ -12,9 +12,9 @@ from ..core.problem import ContactProblem
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
-from .method import checked_method, with_defaults
+from .method import choose_method, with_defaults
 from .time_steps import TimeSteps, step_plan
-from .together import Together, grouped
+from .together import Together, group_runs
 
 
 def march_many(
@@ -31,9 +31,7 @@ def march_many(
 ) -> Iterator[tuple[int, Report | ViContactError]]:
     """Yield (number of the run, report) after every certified step, a step of each run in turn.
 
-    A run that fails yields its error, last; the others go on. ``steps`` or ``t_end``: one for all,
-    or one for each run, as ``states``, None for that of the system; everything else as of
-    ``march``, of which each run takes the steps.
+    A run that fails yields its error, last; the others go on.
 
     Runs step together, which reads every matrix once for eight of them, when their problems have
     the same system and surface objects, and equal mass and impact laws:
@@ -43,16 +41,30 @@ def march_many(
     with motions that are marched beside (``soil``), with schemes that do not say ``by_rows``
     (ContactStabilisedNewmark, MoreauJean), with other solvers than Condensed() of ActiveSet(), or
     of any method for friction, and without CHOLMOD.
+
+    Args:
+        problems: one for each run.
+        scheme: of all runs; as of ``march``, and so are ``solver``, ``dt`` [s], ``escalation`` and
+            ``tolerance``.
+        solver: of all runs.
+        dt: of all runs.
+        steps: the number of base steps, one for all or one for each run.
+        t_end: the time of their end [s], one for all or one for each run; give it or ``steps``.
+        states: where each run starts, None for u0 and v0 of its system.
+        escalation: of all runs.
+        tolerance: of all runs.
+
+    Raises:
+        InputError: at the call, as of ``march``, and where there is not one value for each run.
     """
-    given = several("march_many", "problems", problems, "give a list of ContactProblems")
-    every = [
-        list(_each(name, value, len(given)))
-        for name, value in (("steps", steps), ("t_end", t_end), ("states", states))
-    ]
+    checked = several("march_many", "problems", problems, "give a list of ContactProblems")
+    steps_of_runs = _one_for_each("steps", steps, len(checked))
+    ends = _one_for_each("t_end", t_end, len(checked))
+    starts = _one_for_each("states", states, len(checked))
     runs: list[Together] = []
-    for problem, count, end, state in zip(given, *every, strict=True):
+    for problem, count, end, state in zip(checked, steps_of_runs, ends, starts, strict=True):
         problem, scheme = with_defaults(problem, scheme, [run.method.problem for run in runs])
-        method = checked_method(
+        method = choose_method(
             "march_many",
             problem,
             scheme,
@@ -63,15 +75,22 @@ def march_many(
             state=state,
             tolerance=tolerance,
         )
-        state = initial_state(method.problem) if state is None else state
+        if state is None:
+            state = initial_state(method.problem)
         plan = step_plan(dt, count, end, state.t)
         runs.append(Together(method, plan, scheme.start(method.problem, state, plan.dt(0))))
-    grouped(runs)
+    group_runs(runs)
     return _in_turn(runs)
 
 
-def _each(name: str, value: Any, count: int) -> Sequence[Any]:
-    """One value for each run."""
+def _one_for_each(name: str, value: Any, count: int) -> Sequence[Any]:
+    """Return one value for each run.
+
+    Args:
+        name: of the argument of ``march_many``.
+        value: one for all, or one for each.
+        count: how many runs there are.
+    """
     if not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:

@@ -49,7 +49,7 @@ class Method:
             companion.bind(self.scheme, self.dt)
 
 
-def checked_method(
+def choose_method(
     owner: str,
     problem: ContactProblem,
     scheme: Scheme | None,
@@ -61,12 +61,22 @@ def checked_method(
     state: State | None,
     tolerance: float,
 ) -> Method:
-    """Return the method with its defaults.
+    """Return how a problem is marched, with defaults for what is not said. Collective.
 
-    ``solvers``: the first one, None for Automatic(), and the escalation.
+    Args:
+        owner: the function of the user, for sentences of errors.
+        problem: what is marched.
+        scheme: None for the one of ``with_defaults``.
+        solvers: the first one, None for Automatic(), and the escalation.
+        dt: the time steps [s].
+        steps: the number of base steps, or None.
+        t_end: their end [s], or None.
+        state: the first state, None for u0 and v0 of the system or a checkpoint.
+        tolerance: of the certificate, relative.
 
-    InputError for arguments of the wrong kind, and a state of another problem or inside the
-    obstacle. Collective.
+    Raises:
+        InputError: arguments of the wrong kind, or a state of another problem or inside the
+            obstacle.
     """
     check_problem_given(owner, problem)
     comm = problem.surface.comm
@@ -86,10 +96,10 @@ def checked_method(
     )
     check_methods(owner, *solvers, tolerance)
     problem, scheme = with_defaults(problem, scheme)
-    first, others = solvers
-    method = Method(
-        problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance
-    )
+    first, escalation = solvers
+    if first is None:
+        first = Automatic()
+    method = Method(problem, scheme, [first, *escalation], dt, tolerance)
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
@@ -107,31 +117,43 @@ def checked_method(
 def with_defaults(
     problem: ContactProblem, scheme: Scheme | None, others: Sequence[ContactProblem] = ()
 ) -> tuple[ContactProblem, Scheme]:
-    """Return the problem with a mass matrix and the scheme to run it with.
+    """Return (the problem with a mass matrix, the scheme to run it with).
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass
     at the contact nodes asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains
-    energy. Without a mass: the scheme's. ``others``: the first that has its matrices lends them.
+    energy. Without a mass: the scheme's.
+
+    Args:
+        problem: what is marched.
+        scheme: None for the one above.
+        others: problems; the first that has the same matrices lends them.
     """
     check_problem_given("march", problem)
-    for one in several("march", "others", others, "give a list of problems, or leave it out"):
-        check_problem_given("march", one)
+    for other in several("march", "others", others, "give a list of problems, or leave it out"):
+        check_problem_given("march", other)
     if scheme is None:
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
-        scheme = (
-            Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()
-        )
+        if problem.impact is None and not massive:
+            scheme = Trapezoidal()
+        else:
+            scheme = ZienkiewiczWoodTaylor()
     provides(
         "march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None"
     )
-    problem = problem if problem.mass is not None else replace(problem, mass=scheme.mass)
-    return next(
-        (one for other in others if (one := problem.beside(other)) is not None), problem
-    ), scheme
+    if problem.mass is None:
+        problem = replace(problem, mass=scheme.mass)
+    for other in others:
+        shared = problem.beside(other)
+        if shared is not None:
+            return shared, scheme
+    return problem, scheme
 
 
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
-    """Raise InputError unless it is a solver of steps."""
+    """Raise InputError unless ``value`` is a solver of steps.
+
+    ``owner`` and ``meaning`` say in the sentence whose argument it is, and which.
+    """
     provides(
         owner,
         meaning,
@@ -144,12 +166,16 @@ def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
     """Raise InputError unless these are solvers and a tolerance.
 
-    They are a solver or None, a list of solvers, and a tolerance between 0 and 1.
+    Args:
+        owner: the function of the user, for sentences of errors.
+        solver: a solver, or None.
+        escalation: a list of solvers.
+        tolerance: above 0, at most 1.
     """
     if solver is not None:
         check_solver(owner, solver)
-    for one in several(owner, "escalation", escalation, "give a list of solvers"):
-        check_solver(owner, one, "a solver of escalation")
+    for other in several(owner, "escalation", escalation, "give a list of solvers"):
+        check_solver(owner, other, "a solver of escalation")
     if not 0.0 < real(tolerance) <= 1.0:
         raise InputError(
             f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as "
@@ -160,20 +186,31 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
 def check_state(
     owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any
 ) -> None:
-    """Raise InputError, on all ranks, for a state of another problem. Collective.
+    """Raise InputError, on all ranks, for a state that no run can begin with. Collective.
 
-    So it does for one that penetrates the obstacle.
+    This is one of another problem, or one inside the obstacle. A scheme that ``penetrates``, whose
+    condition is one on velocities, may go on from states of its own runs (k > 0).
 
-    A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its
-    own runs (k > 0).
+    Args:
+        owner: the function of the user, for sentences of errors.
+        problem: that the state should be of.
+        state: the user's.
+        dt: the length of the first step [s].
+        tolerance: of the certificate, relative.
+        scheme: with which the run goes on.
     """
     check_sizes(owner, problem, state)
-    surface, rigid = problem.surface, problem.surface.compliance == 0.0
+    surface = problem.surface
     if state.k > 0 and getattr(scheme, "penetrates", False):
         return
+
+    # Gaps of rigid supports may be negative by round-off alone: SLACK times the tolerance of the
+    # largest displacement, way of a step or gap of all ranks.
+    rigid = surface.compliance == 0.0
     gap = np.where(rigid, surface.gap(state.t) - surface.normal_values(state.u), np.inf)
-    moved = max_abs(state.u), dt * max_abs(state.v), max_abs(surface.gap0[rigid])
-    inside, *sizes = surface.comm.max(np.array([np.max(-gap, initial=-np.inf), *moved]))
+    deepest = np.max(-gap, initial=-np.inf)
+    lengths = [max_abs(state.u), dt * max_abs(state.v), max_abs(surface.gap0[rigid])]
+    inside, *sizes = surface.comm.max(np.array([deepest, *lengths]))
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
         raise InputError(

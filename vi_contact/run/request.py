@@ -64,10 +64,10 @@ class RunRequest:
     def check(self) -> None:
         """Raise InputError for arguments that are wrong by themselves, or differ between ranks.
 
-        What depends on the problem is looked at by ``method.checked_method``. Collective.
+        What depends on the problem is looked at by ``method.choose_method``. Collective.
         """
         check_problem_given(OWNER, self.problem)
-        agree(self.comm, OWNER, self._compared())
+        agree(self.comm, OWNER, self._values_to_compare())
         self._check_outputs()
         self._check_fields_and_cross_check()
         optional(
@@ -85,7 +85,7 @@ class RunRequest:
                 "restart too, or leave it out"
             )
 
-    def _compared(self) -> dict[str, Any]:
+    def _values_to_compare(self) -> dict[str, Any]:
         """Return what has to be the same on all ranks: name -> value.
 
         Every rank has its part of the problem, and only rank 0 shows progress.

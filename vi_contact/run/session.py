@@ -36,7 +36,7 @@ from .request import RunRequest
 from .sampling import sampling_warning
 from .solution import Solution, energy_warning
 from .stop_signals import StopSignals
-from .time_steps import StepPlan, described, pieces_of
+from .time_steps import StepPlan, number_or_words, pieces_of
 from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
@@ -100,14 +100,15 @@ class Session:
 
     def settings(self) -> dict[str, Any]:
         """Return what was asked for, for log and summary."""
-        method, problem, solver = self.method, self.method.problem, self.method.solvers[0]
+        method, problem = self.method, self.method.problem
+        solver = method.solvers[0]
+        if self.request.cross_check is not None:
+            solver = getattr(solver, "primary", solver)
         return {
             "scheme": repr(method.scheme),
             "mass": repr(problem.mass),
-            "solver": repr(
-                solver if self.request.cross_check is None else getattr(solver, "primary", solver)
-            ),
-            "dt": described(method.dt),
+            "solver": repr(solver),
+            "dt": number_or_words(method.dt),
             "tolerance": method.tolerance,
             "ranks": self._comm.size,
             "unknowns": problem.system.space.unknowns,
@@ -128,7 +129,7 @@ class Session:
             return next(filter(None, self.steps(writer, signals)))
 
     def steps(self, writer: Writer, signals: StopSignals) -> Generator[Solution | None, None, None]:
-        """Do the same, and yield None after every base step, the solution in the end."""
+        """Make the remaining steps; yield None after every base step, the solution in the end."""
         begin = time.perf_counter()
         self.halved = self.place.halved
         try:
@@ -141,10 +142,11 @@ class Session:
         except BaseException as error:
             # whatever ends a run, what it has is saved; the error is raised again
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
-            reason = str(error) or ENDED.get(type(error), type(error).__name__)
-            told = getattr(error, "on_all_ranks", False)
             status = "interrupted" if interrupted else "failed"
-            self._rescue(writer, status, reason, time.perf_counter() - begin, all_ranks=told)
+            reason = str(error) or ENDED.get(type(error), type(error).__name__)
+            seconds = time.perf_counter() - begin
+            everywhere = getattr(error, "on_all_ranks", False)
+            self._rescue(writer, status, reason, seconds, all_ranks=everywhere)
             # on all ranks: none ends before the first has written
             if isinstance(error, Interrupted):
                 self._comm.bcast(None)
@@ -168,16 +170,23 @@ class Session:
         )
 
     def _march(self, writer: Writer, signals: StopSignals) -> Iterator[None]:
+        """Make the steps, record each, and yield after every base step.
+
+        A base step is where a frame, a checkpoint and the end of the run may stand; its halves are
+        recorded only.
+        """
         place = self.place
         loop = self.loop or March(
             self.method, self.step_plan, place.state, place.base, place.halved
         )
-        worst, begin = 0.0, time.perf_counter()
+        worst = 0.0
+        begin = time.perf_counter()
         self.wall_time.begin()
         with closing(Progress(self.left, shown=self.request.progress and self.root)) as progress:
             for state, report in loop:
-                self._keep(state, report, writer)
-                self.dt, self.halved = loop.dt, loop.halved
+                self._record(report, writer)
+                self.dt = loop.dt
+                self.halved = loop.halved
                 worst = max(worst, report.certificate.worst)
                 if loop.ended:
                     self.place = RestartPoint(
@@ -228,24 +237,35 @@ class Session:
         """Show a step to the callback, which may ask for the end of the run or raise, on one rank.
 
         Collective.
+
+        Args:
+            callback: the user's.
+            report: of the step; its arrays are made read-only.
+            writer: of the checkpoint, when the callback raises.
         """
         state = report.new
         for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
             if array is not None:
                 array.setflags(write=False)  # u and v are so
-        old, step, result = _locked(report.old), _locked(report.step), _locked(report.result)
-        report = _locked(replace(report, old=old, step=step, result=result))
+        report = replace(
+            report,
+            old=_read_only(report.old),
+            step=_read_only(report.step),
+            result=_read_only(report.result),
+        )
+        report = _read_only(report)
         place = f"after step {state.k}, t = {state.t:.6g} s"
         try:
-            said = on_all(self._comm, "it", lambda: callback(state, report))
+            answer = on_all(self._comm, "it", lambda: callback(state, report))
         except InputError as error:
             self._checkpoint(writer)
             raise InputError(f"the callback {place}: {error}") from error
-        if largest(self._comm, isinstance(said, bool | np.bool_) and bool(said)):
+        if largest(self._comm, isinstance(answer, bool | np.bool_) and bool(answer)):
             self.stopped = f"the callback ended the run {place}"
 
-    def _keep(self, state: State, report: Report, writer: Writer) -> None:
-        """Everything that is recorded of a step, be it a base step or a part of one."""
+    def _record(self, report: Report, writer: Writer) -> None:
+        """Record a step, be it a base step or a part of one. Collective."""
+        state = report.new
         if report.escalated and self.root:
             log.warning(
                 "step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method
@@ -268,34 +288,39 @@ class Session:
 
     def _measure(self) -> None:
         """Tell how much memory is taken, once all is set up and at the end. Collective."""
-        self.memory = memory(self.method.problem, None if self.last is None else self.last.step.A)
+        A = None if self.last is None else self.last.step.A
+        self.memory = memory(self.method.problem, A)
         if self.root:
             log.info("%s", in_words(self.memory))
 
     def _checkpoint(self, writer: Writer) -> None:
+        """Write a checkpoint of the last base step, unless there is one. Collective."""
         with self.wall_time.saving():
-            writer.checkpoint(self.place, lambda: self._about)
+            writer.checkpoint(self.place, lambda: self._identity)
 
     @cached_property
-    def _about(self) -> dict[str, Any]:
-        """What the run is of, for its checkpoints. Collective."""
-        method, start, end = (
-            self.method,
-            self.place.t_start,
-            self.place.t_start + self.step_plan.length,
-        )
+    def _identity(self) -> dict[str, Any]:
+        """Return what the run is of, for its checkpoints. Collective."""
+        method = self.method
+        start = self.place.t_start
+        end = start + self.step_plan.length
         # histories of the user's are asked at other times than those of steps
         with together(self._comm):
-            known = identity(method.problem, method.scheme, method.dt, start=start, end=end)
-        return {"run": known, "span": (start, end)}
+            run = identity(method.problem, method.scheme, method.dt, start=start, end=end)
+        return {"run": run, "span": (start, end)}
 
     def _rescue(
         self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool
     ) -> None:
-        """Save what there is.
+        """Save what there is of a run that ends with an error.
 
-        A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the same
-        error: others might not come.
+        Args:
+            writer: of the files.
+            status: "interrupted" or "failed".
+            reason: why, in words.
+            seconds: since the beginning [s].
+            all_ranks: whether all of them raise the same error. Only then, or on one rank, there is
+                a checkpoint of the last base step: other ranks might not come to write it.
         """
         # Of any kind: the error that ended the run is the one to tell, and it may keep each of
         # these from working.
@@ -310,6 +335,7 @@ class Session:
         writer.rescue(facts)
 
     def _tell_start(self) -> None:
+        """Write into the log what is run, on rank 0."""
         if not self.root:
             return
         log.info(
@@ -330,8 +356,15 @@ class Session:
             )
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
-        """Return the content of summary.json."""
+        """Return the content of summary.json.
+
+        Args:
+            status: how the run ended, in a word.
+            reason: why, in words; "" when it has finished.
+            seconds: since the beginning [s].
+        """
         cross_check = self.request.cross_check
+        seconds_per_step = float(np.median(list(self.seconds))) if self.seconds else float("nan")
         return {
             "status": status,
             "reason": reason,
@@ -344,9 +377,7 @@ class Session:
             "cross_check": None if cross_check is None else cross_check.report(),
             "seconds": seconds,
             "memory": self.memory,
-            "seconds_per_step": float(np.median(list(self.seconds)))
-            if self.seconds
-            else float("nan"),
+            "seconds_per_step": seconds_per_step,
             "seconds_per_linear_step": float("nan"),
         }
 
@@ -358,13 +389,11 @@ class Session:
         # none is made for this: it may not fit
         if self.last is None or not self.last.step.A.factorised:
             return float("nan")
-        problem, scheme, dt, old, A = (
-            self.method.problem,
-            self.method.scheme,
-            self.dt,
-            self.last.old,
-            self.last.step.A,
-        )
+        problem = self.method.problem
+        scheme = self.method.scheme
+        dt = self.dt
+        old = self.last.old
+        A = self.last.step.A
         none = np.zeros(problem.surface.count)
 
         def linear_step() -> None:
@@ -372,8 +401,8 @@ class Session:
             result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
             scheme.finish(problem, old, step, result, dt)
 
-        # the first is slower
-        return float(np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:]))
+        seconds = repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)
+        return float(np.median(seconds[1:]))  # the first is slower
 
 
 def _refuse_overflow(row: Row) -> None:
@@ -391,18 +420,17 @@ def _refuse_overflow(row: Row) -> None:
             )
 
 
-def _locked(value: T) -> T:
+def _read_only(value: T) -> T:
     """Return the value with read-only views of its arrays.
 
     Some of them, such as the gap at rest, belong to the problem.
     """
-    own: Any = value
-    views = {
-        one.name: array.view()
-        for one in fields(own)
-        if isinstance(array := getattr(own, one.name), np.ndarray)
-    }
-    for view in views.values():
-        view.setflags(write=False)
-    locked: T = replace(own, **views)
-    return locked
+    instance: Any = value  # a dataclass, which the type does not say
+    views: dict[str, Any] = {}
+    for field_ in fields(instance):
+        array = getattr(instance, field_.name)
+        if isinstance(array, np.ndarray):
+            views[field_.name] = array.view()
+            views[field_.name].setflags(write=False)
+    read_only: T = replace(instance, **views)
+    return read_only

@@ -24,7 +24,7 @@ from .files.folder import HISTORY_H5, locked, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
-from .method import Method, checked_method, with_defaults
+from .method import Method, choose_method, with_defaults
 from .recorders import Contact, Energy
 from .recorders.steps import Steps
 from .request import CrossCheck, RunRequest
@@ -152,7 +152,7 @@ def open_run(
     """
     request.check()
     wall_time = WallTime(request.wall_time, runs)
-    method = _choose_method(request, others)
+    method = _method_of(request, others)
     comm = request.comm
     folder = None if request.out is None else run_folder(comm, request.out)
     source = _folder_to_continue(request.restart, folder)
@@ -189,10 +189,10 @@ def open_run(
         yield session, Writer(method.problem, folder, request.fields, table, stored)
 
 
-def _choose_method(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
+def _method_of(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
     """Return how the run is marched, checked; ``others`` lend their matrices. Collective."""
     problem, scheme = with_defaults(request.problem, request.scheme, others)
-    return checked_method(
+    return choose_method(
         "simulate",
         problem,
         scheme,

@@ -19,7 +19,7 @@ from .session import Session
 from .simulate import open_run, simulate
 from .solution import Solution
 from .stop_signals import StopSignals
-from .together import Together, grouped
+from .together import Together, group_runs
 
 Ended = tuple[int, Solution | ViContactError]
 
@@ -27,20 +27,23 @@ Ended = tuple[int, Solution | ViContactError]
 def simulate_many(
     runs: Sequence[Mapping[str, Any]], *, tell: Callable[[float], None] = lambda share: None
 ) -> Iterator[Ended]:
-    """Yield (number of the run, its solution) as the runs end.
-
-    Each is given by the arguments of ``simulate``.
+    """Yield (number of the run, its solution) as the runs end. Collective.
 
     A run that fails yields its error instead, and the others go on; what cannot begin is told
     before the first step. Runs of one body step together, which costs less than one after the
     other: ``march_many`` says which can. The others are made one by one at the end. Every run has
     recorders and a folder of its own; its numbers are those of ``simulate`` to round-off, whatever
-    the company. In the place of progress lines ``tell`` gets the share of all steps that is done,
-    after every step. Collective.
+    the company.
 
-    Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as
-    ``simulate`` does, when all runs that have begun have written their checkpoints:
-    ``restart=True`` continues them.
+    Args:
+        runs: the arguments of ``simulate`` for each, by name.
+        tell: it gets the share of all steps that is done, after every step, in the place of
+            progress lines.
+
+    Raises:
+        InputError: arguments that ``simulate`` does not know, or a recorder or folder of two runs.
+        Interrupted, OutOfTime: as of ``simulate``, when all runs that have begun have written their
+            checkpoints: ``restart=True`` continues them.
     """
     given = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
     requests = [_request(run) for run in given]
@@ -84,7 +87,15 @@ def _request(run: Mapping[str, Any]) -> RunRequest:
 
 @dataclass
 class _Turn:
-    """One of the runs that take turns."""
+    """Hold one of the runs that take turns.
+
+    Attributes:
+        number: of the run in the list of all.
+        session: the run.
+        loop: its steps.
+        steps: the generator of its base steps, which yields its solution in the end.
+        begun: whether a step has been made.
+    """
 
     number: int
     session: Session
@@ -93,7 +104,7 @@ class _Turn:
     begun: bool = False
 
     def step(self) -> Solution | ViContactError | Interrupted | None:
-        """Make a base step; what the run has ended with, None when it goes on."""
+        """Make a base step; return what the run has ended with, None when it goes on."""
         self.begun = True
         with turn_of(self):
             try:
@@ -105,9 +116,9 @@ class _Turn:
         """End a run that nobody waits for any more, with its checkpoint."""
         with turn_of(self):
             self.steps.close()
-        self.session.last = self.session.loop = (
-            None  # the matrices of one that has ended serve nobody
-        )
+        # the matrices of a run that has ended serve nobody
+        self.session.last = None
+        self.session.loop = None
         self.loop.prepared.clear()
 
 
@@ -131,29 +142,34 @@ def _in_turn(requests: Sequence[RunRequest], tell: Callable[[float], None]) -> I
             )
             going.append(_Turn(number, session, loop, session.steps(writer, signals)))
             stack.callback(going[-1].close)
-        grouped([one.loop for one in going])
-        made, total = 0, sum(one.session.left for one in going)
+        group_runs([turn.loop for turn in going])
+        made = 0
+        total = sum(turn.session.left for turn in going)
         while going:
             begin = time.perf_counter()
-            group = going[0].loop.group  # one alone may need much memory: one after the other
-            ends = [
-                (one, one.step())
-                for one in going
-                if one is going[0] or (group and one.loop.group is group)
-            ]
-            made += len(ends)
+            # The runs of one group step together. Runs alone go one after the other, not in turns:
+            # each may need much memory. So do those that leave the group while others step.
+            first = going[0]
+            group = first.loop.group
+            turns: list[_Turn] = []
+            ends: list[Solution | ViContactError | Interrupted | None] = []
+            for turn in going:
+                if turn is first or (group and turn.loop.group is group):
+                    turns.append(turn)
+                    ends.append(turn.step())
+            made += len(turns)
             tell(min(made / max(total, 1), 1.0))
-            for one, end in ends:
-                if end is None:  # what was done in the turn of one was done for all
-                    one.session.seconds[-1] = (time.perf_counter() - begin) / len(ends)
+            for turn, end in zip(turns, ends, strict=True):
+                if end is None:  # what was done in the turn of one run was done for all
+                    turn.session.seconds[-1] = (time.perf_counter() - begin) / len(turns)
                     continue
-                one.loop.leave()
-                one.close()
-                going.remove(one)
+                turn.loop.leave()
+                turn.close()
+                going.remove(turn)
                 if isinstance(end, Interrupted):
                     stopped = end
                     going = [other for other in going if other.begun]
                 else:
-                    yield one.number, end
+                    yield turn.number, end
         if stopped is not None:
             raise stopped

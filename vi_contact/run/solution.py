@@ -62,9 +62,8 @@ LINES: Mapping[str, Sequence[tuple[str, ...]]] = {
         ("reason", "{reason}", "reason"),
     ),
 }
-CREATED = (
-    0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
-)
+# Of the largest energy: more than schemes without a fault gain at sensible time steps.
+CREATED = 0.01
 
 
 @dataclass(frozen=True)
@@ -97,12 +96,19 @@ class Solution:
         frame: int | None = None,
         continuous: bool = False,
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function.
+        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function. Collective.
 
-        It is ``fem.as_function`` of the end state.
+        It is ``fem.as_function`` of the end state, or ``fem.read_function`` of a frame in the run
+        folder.
 
-        With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``.
-        Collective. InputError for a system without a mesh, and without such a frame.
+        Args:
+            name: which of them.
+            t: the time of a frame [s].
+            frame: its number. With neither of the two it is the end state.
+            continuous: whether stress is averaged at the nodes, or constant in cells.
+
+        Raises:
+            InputError: the system has no mesh, or the run no such frame.
         """
         if not hasattr(self.problem.system.space, "V"):
             raise InputError(
@@ -123,9 +129,10 @@ class Solution:
 
     def summary(self) -> str:
         """Return the run in a few lines for people."""
-        return "\n".join(
-            f"  {name:<26} {value}" if name else value for name, value in _entries(self.facts)
-        )
+        lines = []
+        for name, value in _entries(self.facts):
+            lines.append(f"  {name:<26} {value}" if name else value)
+        return "\n".join(lines)
 
     __repr__ = summary
 
@@ -139,12 +146,12 @@ class Solution:
 
     def _repr_html_(self) -> str:
         """Return summary and figure for a notebook, without reference to anything outside."""
-        rows = "".join(
-            f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
-            if name
-            else f'<tr><td colspan="2">{escape(value)}</td></tr>'
-            for name, value in _entries(self.facts)
-        )
+        rows = ""
+        for name, value in _entries(self.facts):
+            if name:
+                rows += f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
+            else:
+                rows += f'<tr><td colspan="2">{escape(value)}</td></tr>'
         image = BytesIO()
         self.plot().savefig(image, format="png", dpi=70)
         picture = b64encode(image.getvalue()).decode()
@@ -170,56 +177,56 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
 
 
 def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """(name, value) of every line of the summary; those without a name are whole lines."""
-    dt, mean, plain = facts["dt"], facts["seconds_per_step"], facts["seconds_per_linear_step"]
-    ratio = (
-        f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
-    )
-    told = (
-        dict(facts)
-        | {"s": "s" * (facts["ranks"] > 1)}
-        | {
-            "length": f"({facts['base_steps']} base steps of {dt})"
-            if isinstance(dt, str)
-            else f"of {dt:g} s",
-            "solver": shorten(facts["solver"], 88, placeholder=" …"),
-            "ratio": ratio if np.isfinite(mean) else None,
-            "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
-            "halved_steps": facts["halved_steps"] or None,
-            "reason": facts["reason"] or None,
-        }
-    )
+    """Return (name, value) of every line of the summary; those without a name are whole lines."""
+    words = _words_of(facts)
+    entries = _lines("run", words)
+    for method, difference in (facts["cross_check"] or {}).items():
+        values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
+        entries.append((f"cross-check {method}", values))
+    entries += _lines("energy", words)
+    if "energy" in facts:
+        for name, title in LEDGER.items():
+            if name != "energy_defect":
+                entries.append((f"  {title}", f"{facts['energy'][name]: .6e}"))
+    entries += _lines("defect", words)
+    for warning in filter(None, (energy_warning(facts), facts.get("sampling"))):
+        text = f"WARNING: {warning}"
+        for line in wrap(text, 110, initial_indent="  ", subsequent_indent="  "):
+            entries.append(("", line))
+    return entries + _lines("end", words)
 
-    def lines(part: str) -> list[tuple[str, str]]:
-        return [
-            (name, text.format_map(told))
-            for name, text, *needs in LINES[part]
-            if all(told.get(one) is not None for one in needs)
-        ]
 
-    crossed = [
-        (
-            f"cross-check {method}",
-            ", ".join(f"{name} {value:.2e}" for name, value in difference.items()),
-        )
-        for method, difference in (facts["cross_check"] or {}).items()
-    ]
-    ledger = [
-        (f"  {title}", f"{facts['energy'][name]: .6e}")
-        for name, title in LEDGER.items()
-        if "energy" in facts and name != "energy_defect"
-    ]
-    warned = [
-        ("", text)
-        for one in filter(None, (energy_warning(facts), facts.get("sampling")))
-        for text in wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")
-    ]
-    return [
-        *lines("run"),
-        *crossed,
-        *lines("energy"),
-        *ledger,
-        *lines("defect"),
-        *warned,
-        *lines("end"),
-    ]
+def _words_of(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what fills in the lines of the summary: the facts, some of them in words.
+
+    A fact that is None leaves out the lines that need it.
+    """
+    dt = facts["dt"]
+    length = (
+        f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s"
+    )
+    mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
+    ratio = None
+    if np.isfinite(mean):
+        ratio = ""
+        if np.isfinite(plain):
+            ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}"
+    return {
+        **facts,
+        "s": "s" if facts["ranks"] > 1 else "",
+        "length": length,
+        "solver": shorten(facts["solver"], 88, placeholder=" …"),
+        "ratio": ratio,
+        "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
+        "halved_steps": facts["halved_steps"] or None,
+        "reason": facts["reason"] or None,
+    }
+
+
+def _lines(part: str, words: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return (name, value) of the lines of a part of ``LINES`` for which there are words."""
+    lines = []
+    for name, text, *needs in LINES[part]:
+        if all(words.get(fact) is not None for fact in needs):
+            lines.append((name, text.format_map(words)))
+    return lines

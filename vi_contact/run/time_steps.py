@@ -43,9 +43,8 @@ class Schedule:
         try:
             pairs = [(dt, float(until)) for dt, until in self.pieces]
         except (TypeError, ValueError, OverflowError):
-            given = shown(self.pieces)
             raise InputError(
-                f"Schedule pieces are {given}: give pairs ((dt, until), …) in seconds"
+                f"Schedule pieces are {shown(self.pieces)}: give pairs ((dt, until), …) in seconds"
             ) from None
         if not pairs:
             raise InputError(
@@ -88,7 +87,7 @@ class HalvedAtImpact:
 TimeSteps = float | Schedule | HalvedAtImpact
 
 
-def described(plan: TimeSteps) -> float | str:
+def number_or_words(plan: TimeSteps) -> float | str:
     """Return, for checkpoint and summary, a constant dt as the number it is, a plan in words."""
     return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
 
@@ -135,36 +134,47 @@ class StepPlan:
 def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> StepPlan:
     """Return the base steps from t0 to t_end, or so many.
 
-    There is an InputError when plan, steps or t_end make no sense.
-
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a
     restart, which builds it from the same t0, has the same steps. A step shorter than a millionth
     of dt would be round-off of these times, at the end of a piece and of the run alike, and is not
-    made. InputError for more than 1e9 steps.
+    made.
+
+    Args:
+        plan: how long the steps are [s].
+        steps: how many there are; None when t_end says it.
+        t_end: where they end [s]; None when ``steps`` says it.
+        t0: where they begin [s].
+
+    Raises:
+        InputError: plan, steps or t_end make no sense, or there are more than 1e9 steps.
     """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
     pieces = pieces_of(plan)
-    left = _wanted(steps, t_end, t0)
+    left = _most_steps(steps, t_end, t0)
     parts: list[tuple[float, int]] = []
-    t, made = t0, 0
+    t = t0
+    total = 0
     for size, until in pieces:
+        # So many steps of this piece as reach its end or t_end, and as are left of ``steps``.
         last = t_end is not None and t_end <= until + SLACK * size
         end = t_end if last and t_end is not None else until
-        done = int(min(_reaching(end - t, size), left, LARGEST + 1))
-        made += done
-        if made > LARGEST:
+        count = int(min(_steps_over(end - t, size), left, LARGEST + 1))
+        total += count
+        if total > LARGEST:
             goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
             raise InputError(
                 f"{goal} has more than {LARGEST:.0e} steps of dt = {size:g} s: give a larger dt or "
                 "end earlier"
             )
-        if done or not parts:
-            parts.append((size, done))
-        t, left = t + done * size, 0 if last else left - done
+        if count or not parts:
+            parts.append((size, count))
+        left = 0 if last else left - count
         if left == 0:
             return StepPlan(tuple(parts), halvings)
-        # the next piece begins where the plan says
-        t = until if abs(t - until) <= SLACK * size else t
+        # The next piece begins where the plan says, or where the last step went beyond that.
+        t += count * size
+        if abs(t - until) <= SLACK * size:
+            t = until
     rest = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
     raise InputError(
         f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {rest}: end it at "
@@ -172,14 +182,21 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
     )
 
 
-def _reaching(span: float, size: float) -> float:
-    """How many steps of a size reach over a span, infinite for an endless one."""
-    wanted = span / size
-    return max(ceil(wanted - max(SLACK, 1e-12 * wanted)), 0) if isfinite(wanted) else inf
+def _steps_over(span: float, size: float) -> float:
+    """Return how many steps of a size [s] reach over a span [s], infinite for an endless one."""
+    quotient = span / size
+    if not isfinite(quotient):
+        return inf
+    return max(ceil(quotient - max(SLACK, 1e-12 * quotient)), 0)
 
 
-def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
-    """At most so many steps, infinite when t_end counts."""
+def _most_steps(steps: int | None, t_end: float | None, t0: float) -> float:
+    """Return how many steps there are at most, infinite when t_end [s] counts.
+
+    Raises:
+        InputError: both are given or none, ``steps`` is no number of steps, or t_end is before t0
+            [s].
+    """
     if (steps is None) == (t_end is None):
         raise InputError("give either steps or t_end, and not both")
     if t_end is not None:
@@ -190,32 +207,31 @@ def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
         if _read(number, t_end, remedy) < t0:
             raise InputError(remedy)
         return inf
-    return int(
-        _read(
-            whole,
-            steps,
-            f"steps is {shown(steps)}: give a whole number of steps >= 0, or t_end in seconds",
-        )
-    )
+    remedy = f"steps is {shown(steps)}: give a whole number of steps >= 0, or t_end in seconds"
+    return int(_read(whole, steps, remedy))
 
 
 def _positive(dt: Any) -> float:
+    """Return a time step [s] as a float; InputError for what is none."""
     remedy = (
         f"dt is {shown(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
     )
-    found = float(_read(number, dt, remedy, positive=True))
-    if not 1.0 / LONGEST < found < LONGEST:
+    size = float(_read(number, dt, remedy, positive=True))
+    if not 1.0 / LONGEST < size < LONGEST:
         raise InputError(
-            f"dt is {found:g} s: give a time step between {1.0 / LONGEST:g} and {LONGEST:g} s"
+            f"dt is {size:g} s: give a time step between {1.0 / LONGEST:g} and {LONGEST:g} s"
         )
-    return found
+    return size
 
 
 def _read(check: Callable[..., Any], value: Any, remedy: str, **limits: Any) -> Any:
     """Return what the check makes of the value.
 
-    Raises:
-        InputError: says this sentence when the check refuses.
+    Args:
+        check: one of ``core.checks``, whose own sentence is not wanted.
+        value: the user's.
+        remedy: the sentence of the InputError when the check refuses.
+        limits: of the check.
     """
     try:
         return check("", "", value, **limits)

@@ -64,7 +64,7 @@ class Together(March):
             self.group.without([self])
 
 
-def grouped(runs: Sequence[Together]) -> None:
+def group_runs(runs: Sequence[Together]) -> None:
     """Put runs into groups that step together: all that can."""
     groups: list[list[Together]] = []
     for run in runs:

@@ -23,7 +23,7 @@ from ...core.problem import ContactProblem, with_values
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem, history_value
-from ..time_steps import TimeSteps, described, pieces_of
+from ..time_steps import TimeSteps, number_or_words, pieces_of
 
 ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
 # relative difference of numbers that count as equal: above round-off, below what anybody means to
@@ -64,7 +64,7 @@ def identity(
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
-        "dt": described(dt),
+        "dt": number_or_words(dt),
         "scheme": text_of(scheme),
         "mass": text_of(problem.mass),
         "impact law": text_of(problem.impact),
