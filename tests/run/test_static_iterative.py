@@ -81,7 +81,7 @@ def test_as_with_a_factor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     problem, most = PROBLEMS[name][0](), PROBLEMS[name][1]
     exact = vc.static_equilibrium(problem, solver=vc.Condensed())
     # nothing is factorised
-    for factor in ("petsc_algebra.PetscFactor", "copied_factor.ContactLast"):
+    for factor in ("matrices.petsc_algebra.PetscFactor", "matrices.copied_factor.ContactLast"):
         monkeypatch.setattr(f"vi_contact.fem.{factor}", None)
     Watched.prepared.clear()
     found = vc.static_equilibrium(problem, solver=Watched())

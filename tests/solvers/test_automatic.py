@@ -77,7 +77,7 @@ def test_friction_and_ranks_make_it_iterative_sooner(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(automatic, "IN_SPACE", 100)
     alone = COMM.size == 1 and load_cholmod(surface.comm) is not None
     assert rule.route(K, surface, False) == (vc.Condensed() if alone else vc.Iterative())
-    monkeypatch.setattr(automatic, "cholmod", lambda comm: None)
+    monkeypatch.setattr(automatic, "load_cholmod", lambda comm: None)
     assert rule.route(K, surface, False) == vc.Iterative()
     *_, (_, report) = march(replace(problem, friction=vc.Coulomb(0.3)), dt=BOX_DT, steps=2)
     assert report.result.method.startswith("Iterative")

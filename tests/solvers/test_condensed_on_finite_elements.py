@@ -138,7 +138,7 @@ def test_what_else_factorises(monkeypatch: Any) -> None:
         assert A.algebra.contact_last(A.matrix, last) is None
     finally:
         options.delValue("pc_factor_mat_ordering_type")
-    monkeypatch.setattr(copied_factor, "cholmod", lambda comm: None)
+    monkeypatch.setattr(copied_factor, "load_cholmod", lambda comm: None)
     assert A.algebra.contact_last(A.matrix, last) is None
     states = vc.march(problem, solver=vc.Condensed(), dt=BOX_DT, steps=3)
     assert all(not isinstance(report.step.A.factor, ContactLast) for _, report in states)
