@@ -2,9 +2,6 @@
 
 ``contact_last`` factorises with contact unknowns last, ``condensation`` condenses onto them,
 ``friction_sweeps`` and ``exchanges`` begin small contact problems, and ``compiler`` compiles their
-C files when they are first needed.
+C files when they are first needed. No name of this room is public: its functions trust what they
+are given.
 """
-
-from ..core.lazy import lazy
-
-__all__, __getattr__, __dir__ = lazy(__name__, __file__)
