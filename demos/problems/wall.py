@@ -18,7 +18,6 @@ from vi_contact.core.protocols import Excitation, ImpactLaw, MassLaw
 from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.core.units import STANDARD_GRAVITY
-from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.body.loads import BodyForce
 from vi_contact.fem.contact.surface import contact_surface
@@ -29,6 +28,7 @@ from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
 from vi_contact.meshes.wall import WallMesh
+from vi_contact.run.modal import lowest_frequency
 
 CASES = {
     "a": (4, 7, 10),  # the three labelled points of Fig. 2

@@ -18,8 +18,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.floor_spectra import konno_ohmachi
 from vi_contact.engineering.peak_values import HEADER
-from vi_contact.engineering.racking import racking
 from vi_contact.plots.maps import arc_position, thinned
+from vi_contact.run.recorders.racking import racking
 
 pytestmark = pytest.mark.serial
 

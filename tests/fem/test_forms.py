@@ -23,7 +23,6 @@ from demos.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem, soil
 from vi_contact.core.errors import InputError
 from vi_contact.core.ledger import energy_balance
-from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.fem import Forms, compat
 from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 from vi_contact.fem.output.fields import XDMF, VonMises
@@ -39,6 +38,7 @@ from vi_contact.laws import (
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.plots.deformed import read_frames
 from vi_contact.run.files.identity import differences, identity
+from vi_contact.run.modal import lowest_frequency
 from vi_contact.solvers import Lemke
 from vi_contact.solvers.volume import ReducedNewton, SemismoothNewton, TaoTron, Volume
 

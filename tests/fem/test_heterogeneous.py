@@ -16,7 +16,6 @@ import ufl
 
 from vi_contact import fem
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.fem import (
     BodyForce,
     Cells,
@@ -38,6 +37,7 @@ from vi_contact.laws import (
     Rayleigh,
     with_weight,
 )
+from vi_contact.run.modal import lowest_frequency
 from vi_contact.run.static import static_equilibrium
 from vi_contact.soil import FreeField
 

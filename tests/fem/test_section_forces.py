@@ -15,8 +15,8 @@ from vi_contact import fem, solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.state_checks import initial_state
-from vi_contact.engineering.resultants import tangent_vectors
 from vi_contact.fem import compat
+from vi_contact.run.recorders.contact_parts import tangent_vectors
 from vi_contact.soil.moving_base import base_motion
 
 WIDTH, HEIGHT = 0.5, 4.0

@@ -19,11 +19,11 @@ from wall_runs import POINTS, SCHEME, follow, history, model, problem
 from demos.problems.wall import Wall
 from vi_contact.core.algebra import Array, EffectiveMatrix
 from vi_contact.core.problem import ContactProblem
-from vi_contact.engineering.modal import lowest_frequency
 from vi_contact.laws.impact import ImpulseUpdate
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.cross_check import cross_check
 from vi_contact.run.march import march
+from vi_contact.run.modal import lowest_frequency
 from vi_contact.solvers.condensed import Condensed, PreparedCondensed
 from vi_contact.solvers.normal.hildreth import Hildreth
 

@@ -22,9 +22,9 @@ from ..core.checks import array
 from ..core.errors import InputError, of_machine
 from ..core.files import FIELDS, frames_of, open_hdf5
 from ..core.own_files import inner_folder
-from ..engineering.resultants import Geometry, tangent_vectors
 from ..meshes.rows import SIDES, connected
 from ..run.files.reading import RunFolder, read_run
+from ..run.recorders.contact_parts import Geometry, tangent_vectors
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane

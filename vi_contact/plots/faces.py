@@ -14,9 +14,9 @@ from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.files import frames_of
 from ..core.step import AXES
-from ..engineering.resultants import Geometry, tangent_vectors
 from ..meshes.rows import connected
 from ..run.files.reading import RunFolder
+from ..run.recorders.contact_parts import Geometry, tangent_vectors
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
 from .histories import STYLE, History, length_unit, plain, require_matplotlib, save, scale
 

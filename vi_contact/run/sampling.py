@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 
 from ..core.problem import ContactProblem
-from ..ground_motion.excitation import GroundMotion
-from ..ground_motion.record import Record
 from ..laws.excitation import FullSine, HalfSine, Rectangular, Tabulated
 
 # CHOSEN: steps in a period; a sine at its zeros and peaks still has its largest value at a step
@@ -67,10 +65,9 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
     if source is None or depth == 0:
         return
     name = type(source).__name__
-    if isinstance(source, GroundMotion | Record):
-        yield from _of_samples(
-            (source.record if isinstance(source, GroundMotion) else source).dt, dt
-        )
+    spacing = _spacing(source)
+    if spacing is not None:
+        yield from _of_samples(spacing, dt)
     elif isinstance(source, Tabulated):
         spacing = float(np.median(np.diff(source.times)))
         if dt > spacing * (1.0 + ROUNDED):
@@ -86,6 +83,12 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
     else:
         for held in _held(source):
             yield from _said(held, dt, depth - 1)
+
+
+def _spacing(source: Any) -> float | None:
+    """Return the distance [s] of the samples of a record, which holds them as ``acceleration``."""
+    is_record = isinstance(getattr(source, "acceleration", None), np.ndarray)
+    return getattr(source, "dt", None) if is_record else None
 
 
 def _frequency(source: Any) -> float | None:

@@ -23,7 +23,7 @@ from ..core.collective import together, users
 from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
 from ..core.stages import done
 from ..core.step import Recorder, Report, Row, State, StepResult
-from ..engineering.damping import NOT_COMPUTED, damping_in_words
+from .damping import NOT_COMPUTED, damping_in_words
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
 from .files.log import Progress, versions

@@ -17,8 +17,8 @@ Displacements and velocities are those of the equations: relative to the ground 
 shakes the body. docs/guide/outputs.md explains each recorder, docs/guide/extend.md one of your own.
 
 A recorder says when it is asked and what its columns are called. What it computes stands below, in
-``core.verify`` (energies), ``fem.output`` (work of nodal forces, cuts, strains) or ``engineering``
-(parts of the contact, racking), and runs without it.
+``core.ledger`` (energies), ``fem.output`` (work of nodal forces, cuts, strains) or
+``contact_parts`` (parts of the contact), and runs without it.
 """
 
 from ...core.lazy import lazy

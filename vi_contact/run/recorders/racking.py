@@ -1,17 +1,18 @@
-"""Record the racking of frames."""
+"""Record the racking of frames: the shear of four corners, which no rigid rotation changes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...core.algebra import Array
 from ...core.checks import array, column_name, instance
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import Columns, Report, Row, State
-from ...engineering.racking import racking
 
 
 @dataclass
@@ -83,3 +84,26 @@ class Racking:
             row[f"racking_{label}"] = float(shear)
             row[f"rotation_{label}"] = float(turn)
         return row
+
+
+def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
+    """Return (racking, rotation) of four corners (4, 2) [m] moved by (..., 4, 2) [m].
+
+    Each is (...,), in radians.
+
+    The displacement gradient G that fits the corners best, u = a + G X, gives racking = du_x/dy +
+    du_y/dx and rotation = (du_y/dx - du_x/dy)/2, anticlockwise. For a rectangle du_x/dy is the mean
+    over its sides, du_y/dx over bottom and top (Wang 1993: the racking ratio is this over the free
+    field's shear strain). InputError for corners on one line.
+    """
+    x = array("racking", "corners", corners, (4, 2), unit="m")
+    arms = x - x.mean(axis=0)
+    gram = arms.T @ arms
+    if np.linalg.eigvalsh(gram)[0] <= 1e-12 * np.trace(gram):
+        raise InputError("Racking: the four corners are on one line: give the corners of a frame")
+    gradient = np.einsum(
+        "...ki,kj->...ij", np.asarray(displacements, dtype=float), arms @ np.linalg.inv(gram)
+    )
+    return gradient[..., 0, 1] + gradient[..., 1, 0], 0.5 * (
+        gradient[..., 1, 0] - gradient[..., 0, 1]
+    )

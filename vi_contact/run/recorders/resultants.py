@@ -13,7 +13,7 @@ from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import AXES, Columns, Report, Row, State
 from ...core.surfaces import ContactSurface
-from ...engineering.resultants import DETERMINED, Part, Where, check_part
+from .contact_parts import DETERMINED, Part, Where, check_part
 
 # Quantity -> (unit, meaning).
 _MEANING: Columns = {

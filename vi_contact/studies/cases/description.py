@@ -16,12 +16,12 @@ from ...core.algebra import Array, Comm, largest, total
 from ...core.files import on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import AXES
-from ...engineering.damping import NOT_COMPUTED, damping_in_words, first_modes, first_open_period
 from ...fem.body.space import space_of
 from ...fem.mesh.tagged_mesh import Cells, Facets
 from ...fem.output.outline import cell_volumes, facets_with_cells, longest_edge, outline
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
+from ...run.damping import NOT_COMPUTED, damping_in_words, first_modes, first_open_period
 from ...run.files.folder import MODEL
 from ...run.loose_bodies import judge_loose_bodies
 from ...run.sampling import sampling_warning

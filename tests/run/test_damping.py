@@ -19,9 +19,9 @@ from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.engineering import first_modes
-from vi_contact.engineering.damping import damping_in_words
 from vi_contact.ground_motion.record import Record
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.run.damping import damping_in_words
 from vi_contact.studies import read_case
 from vi_contact.studies.cases.description import describe
 

@@ -37,12 +37,12 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.checks import array, column_name, function, instance, mask, optional, provides
-from ..core.corners import tangent_vectors
-from ..core.errors import InputError
-from ..core.step import AXES
-from ..core.surfaces import ContactSurface
+from ...core.algebra import Array, Indices, Mask
+from ...core.checks import array, column_name, function, instance, mask, optional, provides
+from ...core.corners import tangent_vectors
+from ...core.errors import InputError
+from ...core.step import AXES
+from ...core.surfaces import ContactSurface
 
 Where = Callable[[Array, Array], Mask]
 # with points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder

@@ -11,7 +11,7 @@ from chain import chain_system
 from scipy.linalg import eigh
 
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.modal import lowest_frequency
+from vi_contact.run.modal import lowest_frequency
 
 pytestmark = pytest.mark.serial
 
