@@ -32,7 +32,9 @@ def lazy(
         listed = ast.parse(stub.read()).body
     for node in listed:
         if isinstance(node, ast.ImportFrom):
-            module = f"{package}.{node.module}"
+            # each dot after the first leads out of a package
+            base = package.split(".")[: 1 - node.level or None]
+            module = ".".join([*base, str(node.module)])
             for one in node.names:
                 home.update(
                     dict.fromkeys(
