@@ -168,7 +168,8 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
 
     Collective.
     """
-    tdim, cell = mesh.topology.dim, mesh.topology.cell_type
+    tdim = mesh.topology.dim
+    cell = mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
     mesh.topology.create_connectivity(tdim, dim)
@@ -220,7 +221,8 @@ def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 
     They are those of the input, which any ranks leave as they are, where there are any.
     """
-    cells, given = mesh.topology.index_map(mesh.topology.dim), ()
+    cells = mesh.topology.index_map(mesh.topology.dim)
+    given = ()
     with suppress(RuntimeError):  # a part of a mesh has none: an empty array in 0.5, an error since
         given = mesh.topology.original_cell_index
     known = mesh.comm.allreduce(int(len(given) >= cells.size_local), op=MPI.MIN)

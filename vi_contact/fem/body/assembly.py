@@ -209,7 +209,8 @@ def assemble(
     v0 = _initial(space, "initial velocity", initial_velocity)
 
     reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
-    M, K = reduced.M, reduced.K
+    M = reduced.M
+    K = reduced.K
     system = SemiDiscreteSystem(
         algebra=algebra,
         M=M,

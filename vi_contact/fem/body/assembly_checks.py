@@ -159,7 +159,8 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
     body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
     those of materials, and not the user's own forms.
     """
-    law, ratio = body.damping, body.largest_ratio
+    law = body.damping
+    ratio = body.largest_ratio
     if isinstance(law, DampingRatio) and not any(
         callable(one.xi) or one.xi for _, one in body.materials
     ):
@@ -239,7 +240,8 @@ def refuse_folded(mesh: Mesh) -> None:
 
     The Jacobian J of such a cell changes its sign: |∫ sign(det J)| < ∫ 1 over the cell.
     """
-    size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
+    size = ufl.TestFunction(compat.cell_space(mesh))
+    det = ufl.JacobianDeterminant(mesh)
     signed, whole = (
         compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
         for one in (det / abs(det), 1.0)

@@ -145,7 +145,8 @@ def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
 
     Collective.
     """
-    d, u = space.dimension, compat.function(space.V)
+    d = space.dimension
+    u = compat.function(space.V)
     stress = on_all(space.comm, "Forms: stress", lambda: call(u))
     shape = getattr(stress, "ufl_shape", None)
     if shape != (d, d) and not (d == 2 and shape == (3, 3)):

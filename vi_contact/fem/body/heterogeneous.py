@@ -101,10 +101,8 @@ def _is_function(value: Any) -> bool:
 
 
 def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
-    found, domains = (
-        compat.function(space),
-        extract_domains(value) if isinstance(value, Expr) else (),
-    )
+    found = compat.function(space)
+    domains = extract_domains(value) if isinstance(value, Expr) else ()
     if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):
         raise InputError(
             f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body"

@@ -157,7 +157,8 @@ class Prescribed:
 
     def same_motion(self, other: "Prescribed") -> bool:
         """Return whether both say the same of the components that both prescribe."""
-        mine, theirs = self.components, other.components
+        mine = self.components
+        theirs = other.components
         apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
         return apart or all(
             _same(one, two) for one, two in zip(self.motions, other.motions, strict=True)

@@ -55,7 +55,8 @@ def release(
     check_sizes("release", static, state)
     before, after = _spaces(static, problem)
     nodal = before.expand(static.cartesian(state.u), state.t)
-    added, u0 = _stand(before, after, nodal), after.restrict(nodal)
+    added = _stand(before, after, nodal)
+    u0 = after.restrict(nodal)
     still = np.zeros_like(u0)
     _, first = started(problem, u0, still, state)
     _refuse_moved(static, state, nodal, problem, first)
@@ -66,7 +67,8 @@ def release(
 
 
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
-    before, after = static.system.space, problem.system.space
+    before = static.system.space
+    after = problem.system.space
     if (
         not isinstance(before, FemSpace)
         or not isinstance(after, FemSpace)
@@ -106,7 +108,9 @@ def started(
 
     u0 and v0 are on its own unknowns. That beginning has the contact of another state.
     """
-    surface, system, load = problem.surface, problem.system, problem.system.load
+    surface = problem.surface
+    system = problem.system
+    load = problem.system.load
 
     def turned(x: Array) -> Array:
         x = surface.in_frames(x)
@@ -147,7 +151,8 @@ def removed_support(
     It is the support that ``after`` does without and that carries most of this force; "" for none.
     The reaction is its resultant, or its largest nodal force where this is larger.
     """
-    (old, new), found = _spaces(before, after), [("", 0.0)]
+    old, new = _spaces(before, after)
+    found = [("", 0.0)]
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
     size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))

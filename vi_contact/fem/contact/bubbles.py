@@ -57,14 +57,16 @@ class Bubbles(Rows):
 
 def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: bool) -> Bubbles:
     """Return the facets of a group that have a vertex of this rank, or all of them."""
-    mesh, local = space.mesh, np.asarray(facets.indices)
+    mesh = space.mesh
+    local = np.asarray(facets.indices)
     rows = facet_rows(space.V, local)
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     owner = (
         cell_of.array[cell_of.offsets[:-1][local]]
         < mesh.topology.index_map(mesh.topology.dim).size_local
     )
-    local, rows = local[owner], rows[owner]
+    local = local[owner]
+    rows = rows[owner]
     numbers, points = (hierarchy.with_ghosts(one) for one in (space.numbers, space.points))
     unknowns = numbers.astype(np.int64)[rows]
     wrong = (unknowns[:, 3:] < 0) & (unknowns[:, OTHERS] >= 0).any(axis=2)
@@ -78,7 +80,8 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
         space.comm,
     )
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
-    nodes, normals = space.node_of_block[rows], outward(mesh, local, geometry)
+    nodes = space.node_of_block[rows]
+    normals = outward(mesh, local, geometry)
     found = Bubbles(nodes[:, :3], nodes[:, 3:], unknowns[:, 3:], normals, *_integrals(points[rows]))
     # tied ones count there
     corners = np.hstack([found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)])
@@ -140,11 +143,13 @@ def averaged(
         np.searchsorted(nodes.numbers, corner, side, sorter=order) for side in ("left", "right")
     )
     known = np.flatnonzero(ends > starts)
-    best, row = np.full(len(known), -np.inf), np.zeros(len(known), dtype=np.int64)
+    best = np.full(len(known), -np.inf)
+    row = np.zeros(len(known), dtype=np.int64)
     for k in range(int((ends - starts).max(initial=0))):
         candidate = order[np.minimum(starts[known] + k, ends[known] - 1)]
         cosine = np.sum(found.normals[known // 3] * nodes.normals[candidate], axis=1)
-        row, best = np.where(cosine > best, candidate, row), np.maximum(cosine, best)
+        row = np.where(cosine > best, candidate, row)
+        best = np.maximum(cosine, best)
     numbers, first, column = np.unique(found.middles, return_index=True, return_inverse=True)
     sums = np.bincount(row, found.areas.ravel()[known], minlength=len(nodes.numbers))
     places = np.repeat(row, 3), column.reshape(-1, 3)[known // 3].ravel()

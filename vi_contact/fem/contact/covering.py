@@ -97,7 +97,8 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
 
     None is where there is no whole facet to carry them, and none of a facet at a weld.
     """
-    facets, common = covered.facets, covered.common
+    facets = covered.facets
+    common = covered.common
     # no node of a facet at a weld is carried
     nodes = asked.copy()
     nodes[facets[common[facets].any(axis=1)]] = False
@@ -108,7 +109,8 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
     whole = np.flatnonzero(within if within.any() else apart)
     some = np.flatnonzero(nodes[facets].any(axis=1))
     if not len(whole):
-        nodes, some = np.zeros_like(nodes), some[:0]
+        nodes = np.zeros_like(nodes)
+        some = some[:0]
     # a facet that is hardly covered counts unless it has a node whose condition it alone would be
     alone = (covered.share < LEAST_SHARE) & ~nodes
     used = (covered.parts > LEAST_COVERED) | ~alone[facets].any(axis=1)

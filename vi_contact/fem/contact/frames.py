@@ -95,13 +95,15 @@ class NodalFrames:
     """
 
     def __init__(self, numbers: Indices, points: Array, directions: Array, held: Mask) -> None:
-        self.points, self.directions = points, directions
+        self.points = points
+        self.directions = directions
         self._refuse_prescribed(held)
         self.numbers, first, place = np.unique(numbers, return_index=True, return_inverse=True)
         self.place: Indices = place.ravel()
         self.double: Mask = np.bincount(self.place) > 1
         column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
-        self.column, self.turns = column[self.place], self.blocks.copy()
+        self.column = column[self.place]
+        self.turns = self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
         for slots in same_node(self.place):
             self._refuse_dependent(slots)
@@ -125,7 +127,8 @@ class NodalFrames:
 
         They are its direction, and those that rub.
         """
-        m, d = self.place.size, self.blocks.shape[1]
+        m = self.place.size
+        d = self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
         np.put_along_axis(own, tangential_columns(self.column, d), self.rubs, axis=1)
         own[np.arange(m), self.column] = True
@@ -186,7 +189,8 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
 
     ``data``: gap0, weights and whatever else it holds of each condition of this rank. Collective.
     """
-    comm, d = space.comm, space.dimension
+    comm = space.comm
+    d = space.dimension
     starts = np.cumsum([0, *comm.sum(np.array([float(len(part.slots)) for part in parts]))]).astype(
         np.int64
     )
@@ -197,7 +201,9 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
         comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts)
     )[0]
     index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
-    place, column, count = frames.place, frames.column, len(slots)
+    place = frames.place
+    column = frames.column
+    count = len(slots)
     tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
     turn = _turn(space, frames.turns, index)
     dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
@@ -252,14 +258,19 @@ def _coupling(
     if all(part.facing is None and not part.bubbles for part in parts):
         return None
     _refuse_chains(space, parts)
-    algebra, n = space.algebra, len(space.ids)
-    first, total = algebra.first(n), space.unknowns
-    own, entries, start = [np.zeros(0, dtype=np.int64)], [sp.csr_matrix((0, total))], 0
+    algebra = space.algebra
+    n = len(space.ids)
+    first = algebra.first(n)
+    total = space.unknowns
+    own = [np.zeros(0, dtype=np.int64)]
+    entries = [sp.csr_matrix((0, total))]
+    start = 0
     relative = frames.own_vectors()
     for part in parts:
         slots = slice(start, start + len(part.nodes.numbers))
         start = slots.stop
-        place, faced = frames.place[slots], []
+        place = frames.place[slots]
+        faced = []
         if part.facing is not None:
             faced.append((part.facing, _turns(space, frames, part.facing.nodes.numbers)))
         faced += [
@@ -292,7 +303,8 @@ def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
     d = space.dimension
     known = np.zeros((len(space.nodes), 1 + d * d))
     own = space.blocks_of(frames.numbers)
-    known[own, 0], known[own, 1:] = 1.0, frames.turns.reshape(-1, d * d)
+    known[own, 0] = 1.0
+    known[own, 1:] = frames.turns.reshape(-1, d * d)
     found = space.at_nodes(space.leaders(numbers), known)
     return np.asarray(np.where(found[:, :1, None] > 0.0, found[:, 1:].reshape(-1, d, d), np.eye(d)))
 
@@ -302,7 +314,8 @@ def _faced(
 ) -> sp.csr_matrix:
     """Coefficients (rows, ``total`` unknowns û) of direction·sum_j P_sj u_j."""
     shares = sp.csr_matrix(facing.P[rows])
-    row, partners = np.repeat(np.arange(len(rows)), np.diff(shares.indptr)), shares.indices
+    row = np.repeat(np.arange(len(rows)), np.diff(shares.indptr))
+    partners = shares.indices
     values = shares.data[:, None] * np.matmul(directions[row][:, None, :], turns[partners])[:, 0]
     unknowns = facing.nodes.unknowns[partners]
     used = (unknowns >= 0) & (values != 0.0)

@@ -144,12 +144,11 @@ class NodeToNode:
 
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
         """Place of the nearest node opposite among those of side 2, -1 for none."""
-        x, count, spacing = (
-            one.nodes.points,
-            len(two.nodes.points),
-            _spacing(one.nodes.points, size),
-        )
-        reach, together = self.tolerance * spacing, 2.0 * min(self.tolerance, BESIDE) * spacing
+        x = one.nodes.points
+        count = len(two.nodes.points)
+        spacing = _spacing(one.nodes.points, size)
+        reach = self.tolerance * spacing
+        together = 2.0 * min(self.tolerance, BESIDE) * spacing
         from scipy.spatial import cKDTree  # late: it takes a while
 
         away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
@@ -173,7 +172,8 @@ class NodeToNode:
                 np.linalg.norm(two.nodes.points[these] - two.nodes.points[these[0]], axis=1)
                 <= together[row]
             )
-            these, apart = these[at_one_place], apart[at_one_place]
+            these = these[at_one_place]
+            apart = apart[at_one_place]
             chosen = one_of(
                 surfaces[0],
                 row,
@@ -215,7 +215,8 @@ def _opposite(
     # where several bodies meet they have a node each at one place, told apart by their normals
     # first
     alike = distance <= least[:, None] + ONE_PLACE * reach[:, None]
-    rows, nearest = np.arange(len(reach)), np.where(alike, slope, np.inf).argmin(axis=1)
+    rows = np.arange(len(reach))
+    nearest = np.where(alike, slope, np.inf).argmin(axis=1)
     found = np.isfinite(least)
     places = np.broadcast_to(places, distance.shape)
     partner = np.where(found, places[rows, nearest], -1)

@@ -259,7 +259,9 @@ def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
         common: (m,) nodes of side 1 that are nodes of side 2 too.
     """
     v = ours.nodes.shape[1]
-    weights, full, inside = [], [], []
+    weights = []
+    full = []
+    inside = []
     for block in blocks:
         looks = block.looks
         weights.append(block.own.sum(axis=2) * looks.asking)

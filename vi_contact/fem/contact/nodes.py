@@ -78,7 +78,8 @@ def asked(
     """
     if comm.size == 1:
         return ask(*values)
-    answer, failed = (), False
+    answer = ()
+    failed = False
     try:
         answer = ask(*values)
     except Exception:  # also of a user's function: the other ranks must not wait for this one

@@ -94,7 +94,8 @@ def _within(ways: Array, arm: Array) -> Mask:
     middle = arm.sum(axis=0)
     if np.linalg.norm(middle) < FLAT:  # the node is in the middle of its facet
         return np.ones(len(ways), dtype=bool)
-    low, high = np.min(_angles(middle, arm)), np.max(_angles(middle, arm))
+    low = np.min(_angles(middle, arm))
+    high = np.max(_angles(middle, arm))
     angles = _angles(middle, ways)
     return np.asarray((angles >= low - BORDER) & (angles <= high + BORDER) & (high - low > BORDER))
 

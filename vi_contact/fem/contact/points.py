@@ -91,7 +91,8 @@ def contact_points(
             f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle"
         )
     numbers = integers(OWNER, "nodes", nodes, (None,))
-    m, d = len(numbers), space.dimension
+    m = len(numbers)
+    d = space.dimension
     if not m:
         raise InputError(f"{OWNER}: nodes is empty; list the nodes that may touch")
     outward = _spread("normals", normals, (m, d))
@@ -102,7 +103,8 @@ def contact_points(
         )
     area = _spread("weights", 1.0 if weights is None else weights, (m,), "m²")
     every = _nodes(space, "nodes", numbers, outward / length[:, None], area)
-    directions, faced = every.normals, None
+    directions = every.normals
+    faced = None
     gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
     if obstacle is not None:
         with together(space.comm):  # an obstacle of the user's may fail on one rank
@@ -132,10 +134,8 @@ def _nodes(
     space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array
 ) -> Nodes:
     """Return what all ranks need to know of nodes. Collective."""
-    d, own = (
-        space.dimension,
-        np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers]),
-    )
+    d = space.dimension
+    own = np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
     found = space.at_nodes(numbers, own)
     for number in numbers[found[:, 0] == 0.0]:
         raise InputError(

@@ -96,8 +96,10 @@ def contact_surface(
     )
     angle = checked_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
-    comm, every = space.comm, nodes_on(space, facets)
-    whole, hinge = every, hinges_of(space, every)
+    comm = space.comm
+    every = nodes_on(space, facets)
+    whole = every
+    hinge = hinges_of(space, every)
     if not hinges:
         refuse_hinges("contact_surface", (facets.name,), gathered_points(comm, every, hinge))
     chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
@@ -114,7 +116,9 @@ def contact_surface(
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
     order = np.argsort(_places(nodes, chosen), kind="stable")
-    nodes, directions, gap = nodes.pick(order), directions[order], gap[order]
+    nodes = nodes.pick(order)
+    directions = directions[order]
+    gap = gap[order]
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
@@ -124,7 +128,8 @@ def contact_surface(
     conditions = NodalConditions(
         nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
     )
-    held, kept = every.held.all(axis=1), np.isin(every.numbers, whole.numbers)
+    held = every.held.all(axis=1)
+    kept = np.isin(every.numbers, whole.numbers)
     kinds = dict(clamped_or_prescribed(space, every, held))
     kinds |= {
         "not listed": ~(held | kept),
@@ -153,7 +158,8 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
-    moved, values = moved_by_held(space, [conditions]), space.prescribed_values
+    moved = moved_by_held(space, [conditions])
+    values = space.prescribed_values
     return {"motion": lambda t: moved(values(t))[0], "slide": lambda t: moved(values(t))[1]}
 
 
@@ -166,15 +172,14 @@ def moved_by_held(
     conditions move towards their nodes, (m,), and along their tangents, (m, d-1). Both are
     collective.
     """
-    frames, free = (
-        NodalFrames(*given(conditions)),
-        ~joined_nodes([one.nodes for one in conditions]).held,
-    )
+    frames = NodalFrames(*given(conditions))
+    free = ~joined_nodes([one.nodes for one in conditions]).held
     free = (
         np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
         & frames.rubs
     )
-    tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
+    tangents = tangent_vectors(frames.directions, frames.place)
+    directions = frames.directions
     faced = [
         [part for part in (one.facing, *one.bubbles) if part is not None] for one in conditions
     ]
@@ -247,7 +252,8 @@ def _looking(
     """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
-        directions, gap = np.zeros_like(points), np.zeros(len(points))
+        directions = np.zeros_like(points)
+        gap = np.zeros(len(points))
         try:
             found = (
                 facing(Touching() if obstacle is None else obstacle, points, normals)
@@ -260,10 +266,8 @@ def _looking(
             rows = np.flatnonzero(
                 np.sum(found[0] * normals, axis=1) > EDGE_ON * np.linalg.norm(found[0], axis=1)
             )
-            directions[rows], gap[rows] = (
-                snapped(found[0][rows]),
-                admissible_gap(found[1][rows], points[rows], size),
-            )
+            directions[rows] = snapped(found[0][rows])
+            gap[rows] = admissible_gap(found[1][rows], points[rows], size)
         return directions, gap
 
     return ask
@@ -297,7 +301,9 @@ def one_per_direction(
     """
     if len(nodes.numbers) == len(whole.numbers):
         return nodes, directions, gap
-    weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
+    weights = nodes.weights.copy()
+    gap = gap.copy()
+    kept = np.ones(len(nodes.numbers), dtype=bool)
     numbers, starts, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
     entire = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
     for node, start, count in zip(
@@ -347,7 +353,9 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     if space.hierarchy is not None:
         blocks = np.intersect1d(blocks, space.hierarchy.vertices[1])
     blocks = blocks[np.argsort(space.nodes[blocks])]
-    weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
+    weights = values[blocks, 0]
+    sums = values[blocks, 1:]
+    held = space.held[blocks]
     if not largest(space.comm, len(blocks)):
         raise InputError(
             f"no contact nodes: boundary group '{facets.name}' is empty: choose a group with facets"
@@ -427,7 +435,8 @@ def merged(
     InputError for a node that is tied in some components only, or to one without such a
     condition.
     """
-    leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
+    leaders = space.leaders(nodes.numbers)
+    target = np.arange(len(nodes.numbers))
     for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
         alike = np.flatnonzero(nodes.numbers == leaders[row])
         turn = directions[alike] @ directions[row]
@@ -465,16 +474,12 @@ def with_ties(
     """
     tied = np.isin(nodes.numbers, space.tied_nodes)
     parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
-    every, (n, g) = (
-        joined_nodes([part[0] for part in parts]),
-        (np.concatenate([p[i] for p in parts]) for i in (1, 2)),
-    )
+    every = joined_nodes([part[0] for part in parts])
+    n, g = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
     if not len(g):
         return nodes, directions, gap
     every, n, shares = merged(space, name, every, n, angle)
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
-    nodes, directions = (
-        joined_nodes([nodes.pick(~tied), every.pick(own)]),
-        np.concatenate([directions[~tied], n[own]]),
-    )
+    nodes = joined_nodes([nodes.pick(~tied), every.pick(own)])
+    directions = np.concatenate([directions[~tied], n[own]])
     return nodes, directions, np.concatenate([gap[~tied], (shares @ g)[own]])

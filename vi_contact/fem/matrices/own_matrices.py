@@ -122,7 +122,8 @@ def own_system(
     What is given of this rank's rows and nodes is checked here. ``unsymmetric``: the algebra for C
     or K that are not symmetric.
     """
-    comm, n = algebra.comm, matrices["K"].rows
+    comm = algebra.comm
+    n = matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
     d = points.shape[1]
@@ -143,7 +144,8 @@ def own_system(
     if largest(comm, not free.all()):
         matrices = {name: algebra.block(A, free) for name, A in matrices.items()}
         load = load.in_basis(SerialMatrix(sp.identity(n, format="csc")[:, free]))
-    M, K = matrices["M"], matrices["K"]
+    M = matrices["M"]
+    K = matrices["K"]
     # of rows that stand still, when all move
     momenta = [(every @ r)[free] - M @ r[free] for r in influence.T]
     massless = M.diagonal() == 0.0
@@ -199,7 +201,8 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
         raise InputError(
             f"{owner}: component {c} of node {node} has several rows in unknowns; give it one"
         )
-    rows, free = integers(owner, "clamped", given["clamped"], (None,)), np.ones(n, dtype=bool)
+    rows = integers(owner, "clamped", given["clamped"], (None,))
+    free = np.ones(n, dtype=bool)
     if len(rows) and not 0 <= rows.min() <= rows.max() < n:
         raise InputError(
             f"{owner}: clamped goes from {rows.min()} to {rows.max()}; give numbers of rows below "
@@ -243,11 +246,19 @@ class MatrixSpace(NodalSpace):
 
         Collective.
         """
-        self.algebra, self.comm, self.points = algebra, algebra.comm, points
-        (k, d), n, first = points.shape, len(block), algebra.first(len(block))
-        self.dimension, self.unknowns = d, round(total(self.comm, n))
-        self.nodes, self.size = algebra.first(k) + np.arange(k), bounding_box(self.comm, points)
-        self.component, moves, every = component, component >= 0, np.arange(n)
+        self.algebra = algebra
+        self.comm = algebra.comm
+        self.points = points
+        k, d = points.shape
+        n = len(block)
+        first = algebra.first(len(block))
+        self.dimension = d
+        self.unknowns = round(total(self.comm, n))
+        self.nodes = algebra.first(k) + np.arange(k)
+        self.size = bounding_box(self.comm, points)
+        self.component = component
+        moves = component >= 0
+        every = np.arange(n)
         self.free_index = np.full(k * d, -1)
         self.free_index[(block * d + component)[moves]] = every[moves]
         self.numbers = np.where(self.free_index >= 0, first + self.free_index, -1).reshape(k, d)
@@ -264,14 +275,17 @@ def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
     Bodies are in the order of least numbers; K or a node joins those of one body. ``block``: (n,)
     the node of each, all on one rank.
     """
-    n, first = K.rows, algebra.first(K.rows)
-    entries, own = algebra.entries(K, np.arange(n)), first + np.arange(n)
+    n = K.rows
+    first = algebra.first(K.rows)
+    entries = algebra.entries(K, np.arange(n))
+    own = first + np.arange(n)
     entries.eliminate_zeros()
     _, leader, node = np.unique(block, return_index=True, return_inverse=True)
     row = np.concatenate([own, np.repeat(own, np.diff(entries.indptr))])
     column = np.concatenate([first + leader[node.ravel()], entries.indices])
     numbers = np.union1d(own, column)  # those of other ranks too
     away = (column < first) | (column >= first + n)
-    one, two = np.searchsorted(numbers, row), np.searchsorted(numbers, column)
+    one = np.searchsorted(numbers, row)
+    two = np.searchsorted(numbers, column)
     shared = np.union1d(one[away], two[away])
     return parts_of(algebra.comm, one, two, numbers, shared)[np.searchsorted(numbers, own)]

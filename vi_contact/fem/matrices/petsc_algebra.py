@@ -261,7 +261,8 @@ class PetscAlgebra:
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         """Return the matrix of entries between the n unknowns of one rank."""
-        places, every = (rows, self.first(n) + np.asarray(columns)), int(self.comm.mpi.allreduce(n))
+        places = (rows, self.first(n) + np.asarray(columns))
+        every = int(self.comm.mpi.allreduce(n))
         return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, every)), self.comm.mpi))
 
     def first(self, n: int) -> int:
@@ -271,7 +272,8 @@ class PetscAlgebra:
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         """Return these owned rows of A, their columns numbered over all ranks."""
         mat = as_petsc(A).mat
-        (start, _), (first, last) = mat.getOwnershipRange(), mat.getOwnershipRangeColumn()
+        start, _ = mat.getOwnershipRange()
+        first, last = mat.getOwnershipRangeColumn()
         chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
         whole = PETSc.IS().createStride(last - first, first, 1, comm=mat.comm)
         part = mat.createSubMatrix(chosen, whole)
@@ -308,7 +310,8 @@ class PetscAlgebra:
 
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
         """Return a factor with these unknowns last, or None where there is none."""
-        mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
+        mat = as_petsc(A).mat
+        given = PETSc.Options(PREFIX).getAll()
         # options of the user choose the factor
         chosen = any(not name.startswith(TUNING) for name in given)
         serves = not chosen and (self.comm.size == 1 or own_serves(mat))

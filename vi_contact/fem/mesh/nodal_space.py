@@ -84,7 +84,8 @@ class NodalSpace:
 
         They are zero for nodes of nobody.
         """
-        found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
+        found = np.zeros((len(numbers), values.shape[1]))
+        where = self.blocks_of(numbers)
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
 

@@ -39,19 +39,23 @@ class LargestStrain:
             raise InputError(
                 "LargestStrain does not know the strains before the checkpoint: run from the start"
             )
-        self._problem, self._space = problem, space_of("LargestStrain", problem.system)
-        V, d = self._space.V, self._space.dimension
+        self._problem = problem
+        self._space = space_of("LargestStrain", problem.system)
+        V = self._space.V
+        d = self._space.dimension
         if d == 1:
             raise InputError("LargestStrain: a body on a line has no shear strain; leave it out")
         tensors = compat.lagrange(V.mesh, 0, (d, d), continuous=False)
-        q, eps = ufl.TestFunction(tensors), ufl.sym(ufl.grad(ufl.TrialFunction(V)))
+        q = ufl.TestFunction(tensors)
+        eps = ufl.sym(ufl.grad(ufl.TrialFunction(V)))
         self._integral = PetscMatrix(
             compat.assemble_matrix(compat.compile_form(ufl.inner(q, eps) * ufl.dx))
         )
         volumes = np.array(compat.assemble_vector(compat.compile_form(q[0, 0] * ufl.dx)).array_r)
         self._volumes = volumes.reshape(-1, d * d)[:, :1]
         self._order = compat.cell_blocks(tensors)[: len(self._volumes), 0]
-        self._begin, self.values = self._nodal(state), np.zeros(len(self._volumes))
+        self._begin = self._nodal(state)
+        self.values = np.zeros(len(self._volumes))
         return self._row(state)
 
     def row(self, report: Report) -> Row:
