@@ -359,7 +359,15 @@ def in_symmetry_planes(normals: Array, held: Mask) -> Array:
 
 
 def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle: float) -> None:
-    """Log, on rank 0, how many nodes have several conditions, and where. Collective."""
+    """Log, on rank 0, how many nodes have several conditions, and where. Collective.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        nodes: this rank's, one for each condition.
+        slots: their numbers among those of all ranks.
+        angle: the feature angle [rad].
+    """
     _, first, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
     rows = first[counts > 1]
     parts = from_each(space.comm, (slots[rows], nodes.points[rows]))

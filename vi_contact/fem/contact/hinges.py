@@ -31,6 +31,8 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     as a facet is of two cells and may be of two ranks, all those round the node. Mid-points of
     edges and sides are no hinges.
     """
+    # facets at cells that have one of the nodes, and numbers of their own for pairs of a node and
+    # a facet, the same on every rank
     mesh = space.mesh
     d = space.mesh.topology.dim
     names = node_numbers(mesh)
@@ -91,6 +93,11 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
     """Raise InputError for hinges at these points (k, d), if there are any.
 
     The points are ordered; ``names`` are those of the boundaries.
+
+    Args:
+        owner: who asks.
+        names: those of the boundaries, one or two.
+        points: (k, d) places of the hinges, ordered [m].
     """
     if not len(points):
         return
@@ -110,7 +117,13 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
 
 
 def gathered_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
-    """Return the points of the chosen nodes of all ranks, by their numbers. Collective."""
+    """Return the points of the chosen nodes of all ranks, by their numbers. Collective.
+
+    Args:
+        comm: the ranks.
+        nodes: those of this rank.
+        chosen: which of them.
+    """
     parts = from_each(comm, (nodes.numbers[chosen], nodes.points[chosen]))
     numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
     return np.asarray(points[np.argsort(numbers)])

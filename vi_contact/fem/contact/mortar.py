@@ -59,7 +59,13 @@ class DualMortar:
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
-        """Return what the nodes of side 1 face by the dual mortar coupling."""
+        """Return what the nodes of side 1 face by the dual mortar coupling.
+
+        Args:
+            one: side 1.
+            two: side 2.
+            size: that of the mesh [m]; nothing here needs it.
+        """
         d = one.nodes.points.shape[1]
         if d == 1:
             raise InputError(

@@ -181,7 +181,16 @@ def _checked_pair(
     matching: Matching | None,
     feature_angle: float,
 ) -> tuple[FemSpace, float]:
-    """Return the space of the system and the angle [rad]; InputError for wrong arguments."""
+    """Return the space of the system and the angle [rad]; InputError for wrong arguments.
+
+    Args:
+        system: the system of both bodies.
+        facets1: side 1.
+        facets2: side 2.
+        points: a list of coordinates, or None.
+        matching: how nodes find what they face.
+        feature_angle: [rad].
+    """
     space = contact_space(
         "contact_pair",
         system,
@@ -211,6 +220,11 @@ def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side,
     """Return both sides, and which nodes of side 1 are shared; InputError unless they can part.
 
     Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        facets1: side 1.
+        facets2: side 2.
     """
     one = side_of(space, facets1)
     two = side_of(space, facets2)
@@ -231,7 +245,15 @@ def _pick_listed(
     matched: Matched,
     points: Sequence[Sequence[float]],
 ) -> tuple[Nodes, Matched, Mask]:
-    """Return the nodes nearest to the points, in their order, and which of side 1 are not."""
+    """Return the nodes nearest to the points, in their order, and which of side 1 are not.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1.
+        nodes: those of it with a condition.
+        matched: what they face.
+        points: (k, d) coordinates [m].
+    """
     chosen = listed(space, nodes, points, one.name)
     rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
     others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
@@ -269,7 +291,14 @@ def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict
 
 
 def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> None:
-    """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered."""
+    """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1.
+        two: side 2.
+        little: numbers of these nodes.
+    """
     if len(little) and space.comm.rank == 0:
         where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
         log.warning(
@@ -289,6 +318,11 @@ def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
     """Return kind -> mask of the nodes of side 1 held in every component, at rest or moved.
 
     Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        clamped: (m,) nodes held in every component.
     """
     sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
     moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
@@ -301,6 +335,13 @@ def _watched(
     """Return what watches nodes of side 1 that are held in every component. Collective.
 
     They are given of all ranks, and in front of others that are held so too.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1.
+        two: side 2.
+        nodes: nodes of side 1, of all ranks.
+        matched: what they face.
     """
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
     nodes = nodes.pick(known)
@@ -322,6 +363,13 @@ def _borrowed(
     """Return what nodes of side 1 without a pressure of their own take of neighbours.
 
     Those in front of nothing are left out.
+
+    Args:
+        space: the bodies' unknowns.
+        facets: those of side 1.
+        one: side 1.
+        kinds: what became of its nodes.
+        having: numbers of this rank's nodes with a pressure.
     """
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
@@ -331,6 +379,13 @@ def _borrowed(
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
     """Return which nodes of side 1 only glue bodies together. Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        two: side 2.
+        shared: (m,) nodes of both sides.
+        allowed: whether bodies may hang together so.
 
     Raises:
         InputError: there are some, and they are not ``allowed``.
@@ -353,6 +408,11 @@ def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
 
     They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
     They cannot part, as the two sides of a weld.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        two: side 2.
     """
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):

@@ -34,6 +34,13 @@ def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int)
     """Return in front of which facets at a node of side 1 (m,) those at its partner lie.
 
     They are seen along the normal.
+
+    Args:
+        one: side 1.
+        node: the place of the node on side 1.
+        normal: (d,) its normal.
+        two: side 2.
+        partner: the place of its partner on side 2.
     """
     frame = nodal_frames(normal[None])[0][:, 1:]
     ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame

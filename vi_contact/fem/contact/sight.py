@@ -301,7 +301,13 @@ def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
 
 
 def beside(looks: Looks, rows: Indices, points: Array) -> Array:
-    """Return how far points are from the normals through the middles of these rows of looks [m]."""
+    """Return how far points are from the normals through the middles of these rows of looks [m].
+
+    Args:
+        looks: those of side 1.
+        rows: which of them.
+        points: (…, 3) [m].
+    """
     offset = points - looks.middles[rows]
     along = np.sum(offset * looks.normals[rows], axis=-1)
     return np.sqrt(np.maximum(np.sum(offset**2, axis=-1) - along**2, 0.0))
