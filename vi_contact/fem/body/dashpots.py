@@ -224,6 +224,13 @@ def impedances(
 
     They are those of the ground beside the dashpots, whose constants given here hold the thickness
     already, or of their own material.
+
+    Args:
+        dashpots: the absorbing boundary.
+        section: that of the body.
+        lame: Lamé's first constant beside it, times the thickness [Pa m].
+        shear: the shear modulus, times the thickness [Pa m].
+        rho: the density, times the thickness [kg/m²].
     """
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho
@@ -238,7 +245,13 @@ def impedances(
 def describe_boundaries(
     boundaries: Sequence[Dashpots], rank: int, notes: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Return these notes and what each boundary expects, logged on rank 0."""
+    """Return these notes and what each boundary expects, logged on rank 0.
+
+    Args:
+        boundaries: absorbing boundaries.
+        rank: this one's.
+        notes: what comes first.
+    """
     notes += tuple(
         f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries
     )

@@ -161,6 +161,11 @@ class ElasticForms:
         """Return (sigma (d, d), sigma_zz) times the thickness of a strain.
 
         Given are the strain, that across the plane, and its trace.
+
+        Args:
+            eps: (d, d) strain.
+            across: strain across the plane.
+            trace: trace of the strain in the plane.
         """
         d = self.space.dimension
         fields = self.fields
@@ -216,6 +221,11 @@ class ElasticForms:
 
         It is the bilinear form with r as test function. Call ``follow`` when the values of the
         Function r have changed since.
+
+        Args:
+            name: "M", "C" or "K".
+            r: the Function that takes the place of the test function.
+            inside: one in the cells that count, zero in others.
         """
         form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
         if self.dilatation is None or name == "M":
@@ -296,6 +306,14 @@ def _anisotropic(
     """Return the matrix of all cells times the thickness, as a function.
 
     See ``Orthotropic.matrix``.
+
+    Args:
+        cells: the cellwise space.
+        degree: its degree, 0 or 1.
+        materials: pairs of local cells and a material.
+        fields: Lamé constants times the thickness, at the unknowns of ``cells``.
+        section: that of the body.
+        d: dimension.
     """
     if d == 1:
         raise InputError(

@@ -131,7 +131,13 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
 
 
 def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
-    """Return what is wrong with the values of this rank."""
+    """Return what is wrong with the values of this rank.
+
+    Args:
+        values: of each constant, at all unknowns of the space.
+        mine: which unknowns are of cells of the material.
+        space: the cellwise space.
+    """
     for name, (words, low, high, remedy) in RANGES.items():
         wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
         if len(wrong):

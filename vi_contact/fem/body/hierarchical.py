@@ -77,6 +77,11 @@ class Hierarchy:
         """Return owned nodal values (k, c)at mid-points too.
 
         They are given with a ``mean`` of the ends of edges at mid-points that are known.
+
+        Args:
+            nodal: (k, c) owned nodal values.
+            known: (k,) which of them are given.
+            mean: how the ends of an edge make the value of its mid-point, such as ``np.mean``.
         """
         every = self.with_ghosts(nodal)
         found = self.with_ghosts(known[:, None])[self._mids, 0] > 0.0

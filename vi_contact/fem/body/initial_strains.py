@@ -72,6 +72,11 @@ class InitialStrain(ActingLoad):
         """Return the tensors at points (k, d), less the history.
 
         They are in the shape (k, 9) of the room.
+
+        Args:
+            points: (k, d) [m].
+            room: (k, 9) where the tensors are written.
+            t: time [s].
         """
         value: Any = (
             self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
@@ -92,6 +97,12 @@ def _tensors(
     owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
 ) -> Array:
     """Return strains, one or one at each point, as tensors.
+
+    Args:
+        owner: who asks.
+        value: what was given.
+        leading: () for one strain, (k,) for one at each point.
+        dimensions: those that a body may have.
 
     Raises:
         InputError: none of these dimensions has the shape.

@@ -30,6 +30,13 @@ def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Ar
     """Evaluate the value at this rank's points, (k, d).
 
     InputError on all ranks for NaN, other shapes. Collective.
+
+    Args:
+        name: what messages call the value.
+        value: (d,) numbers, or a function of points and time.
+        points: (k, d) of this rank [m].
+        t: time [s].
+        comm: the ranks.
     """
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
@@ -40,6 +47,12 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
     """Return (values at the points, what is wrong with them or an empty text).
 
     The values are zeros where something is wrong.
+
+    Args:
+        name: what messages call the value.
+        value: (d,) numbers, or a function of points and time.
+        points: (k, d) [m].
+        t: time [s].
     """
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points

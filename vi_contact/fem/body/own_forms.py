@@ -150,7 +150,13 @@ class OwnForms(ElasticForms):
         return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        """Raise InputError: the forms do not tell the C of a material."""
+        """Raise InputError: the forms do not tell the C of a material.
+
+        Args:
+            eps: strain.
+            across: strain across the plane.
+            trace: trace of the strain.
+        """
         raise InputError(
             "InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0"
         )

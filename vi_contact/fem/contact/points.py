@@ -125,7 +125,14 @@ def contact_points(
 
 
 def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") -> Array:
-    """Values of this shape, also given once for all nodes."""
+    """Values of this shape, also given once for all nodes.
+
+    Args:
+        meaning: what messages call the value.
+        value: numbers for each node, or once for all.
+        shape: that of the result, nodes first.
+        unit: what messages call its unit.
+    """
     once = shape[1:] if np.ndim(value) < len(shape) else shape
     return np.array(np.broadcast_to(array(OWNER, meaning, value, once, unit=unit), shape))
 
@@ -133,7 +140,15 @@ def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") ->
 def _nodes(
     space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array
 ) -> Nodes:
-    """Return what all ranks need to know of nodes. Collective."""
+    """Return what all ranks need to know of nodes. Collective.
+
+    Args:
+        space: the unknowns of the matrices.
+        meaning: what messages call the nodes.
+        numbers: (m,) of nodes on any ranks.
+        normals: (m, d) outward unit normals.
+        weights: (m,) shares of the boundary [m], [m²].
+    """
     d = space.dimension
     own = np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
     found = space.at_nodes(numbers, own)

@@ -20,6 +20,11 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
 
     It is None without CHOLMOD, and where it cannot: not positive definite, which PETSc says better,
     or too large.
+
+    Args:
+        comm: the ranks.
+        mat: the PETSc matrix.
+        last: owned unknowns that come last.
     """
     functions = cholmod(comm)
     if functions is None:

@@ -179,7 +179,14 @@ class CompactAlgebra(PetscAlgebra):
 def algebra_for(
     comm: Any, dimension: int, unknowns: int, *, symmetric: bool = True
 ) -> PetscAlgebra:
-    """Return the algebra for the matrices of a body of this size."""
+    """Return the algebra for the matrices of a body of this size.
+
+    Args:
+        comm: the communicator.
+        dimension: unknowns of a node.
+        unknowns: how many there are on all ranks.
+        symmetric: whether all matrices are.
+    """
     if not symmetric:
         return UnsymmetricAlgebra(comm)
     return (

@@ -121,6 +121,13 @@ def own_system(
 
     What is given of this rank's rows and nodes is checked here. ``unsymmetric``: the algebra for C
     or K that are not symmetric.
+
+    Args:
+        owner: who asks.
+        algebra: that of symmetric matrices.
+        unsymmetric: that for C or K that are not symmetric.
+        matrices: M, K and perhaps C, of n owned rows.
+        given: the other arguments by name.
     """
     comm = algebra.comm
     n = matrices["K"].rows
@@ -172,7 +179,13 @@ def own_system(
 
 
 def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indices, Indices, Mask]:
-    """(points, node of each row, component of each row, rows that are free)."""
+    """(points, node of each row, component of each row, rows that are free).
+
+    Args:
+        owner: who asks.
+        n: how many rows this rank owns.
+        given: arguments by name.
+    """
     points = array(owner, "coordinates", given["coordinates"], (None, None), unit="metres")
     k, d = points.shape
     if d not in (1, 2, 3):
@@ -213,7 +226,13 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
 
 
 def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array, Array]:
-    """Load and initial values of all rows, zero where there are none."""
+    """Load and initial values of all rows, zero where there are none.
+
+    Args:
+        owner: who asks.
+        n: how many rows this rank owns.
+        given: arguments by name.
+    """
 
     def vector(name: str, value: Any, unit: str) -> Array:
         return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
@@ -274,6 +293,11 @@ def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
 
     Bodies are in the order of least numbers; K or a node joins those of one body. ``block``: (n,)
     the node of each, all on one rank.
+
+    Args:
+        algebra: that of K.
+        K: stiffness, of n owned rows.
+        block: (n,) the node of each row.
     """
     n = K.rows
     first = algebra.first(K.rows)

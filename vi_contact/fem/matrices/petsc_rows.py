@@ -28,6 +28,11 @@ def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
 
     Columns are numbered over all ranks; ``columns``: how many this rank owns, as many as rows
     unless given.
+
+    Args:
+        rows: (n, unknowns of all ranks).
+        comm: the communicator.
+        columns: how many of the columns this rank owns; n when None.
     """
     entries = sp.csr_matrix(rows)
     kind = PETSc.IntType

@@ -82,6 +82,11 @@ def system_from_matrices(
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
     """Return a copy of this rank's rows of a matrix with the layout of K.
 
+    Args:
+        name: "M", "C" or "K".
+        A: what was given.
+        K: the matrix whose layout counts.
+
     Raises:
         InputError: another type or layout.
     """

@@ -75,6 +75,12 @@ class Group:
 
         InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
         any rank has.
+
+        Args:
+            name: that of the group.
+            meshtags: DOLFINx MeshTags of the mesh.
+            value: which of their values.
+            mesh: the mesh.
         """
         owner = f"{cls.__name__}.tagged"
         things = cls.__name__.lower()
@@ -115,6 +121,11 @@ class Group:
 
         ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
         it fails or marks none on any rank.
+
+        Args:
+            name: that of the group.
+            mesh: the mesh.
+            marker: x (3, n) [m] -> (n,) truth values, as in DOLFINx.
         """
         owner = f"{cls.__name__}.where"
         things = cls.__name__.lower()

@@ -36,6 +36,14 @@ def work_beyond(
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not
     positive. ``motion``: points (k, d) -> virtual displacements (motions, k, d), linear in them;
     ``density``: one for all or one of each local cell. Collective.
+
+    Args:
+        space: the body's unknowns.
+        crossed: mask of local cells that count.
+        level: points (…, d) -> (…), not positive in the parts that count.
+        motion: points (k, d) -> virtual displacements (motions, k, d), linear in them.
+        density: a number, or one of each local cell.
+        load: a traction or body force, None for ``density`` alone.
     """
     d = space.dimension
     cells, nodes = _entities(
@@ -78,6 +86,11 @@ def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
     """Return (cells, geometry nodes) of the crossed cells of this rank.
 
     Or the nodes are those of the outer facets beside them.
+
+    Args:
+        mesh: the mesh.
+        crossed: mask of local cells.
+        facets: local facets of a traction, or None for cells.
     """
     dim = mesh.topology.dim
     owned = mesh.topology.index_map

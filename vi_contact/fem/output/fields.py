@@ -319,6 +319,11 @@ def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple
 
     They are made of those of the conditions: of several faces of a node the pressure of the one
     that is pressed most, and the highest status.
+
+    Args:
+        problem: the problem.
+        state: a state of it.
+        status: (conditions,) a number for each condition.
     """
     space = cast(NodalSpace, problem.system.space)
     blocks = blocks_of_conditions(problem)
@@ -342,6 +347,11 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
 
     These are added where conditions are those of vertices only: linear from end to end, zero at
     ends without a condition, so that ∫ p = sum r_n.
+
+    Args:
+        problem: the problem.
+        nodal: (k, c) owned nodal values.
+        mean: how the ends of an edge make the value of its mid-point.
     """
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:

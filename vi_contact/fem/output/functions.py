@@ -142,6 +142,12 @@ def read_function(
 def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     """Return the space of the problem.
 
+    Args:
+        owner: who asks.
+        problem: what was given.
+        name: the quantity.
+        continuous: whether the stress is projected.
+
     Raises:
         InputError: there is none, or no such quantity.
     """
@@ -160,6 +166,13 @@ def _function(
     """Return the Function of values at the owned nodes, (k,) or (k, d), at a time.
 
     The stress is that of displacements.
+
+    Args:
+        problem: the problem.
+        name: the quantity.
+        nodal: values at the owned nodes.
+        t: time [s].
+        continuous: whether the stress is projected.
     """
     system = problem.system
     space = space_of(name, problem.system)
@@ -276,7 +289,13 @@ def _stored(
 
 
 def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
-    """Return the number of the frame of a time, or of this number."""
+    """Return the number of the frame of a time, or of this number.
+
+    Args:
+        times: those of the frames [s].
+        t: the time that is asked for, or None.
+        frame: the number that is asked for, or None.
+    """
     told = ", ".join(f"{one:.9g}" for one in times[:12]) + (
         f", … {times[-1]:.9g}" if len(times) > 12 else ""
     )

@@ -42,7 +42,13 @@ Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 
 
 def check_actions(owner: str, loads: Any, gravity: Any) -> None:
-    """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
+    """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration.
+
+    Args:
+        owner: who asks.
+        loads: what was given.
+        gravity: what was given [m/s²].
+    """
     for load in as_tuple(loads):
         instance(owner, "loads", load, LOADS, "give the loads of fem.assemble")
     optional(array, owner, "gravity", gravity, (None,), unit="m/s²")
@@ -234,6 +240,11 @@ class NodalWork:
         """Return the numbers for nodal u, v, a (owned, d), less contact forces on held ones.
 
         ``at`` evaluates functions.
+
+        Args:
+            motion: nodal u, v, a (owned, d).
+            at: evaluates a function of time at that of the step.
+            contact: a state or balance with the contact forces.
         """
         total = np.zeros(self._count)
         r_t = 0.0 if contact.r_t is None else contact.r_t
@@ -249,7 +260,13 @@ class NodalWork:
         return self.space.comm.sum(total)
 
     def _of_load(self, k: int, load: Any, at: Callable[[Callable[[float], Any]], Any]) -> Array:
-        """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
+        """Return rᵀf on this rank, (count,); what does not change with time is evaluated once.
+
+        Args:
+            k: the number of the load.
+            load: the load.
+            at: evaluates a function of time at that of the step.
+        """
 
         def work(t: float) -> Array:
             if isinstance(load, LinearForm):

@@ -53,6 +53,11 @@ def outline(
 
     They are those of the boundary, group "", and of each group of it; in space and on a line the
     edges of a box around each region of local cells. The same on any ranks.
+
+    Args:
+        space: the body's unknowns.
+        tags: groups by name.
+        regions: local cells of each region.
     """
     mesh = space.mesh
     d = space.dimension

@@ -170,6 +170,12 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
     The nodes on the cut and behind it move, and the cells before them hold them; the other way
     round where sides of cells lie on the cut behind it only, as at a foot.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the cut.
+        given: its ends or corners (d, d) [m].
+        group: the cells that it cuts, all when None.
     """
     corners = np.asarray(given, dtype=float)
     mesh = space.mesh
