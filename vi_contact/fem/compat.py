@@ -167,8 +167,14 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     """Return local geometry nodes of the vertices of each entity, (n_entities, n_vertices).
 
     Collective.
+
+    Args:
+        mesh: the mesh.
+        dim: dimension of the entities.
+        entities: (n_entities,) local numbers.
     """
-    tdim, cell = mesh.topology.dim, mesh.topology.cell_type
+    tdim = mesh.topology.dim
+    cell = mesh.topology.cell_type
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, tdim)
     mesh.topology.create_connectivity(tdim, dim)
@@ -208,6 +214,11 @@ def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indice
     """Return the local cells, or facets of the boundary, whose vertices are all marked.
 
     ``marker`` is x (3, n) -> (n,).
+
+    Args:
+        mesh: the mesh.
+        dim: that of cells, or one less for facets.
+        marker: x (3, n) -> (n,) truth values.
     """
     mesh.topology.create_entities(dim)
     mesh.topology.create_connectivity(dim, mesh.topology.dim)
@@ -220,7 +231,8 @@ def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 
     They are those of the input, which any ranks leave as they are, where there are any.
     """
-    cells, given = mesh.topology.index_map(mesh.topology.dim), ()
+    cells = mesh.topology.index_map(mesh.topology.dim)
+    given = ()
     with suppress(RuntimeError):  # a part of a mesh has none: an empty array in 0.5, an error since
         given = mesh.topology.original_cell_index
     known = mesh.comm.allreduce(int(len(given) >= cells.size_local), op=MPI.MIN)
@@ -232,6 +244,11 @@ def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
     """Return dx (dim = topological dimension) or ds (one less) on these local entities.
 
     ds skips inner facets.
+
+    Args:
+        mesh: the mesh.
+        dim: that of cells for dx, one less for ds.
+        indices: local numbers of the cells or facets.
     """
     kind = "dx" if dim == mesh.topology.dim else "ds"
     tags = meshtags(
@@ -255,7 +272,14 @@ def vector_space(mesh: Mesh, degree: int = 1) -> Any:
 def lagrange(
     mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True
 ) -> Any:
-    """Make the space of Lagrange fields of values of this shape: (), (d,) or that of a matrix."""
+    """Make the space of Lagrange fields of values of this shape: (), (d,) or that of a matrix.
+
+    Args:
+        mesh: the mesh.
+        degree: 0, 1 or 2.
+        shape: () for numbers, (d,) for vectors, (n, n) for matrices.
+        continuous: whether fields are.
+    """
     family = "Lagrange" if continuous else "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
 
     def made() -> Any:

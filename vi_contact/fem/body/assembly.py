@@ -209,7 +209,8 @@ def assemble(
     v0 = _initial(space, "initial velocity", initial_velocity)
 
     reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
-    M, K = reduced.M, reduced.K
+    M = reduced.M
+    K = reduced.K
     system = SemiDiscreteSystem(
         algebra=algebra,
         M=M,
@@ -416,6 +417,12 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
 
 
 def _nodal(space: FemSpace, name: str, value: Any) -> Array:
-    """Return the values (k, d) of a constant or a function of points at the owned nodes."""
+    """Return the values (k, d) of a constant or a function of points at the owned nodes.
+
+    Args:
+        space: the body's unknowns.
+        name: what messages call the values.
+        value: (d,) numbers, or a function of points (k, d) [m].
+    """
     field: Any = (lambda points, t: value(points)) if callable(value) else value
     return evaluate(name, field, space.points, 0.0, space.comm)

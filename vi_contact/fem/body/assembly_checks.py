@@ -55,6 +55,17 @@ def check_body(
 ) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None.
 
+    Args:
+        mesh: that of the body.
+        material: a material, or (cells, material) pairs.
+        forms: the user's own forms, or None.
+        section: a section, or None.
+        damping: a damping law, or None.
+        base_inertia: whether the base counts.
+        degree: that of the displacement.
+        quadrature_degree: that of integrals, or None.
+        integration: "full" or "selective".
+
     Raises:
         InputError: objects of another kind, cells of another mesh.
     """
@@ -96,7 +107,13 @@ def check_body(
 
 
 def _check_material(mesh: Any, material: Any, forms: Any) -> None:
-    """Raise InputError unless there are forms, a material, or pairs of cells and materials."""
+    """Raise InputError unless there are forms, a material, or pairs of cells and materials.
+
+    Args:
+        mesh: that of the body.
+        material: what was given.
+        forms: the user's own forms, or None.
+    """
     if material is None and forms is None:
         raise InputError("assemble: neither a material nor forms are given; give one of them")
     if material is not None and not isinstance(material, KINDS):
@@ -129,7 +146,13 @@ def _check_section(section: Any, dimension: int) -> None:
 
 
 def _check_damping(damping: Any, section: Any, forms: Any) -> None:
-    """Raise InputError unless the damping is one, and goes with the forms and the section."""
+    """Raise InputError unless the damping is one, and goes with the forms and the section.
+
+    Args:
+        damping: what was given.
+        section: the section of the body.
+        forms: the user's own forms, or None.
+    """
     provides(
         OWNER,
         "damping",
@@ -159,7 +182,8 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
     body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
     those of materials, and not the user's own forms.
     """
-    law, ratio = body.damping, body.largest_ratio
+    law = body.damping
+    ratio = body.largest_ratio
     if isinstance(law, DampingRatio) and not any(
         callable(one.xi) or one.xi for _, one in body.materials
     ):
@@ -239,7 +263,8 @@ def refuse_folded(mesh: Mesh) -> None:
 
     The Jacobian J of such a cell changes its sign: |∫ sign(det J)| < ∫ 1 over the cell.
     """
-    size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
+    size = ufl.TestFunction(compat.cell_space(mesh))
+    det = ufl.JacobianDeterminant(mesh)
     signed, whole = (
         compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
         for one in (det / abs(det), 1.0)
@@ -263,6 +288,14 @@ def _check_integration(
     """Raise InputError for a word of integration that is none.
 
     So it does where cells cannot or need not be integrated selectively.
+
+    Args:
+        mesh: that of the body.
+        materials: those of the body, or its forms.
+        section: its section.
+        damping: its damping law.
+        degree: that of the displacement.
+        integration: the word.
     """
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":

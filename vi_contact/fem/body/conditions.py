@@ -148,6 +148,11 @@ def _contradictions(
     """Return pairs of conditions on the same facets of this rank that contradict.
 
     These are other values of one component, ties and dashpots.
+
+    Args:
+        held: what is clamped or prescribed.
+        tied: boundaries that move together.
+        damped: absorbing boundaries.
     """
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):

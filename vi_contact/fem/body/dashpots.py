@@ -139,7 +139,8 @@ class DashpotMatrix:
     """
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
-        self.space, self.dashpots = space, dashpots
+        self.space = space
+        self.dashpots = dashpots
         own = dashpots.material is not None
         if not own and not forms.fields:
             raise InputError(
@@ -160,7 +161,8 @@ class DashpotMatrix:
 
     def _matrix(self, facets: Any) -> Any:
         """∫ over some facets."""
-        u, v = ufl.TrialFunction(self.space.V), ufl.TestFunction(self.space.V)
+        u = ufl.TrialFunction(self.space.V)
+        v = ufl.TestFunction(self.space.V)
         n = ufl.FacetNormal(self.space.mesh)
         along = ufl.dot(u, n) * ufl.dot(v, n)
         density = self._normal * along + self._tangential * (ufl.inner(u, v) - along)
@@ -173,7 +175,8 @@ class DashpotMatrix:
         return self.space.comm.sum(np.array([e @ (whole @ e) for e in self.space.translations]))
 
     def _refuse_held(self) -> None:
-        name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
+        name = self.dashpots.facets.name
+        total = self._resistance(self.mat).sum()
         if np.isnan(total):
             raise InputError(
                 f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several "
@@ -200,7 +203,8 @@ class DashpotMatrix:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""
         whole = PetscMatrix(self.mat)
         rows = [self.space.pull(whole @ e) for e in self.space.translations]
-        columns, name = factor * np.column_stack(rows), type(self.dashpots).__name__
+        columns = factor * np.column_stack(rows)
+        name = type(self.dashpots).__name__
 
         def load(t: float) -> Array:
             v = np.asarray(motion(t))
@@ -220,6 +224,13 @@ def impedances(
 
     They are those of the ground beside the dashpots, whose constants given here hold the thickness
     already, or of their own material.
+
+    Args:
+        dashpots: the absorbing boundary.
+        section: that of the body.
+        lame: Lamé's first constant beside it, times the thickness [Pa m].
+        shear: the shear modulus, times the thickness [Pa m].
+        rho: the density, times the thickness [kg/m²].
     """
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho
@@ -234,7 +245,13 @@ def impedances(
 def describe_boundaries(
     boundaries: Sequence[Dashpots], rank: int, notes: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Return these notes and what each boundary expects, logged on rank 0."""
+    """Return these notes and what each boundary expects, logged on rank 0.
+
+    Args:
+        boundaries: absorbing boundaries.
+        rank: this one's.
+        notes: what comes first.
+    """
     notes += tuple(
         f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries
     )

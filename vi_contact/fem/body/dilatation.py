@@ -30,7 +30,8 @@ class MeanDilatation:
 
     def __init__(self, V: Any) -> None:
         self._cells = compat.cell_space(V.mesh)
-        q, u = ufl.TestFunction(self._cells), ufl.TrialFunction(V)
+        q = ufl.TestFunction(self._cells)
+        u = ufl.TrialFunction(V)
         self._integral = PetscMatrix(
             compat.assemble_matrix(compat.compile_form(q * ufl.div(u) * ufl.dx))
         )
@@ -48,7 +49,8 @@ class MeanDilatation:
         density = 1.0 / self._volume
         for modulus in (one for one in moduli if one is not None):
             density = density * modulus.x.array[: len(density)]
-        every, algebra = np.arange(len(density)), PetscAlgebra(self._cells.mesh.comm)
+        every = np.arange(len(density))
+        algebra = PetscAlgebra(self._cells.mesh.comm)
         weights = as_petsc(algebra.local(every, every, density, len(density))).mat
         different = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
         matrix.axpy(1.0, triple_product(weights, self._integral.mat), structure=different)

@@ -51,7 +51,14 @@ class GivenValues:
     def at(
         self, points: Array, places: tuple[Any, Any], t: float, derivative: int
     ) -> tuple[Any, str]:
-        """Return (the values, or zero rates, at the places; no defect)."""
+        """Return (the values, or zero rates, at the places; no defect).
+
+        Args:
+            points: (owned nodes, d) coordinates [m]; nothing here needs them.
+            places: owned blocks and components.
+            t: time [s].
+            derivative: 0 for the values, 1 and 2 for their rates.
+        """
         return (0.0 if derivative else self.values[places]), ""
 
     def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, tuple[int, ...]]]:

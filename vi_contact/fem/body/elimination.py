@@ -80,14 +80,27 @@ class Elimination:
 
 
 def _selection(comm: MpiComm, free: Mask, followed: Indices, unknowns: int) -> PetscMatrix:
-    """Return P: one 1 per free component, and one for each that follows another. Collective."""
+    """Return P: one 1 per free component, and one for each that follows another. Collective.
+
+    Args:
+        comm: the communicator of the matrices.
+        free: (full,) mask of the owned free components.
+        followed: (full,) the unknown that each owned component is or follows, -1 where it is held.
+        unknowns: how many there are on all ranks.
+    """
     kept = np.flatnonzero(followed >= 0)
     ones = sp.csr_matrix((np.ones(len(kept)), (kept, followed[kept])), shape=(len(free), unknowns))
     return PetscMatrix(aij_of(ones, comm.mpi, int(free.sum())))
 
 
 def _part(full: Any, rows: Mask, columns: Mask) -> Any:
-    """Return the rows and columns of a PETSc matrix that masks of owned ones name. Collective."""
+    """Return the rows and columns of a PETSc matrix that masks of owned ones name. Collective.
+
+    Args:
+        full: a PETSc matrix of all components.
+        rows: (full,) mask of owned rows.
+        columns: (full,) mask of owned columns.
+    """
     first = full.getOwnershipRange()[0]
     numbers = [(first + np.flatnonzero(mask)).astype(PETSc.IntType) for mask in (rows, columns)]
     return full.createSubMatrix(

@@ -53,6 +53,12 @@ def takes(name: str, call: Any, *arguments: str) -> None:
 def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
     """Return call(*arguments), a form linear in all of them on the mesh of the space. Collective.
 
+    Args:
+        said: the beginning of messages.
+        call: the user's function that makes the form.
+        space: that of the displacement.
+        *arguments: what the form is linear in.
+
     Raises:
         InputError: on all ranks otherwise; it begins with ``said``.
     """
@@ -101,7 +107,13 @@ def refuse_not_linear(said: str, form: Any) -> None:
 
 
 def matrix_of(name: str, space: FemSpace, compiled: Callable[[], Any]) -> Any:
-    """Return the assembled matrix of a form, finite. Collective."""
+    """Return the assembled matrix of a form, finite. Collective.
+
+    Args:
+        name: what messages call the form.
+        space: that of the displacement.
+        compiled: a function that returns the form compiled.
+    """
     matrix = compat.assemble_matrix(on_all(space.comm, f"Forms: {name}", compiled))
     if not np.isfinite(matrix.norm(PETSc.NormType.FROBENIUS)):
         raise InputError(
@@ -145,7 +157,8 @@ def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
 
     Collective.
     """
-    d, u = space.dimension, compat.function(space.V)
+    d = space.dimension
+    u = compat.function(space.V)
     stress = on_all(space.comm, "Forms: stress", lambda: call(u))
     shape = getattr(stress, "ufl_shape", None)
     if shape != (d, d) and not (d == 2 and shape == (3, 3)):

@@ -150,7 +150,8 @@ class ElasticForms:
 
         sigma_zz = 0 in plane stress and else.
         """
-        eps, trace = ufl.sym(ufl.grad(u)), self._trace(u)
+        eps = ufl.sym(ufl.grad(u))
+        trace = self._trace(u)
         if self.initial is None or u is self.u:
             return self.hooke(eps, 0.0, trace)
         own, across = self.initial.parts
@@ -160,8 +161,14 @@ class ElasticForms:
         """Return (sigma (d, d), sigma_zz) times the thickness of a strain.
 
         Given are the strain, that across the plane, and its trace.
+
+        Args:
+            eps: (d, d) strain.
+            across: strain across the plane.
+            trace: trace of the strain in the plane.
         """
-        d, fields = self.space.dimension, self.fields
+        d = self.space.dimension
+        fields = self.fields
         if self._anisotropic is None:
             sigma = fields["lame"] * trace * ufl.Identity(d) + 2 * fields["shear"] * eps
             sigma += fields["lame_out"] * across * ufl.Identity(d)
@@ -198,7 +205,9 @@ class ElasticForms:
 
         It is in the trial function ``u`` and the test function ``v``.
         """
-        u, v, fields = self.u, self.v, self.fields
+        u = self.u
+        v = self.v
+        fields = self.fields
         if name == "M":  # forms=… without a stress take the mass from here
             return fields["rho"] * ufl.inner(u, v) * ufl.dx
         stiffness = ufl.inner(self.stress(u), ufl.sym(ufl.grad(v)))
@@ -212,6 +221,11 @@ class ElasticForms:
 
         It is the bilinear form with r as test function. Call ``follow`` when the values of the
         Function r have changed since.
+
+        Args:
+            name: "M", "C" or "K".
+            r: the Function that takes the place of the test function.
+            inside: one in the cells that count, zero in others.
         """
         form = ufl.replace(self.bilinear(name), {self.u: self.v, self.v: inside * r})
         if self.dilatation is None or name == "M":
@@ -292,31 +306,42 @@ def _anisotropic(
     """Return the matrix of all cells times the thickness, as a function.
 
     See ``Orthotropic.matrix``.
+
+    Args:
+        cells: the cellwise space.
+        degree: its degree, 0 or 1.
+        materials: pairs of local cells and a material.
+        fields: Lamé constants times the thickness, at the unknowns of ``cells``.
+        section: that of the body.
+        d: dimension.
     """
     if d == 1:
         raise InputError(
             "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"
         )
-    n, trace = len(VOIGT[d]), np.array([float(i == j) for i, j in VOIGT[d]])
+    n = len(VOIGT[d])
+    trace = np.array([float(i == j) for i, j in VOIGT[d]])
     rows = n + (d == 2)  # the last one is that of the strain and the stress across the plane
     found = compat.function(compat.lagrange(cells.mesh, degree, (rows, rows), continuous=False))
     values = found.x.array.reshape(len(fields["lame"].x.array), rows, rows)
     for where, one in materials:
         dofs = np.ravel(compat.cell_blocks(cells)[where])
         if isinstance(one, Orthotropic):
-            told, corner = (
-                section.thickness * one.matrix(section, d),
-                section.thickness * one.stiffness[2, 2, 2, 2],
-            )
-            whole, across = told[:n], told[n:]
+            told = section.thickness * one.matrix(section, d)
+            corner = section.thickness * one.stiffness[2, 2, 2, 2]
+            whole = told[:n]
+            across = told[n:]
         else:
             lame, shear, out = (
                 fields[name].x.array[dofs][:, None, None] for name in ("lame", "shear", "lame_out")
             )
             whole = lame * np.outer(trace, trace) + shear * np.diag(1.0 + trace)
-            across, corner = out * trace, out + 2.0 * shear
-        values[dofs, :n, :n], values[dofs, n:, :n] = whole, across
-        values[dofs, :n, n:], values[dofs, n:, n:] = across.swapaxes(-1, -2), corner
+            across = out * trace
+            corner = out + 2.0 * shear
+        values[dofs, :n, :n] = whole
+        values[dofs, n:, :n] = across
+        values[dofs, :n, n:] = across.swapaxes(-1, -2)
+        values[dofs, n:, n:] = corner
     return found
 
 

@@ -101,10 +101,8 @@ def _is_function(value: Any) -> bool:
 
 
 def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
-    found, domains = (
-        compat.function(space),
-        extract_domains(value) if isinstance(value, Expr) else (),
-    )
+    found = compat.function(space)
+    domains = extract_domains(value) if isinstance(value, Expr) else ()
     if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):
         raise InputError(
             f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body"
@@ -133,7 +131,13 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
 
 
 def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
-    """Return what is wrong with the values of this rank."""
+    """Return what is wrong with the values of this rank.
+
+    Args:
+        values: of each constant, at all unknowns of the space.
+        mine: which unknowns are of cells of the material.
+        space: the cellwise space.
+    """
     for name, (words, low, high, remedy) in RANGES.items():
         wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
         if len(wrong):

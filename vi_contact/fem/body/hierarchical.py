@@ -44,8 +44,10 @@ class Hierarchy:
     """
 
     def __init__(self, space: Any) -> None:
-        V, self._space = space.V, space
-        blocks, around = compat.cell_blocks(V), supports(V)
+        V = space.V
+        self._space = space
+        blocks = compat.cell_blocks(V)
+        around = supports(V)
         places = [place for place, one in enumerate(around) if len(one) == 2]
         self._mids, found = np.unique(blocks[:, places], return_index=True)
         cell, place = np.divmod(found, len(places))
@@ -54,7 +56,8 @@ class Hierarchy:
         rows = np.empty(int(compat.cell_blocks(first).max(initial=-1)) + 1, dtype=np.int64)
         rows[compat.cell_blocks(first)] = blocks[:, : len(compat.sub_entities(V.mesh, 0))]
         self.vertices = first, rows[: first.dofmap.index_map.size_local]
-        self.H, self.back = self._shares(0.5), self._shares(-0.5)
+        self.H = self._shares(0.5)
+        self.back = self._shares(-0.5)
 
     def with_ghosts(self, values: Any) -> Array:
         """Return owned nodal values (k, c), c <= d, followed by those of the ghosts."""
@@ -74,11 +77,14 @@ class Hierarchy:
         """Return owned nodal values (k, c)at mid-points too.
 
         They are given with a ``mean`` of the ends of edges at mid-points that are known.
+
+        Args:
+            nodal: (k, c) owned nodal values.
+            known: (k,) which of them are given.
+            mean: how the ends of an edge make the value of its mid-point, such as ``np.mean``.
         """
-        every, found = (
-            self.with_ghosts(nodal),
-            self.with_ghosts(known[:, None])[self._mids, 0] > 0.0,
-        )
+        every = self.with_ghosts(nodal)
+        found = self.with_ghosts(known[:, None])[self._mids, 0] > 0.0
         every[self._mids[found]] = mean(every[self._ends[found]], axis=1)
         return every[: len(nodal)]
 
@@ -93,8 +99,11 @@ class Hierarchy:
 
     def _shares(self, share: float) -> PetscMatrix:
         """Return the identity and, in rows of mid-points, so much at the ends of their edges."""
-        space, algebra = self._space, PetscAlgebra(self._space.comm.mpi)
-        n, d, owned = len(space.ids), space.dimension, self._mids < len(space.nodes)
+        space = self._space
+        algebra = PetscAlgebra(self._space.comm.mpi)
+        n = len(space.ids)
+        d = space.dimension
+        owned = self._mids < len(space.nodes)
         own = space.free_index.reshape(-1, d)[self._mids[owned]]
         ends = self.with_ghosts(space.numbers).astype(np.int64)[self._ends[owned]]
         columns = np.concatenate(

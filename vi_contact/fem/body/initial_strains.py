@@ -72,6 +72,11 @@ class InitialStrain(ActingLoad):
         """Return the tensors at points (k, d), less the history.
 
         They are in the shape (k, 9) of the room.
+
+        Args:
+            points: (k, d) [m].
+            room: (k, 9) where the tensors are written.
+            t: time [s].
         """
         value: Any = (
             self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
@@ -92,6 +97,12 @@ def _tensors(
     owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
 ) -> Array:
     """Return strains, one or one at each point, as tensors.
+
+    Args:
+        owner: who asks.
+        value: what was given.
+        leading: () for one strain, (k,) for one at each point.
+        dimensions: those that a body may have.
 
     Raises:
         InputError: none of these dimensions has the shape.
@@ -118,10 +129,14 @@ class InitialStrains:
     """
 
     def __init__(self, body: ElasticForms, given: Sequence[InitialStrain]) -> None:
-        self._space, self._body, self._given, mesh = body.space, body, given, body.space.mesh
+        self._space = body.space
+        self._body = body
+        self._given = given
+        mesh = body.space.mesh
         degree = 0 if body.dilatation else self._space.degree - compat.is_simplex(mesh)
         self.tensors = compat.lagrange(mesh, degree, (3, 3), continuous=False)
-        self._field, cell = compat.function(self.tensors), ufl.TestFunction(compat.cell_space(mesh))
+        self._field = compat.function(self.tensors)
+        cell = ufl.TestFunction(compat.cell_space(mesh))
         self.parts = own, across = self._split(self._field)
         sigma, beyond = body.hooke(own, across, ufl.tr(own))
         self._work = self._space.compiled(ufl.inner(sigma, ufl.sym(ufl.grad(body.v))) * ufl.dx)
@@ -136,12 +151,14 @@ class InitialStrains:
 
     def _split(self, eps: Any) -> tuple[Any, Any]:
         """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
-        d, panel = self._space.dimension, isinstance(self._body.section, PlaneStress)
+        d = self._space.dimension
+        panel = isinstance(self._body.section, PlaneStress)
         free = d != 2 or panel
         if d == 1:
             # A bar cannot strain sideways, as its stiffness says: what is held there presses along
             # it.
-            lame, shear = self._body.fields["lame"], self._body.fields["shear"]
+            lame = self._body.fields["lame"]
+            shear = self._body.fields["shear"]
             sides = eps[1, 1] if panel else eps[1, 1] + eps[2, 2]
             return ufl.as_tensor([[eps[0, 0] + lame / (lame + 2 * shear) * sides]]), 0.0
         return ufl.sym(
@@ -165,7 +182,8 @@ class InitialStrains:
 
         Returned are the owned values.
         """
-        points, blocks = self.tensors.tabulate_dof_coordinates(), compat.cell_blocks(self.tensors)
+        points = self.tensors.tabulate_dof_coordinates()
+        blocks = compat.cell_blocks(self.tensors)
         values = self._field.x.array.reshape(-1, 9)
         values[:] = 0.0
         for one in self._given if only is None else (only,):

@@ -86,7 +86,8 @@ class LinearForm:
         """
         if space in self._once:
             return lambda t: np.asarray(self._once[space])
-        name, v = f"{NAME}: form", ufl.TestFunction(space.V)
+        name = f"{NAME}: form"
+        v = ufl.TestFunction(space.V)
         form = form_of(name, self.form, space, v)
         vector_of = on_all(space.comm, name, lambda: space.compiled(form))
         update = self.update

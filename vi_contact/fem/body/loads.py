@@ -30,6 +30,13 @@ def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Ar
     """Evaluate the value at this rank's points, (k, d).
 
     InputError on all ranks for NaN, other shapes. Collective.
+
+    Args:
+        name: what messages call the value.
+        value: (d,) numbers, or a function of points and time.
+        points: (k, d) of this rank [m].
+        t: time [s].
+        comm: the ranks.
     """
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
@@ -40,6 +47,12 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
     """Return (values at the points, what is wrong with them or an empty text).
 
     The values are zeros where something is wrong.
+
+    Args:
+        name: what messages call the value.
+        value: (d,) numbers, or a function of points and time.
+        points: (k, d) [m].
+        t: time [s].
     """
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
@@ -157,7 +170,8 @@ class Prescribed:
 
     def same_motion(self, other: "Prescribed") -> bool:
         """Return whether both say the same of the components that both prescribe."""
-        mine, theirs = self.components, other.components
+        mine = self.components
+        theirs = other.components
         apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
         return apart or all(
             _same(one, two) for one, two in zip(self.motions, other.motions, strict=True)

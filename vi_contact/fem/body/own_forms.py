@@ -82,7 +82,8 @@ class OwnForms(ElasticForms):
                 "assemble: forms=… have no mass; give Forms(…, mass=), or a material for its "
                 "density"
             )
-        self._given, self.tells_stress = given, given.stress is not None
+        self._given = given
+        self.tells_stress = given.stress is not None
         self.own_damping = given.damping is not None
         self.densities = given.mass is None and given.damping is None
         rayleigh = damping if isinstance(damping, Rayleigh) else Rayleigh(0.0, 0.0)
@@ -121,10 +122,8 @@ class OwnForms(ElasticForms):
 
     def _notes(self, material: bool) -> tuple[str, ...]:
         mass = "the density of the material" if self._given.mass is None else "a form"
-        stress, waves = (
-            "a" if self.tells_stress else "no",
-            "the material beside them" if material else "no material",
-        )
+        stress = "a" if self.tells_stress else "no"
+        waves = "the material beside them" if material else "no material"
         notes = [
             f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave "
             f"speeds at boundaries by {waves}"
@@ -144,12 +143,20 @@ class OwnForms(ElasticForms):
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
         """Return the stress and sigma_zz(u) times the thickness."""
-        sigma, d, h = self._stress(u), self.space.dimension, self.section.thickness
+        sigma = self._stress(u)
+        d = self.space.dimension
+        h = self.section.thickness
         across = h * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
         return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        """Raise InputError: the forms do not tell the C of a material."""
+        """Raise InputError: the forms do not tell the C of a material.
+
+        Args:
+            eps: strain.
+            across: strain across the plane.
+            trace: trace of the strain.
+        """
         raise InputError(
             "InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0"
         )

@@ -55,7 +55,8 @@ def release(
     check_sizes("release", static, state)
     before, after = _spaces(static, problem)
     nodal = before.expand(static.cartesian(state.u), state.t)
-    added, u0 = _stand(before, after, nodal), after.restrict(nodal)
+    added = _stand(before, after, nodal)
+    u0 = after.restrict(nodal)
     still = np.zeros_like(u0)
     _, first = started(problem, u0, still, state)
     _refuse_moved(static, state, nodal, problem, first)
@@ -66,7 +67,8 @@ def release(
 
 
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
-    before, after = static.system.space, problem.system.space
+    before = static.system.space
+    after = problem.system.space
     if (
         not isinstance(before, FemSpace)
         or not isinstance(after, FemSpace)
@@ -105,8 +107,17 @@ def started(
     """Return the problem that begins with u0, v0 and has a constant force [N] more.
 
     u0 and v0 are on its own unknowns. That beginning has the contact of another state.
+
+    Args:
+        problem: the problem that begins.
+        u0: (n,) initial displacement [m].
+        v0: (n,) initial velocity [m/s].
+        state: a state with the contact that the beginning has.
+        force: (n,) constant force [N].
     """
-    surface, system, load = problem.surface, problem.system, problem.system.load
+    surface = problem.surface
+    system = problem.system
+    load = problem.system.load
 
     def turned(x: Array) -> Array:
         x = surface.in_frames(x)
@@ -120,6 +131,12 @@ def started(
 
 def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
     """Return F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t.
+
+    Args:
+        problem: the problem that begins.
+        u0: (n,) where it begins [m].
+        state: its contact.
+        was_held: (n,) unknowns that were held before.
 
     Raises:
         InputError: it is not zero and nothing was held.
@@ -146,8 +163,14 @@ def removed_support(
 
     It is the support that ``after`` does without and that carries most of this force; "" for none.
     The reaction is its resultant, or its largest nodal force where this is larger.
+
+    Args:
+        before: the problem with the support.
+        after: the problem without it.
+        force: (n,) on the unknowns of ``after`` [N].
     """
-    (old, new), found = _spaces(before, after), [("", 0.0)]
+    old, new = _spaces(before, after)
+    found = [("", 0.0)]
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
     size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))
@@ -168,6 +191,11 @@ def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
     """Let what ``after`` holds in addition stay where the body is.
 
     Returned is the (k, d) mask of what stays off its own place.
+
+    Args:
+        before: the unknowns of the stage before.
+        after: those of the problem that begins.
+        nodal: (k, d) where nodes are [m].
     """
     stays = np.where(after.held & ~before.held, nodal, 0.0)
     if before.stands is not None:
@@ -195,6 +223,13 @@ def _refuse_moved(
     """Raise InputError unless the new supports hold the body where it is.
 
     They must hold it, and what its contact points face, where the static stage has left it.
+
+    Args:
+        static: the problem of the stage before.
+        state: where that stage has ended.
+        nodal: (k, d) where nodes are then [m].
+        problem: the problem that begins.
+        begun: its first state.
     """
     there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
     before = static.surface.gap(state.t) - static.surface.normal_values(state.u)

@@ -68,6 +68,11 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     It is for outputs that go by the materials given there.
 
     Springs added to K leave the stresses of the elements as they are; another material does not.
+
+    Args:
+        owner: who asks.
+        system: a system of ``assemble``.
+        names: letters of the matrices that count, such as "MK".
     """
     found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
     if found and system.algebra.comm.rank == 0:
@@ -336,7 +341,13 @@ class FemSpace(NodalSpace):
         return (values if derivative or self.stands is None else values + self.stands).ravel()
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
-        """Expand a free vector -> nodal values (owned nodes, d), prescribed components included."""
+        """Expand a free vector -> nodal values (owned nodes, d), prescribed components included.
+
+        Args:
+            u: (n,) the free vector.
+            t: time [s].
+            derivative: 0 for displacements, 1 and 2 for their rates.
+        """
         full = self.elimination.expand(u, self.prescribed_values(t, derivative))
         return full.reshape(-1, self.dimension)
 

@@ -20,8 +20,10 @@ from ...core.algebra import Array, Indices, from_each, largest
 class Borrowed:
     """Hold nodes of this rank that take the values of others.
 
-    These are their numbers (t,), the numbers (q,) of the lenders, of all ranks, and shares (t, q)
-    with rows that sum to one.
+    Attributes:
+        numbers: (t,) those of the nodes.
+        lenders: (q,) numbers of those that lend, of all ranks.
+        shares: (t, q), with rows that sum to one.
     """
 
     numbers: Indices
@@ -38,6 +40,12 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
 
     A pressure here is one of their own. It is None where there are none of either. Both are numbers
     of nodes of any rank, as this rank knows them.
+
+    Args:
+        space: the body's unknowns.
+        facets: those of the contact.
+        without: numbers of nodes without pressure, as this rank knows them.
+        having: numbers of nodes with one.
     """
     # A node has its condition on the rank that owns it: most boundaries end here, and nothing is
     # gathered.
@@ -50,6 +58,7 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
     rows = space.corners_of_facets(facets.indices)
     if not (len(asking) and len(lending)):
         return None
+    # pairs of one that asks and one that lends on a facet; each rank keeps those of its own nodes
     v = rows.shape[1]
     pairs = np.column_stack([np.repeat(rows, v, axis=1).ravel(), np.tile(rows, v).ravel()])
     pairs = pairs[np.isin(pairs[:, 0], asking) & np.isin(pairs[:, 1], lending)]
@@ -60,6 +69,7 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
         (np.ones(len(pairs)), (row.ravel(), np.searchsorted(lending, pairs[:, 1]))),
         shape=(len(numbers), len(lending)),
     )
+    # the mean of all neighbours
     count = np.asarray(shares.sum(axis=1)).ravel()
     return Borrowed(
         numbers, lending, sp.csr_matrix(sp.diags(1.0 / count) @ shares if len(count) else shares)

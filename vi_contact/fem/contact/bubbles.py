@@ -41,10 +41,15 @@ OTHERS = np.array([[1, 2], [0, 2], [0, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Bubbles(Rows):
-    """Hold facets of second order, and their bubbles.
+    """Hold k facets of second order, and their bubbles.
 
-    These are numbers (k, 3) of their vertices and of the mid-points opposite, and of these the
-    unknowns (k, 3, d) of all ranks; outward normals (k, d), ∫ phi_i (k, 3), ∫ psi_i b_k (k, 3, 3).
+    Attributes:
+        vertices: (k, 3) numbers of their vertices.
+        middles: (k, 3) numbers of the mid-points opposite.
+        unknowns: (k, 3, d) unknowns of these, of all ranks.
+        normals: (k, d) outward unit normals.
+        areas: (k, 3) ∫ phi_i [m²].
+        integrals: (k, 3, 3) ∫ psi_i b_k [m²].
     """
 
     vertices: Indices
@@ -56,36 +61,48 @@ class Bubbles(Rows):
 
 
 def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: bool) -> Bubbles:
-    """Return the facets of a group that have a vertex of this rank, or all of them."""
-    mesh, local = space.mesh, np.asarray(facets.indices)
+    """Return the facets of a group that have a vertex of this rank, or all of them.
+
+    Args:
+        space: the body's unknowns.
+        hierarchy: that of its tetrahedra.
+        facets: the group.
+        everywhere: whether all facets are asked for, on every rank.
+    """
+    mesh = space.mesh
+    local = np.asarray(facets.indices)
     rows = facet_rows(space.V, local)
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     owner = (
         cell_of.array[cell_of.offsets[:-1][local]]
         < mesh.topology.index_map(mesh.topology.dim).size_local
     )
-    local, rows = local[owner], rows[owner]
-    numbers, points = (hierarchy.with_ghosts(one) for one in (space.numbers, space.points))
+    local = local[owner]
+    rows = rows[owner]
+    # a bubble is free where its mid-point is; it has to be held where both ends of its edge are
+    numbers = hierarchy.with_ghosts(space.numbers)
+    points = hierarchy.with_ghosts(space.points)
     unknowns = numbers.astype(np.int64)[rows]
     wrong = (unknowns[:, 3:] < 0) & (unknowns[:, OTHERS] >= 0).any(axis=2)
     where = points[rows[:, 3:][wrong.any(axis=2)]][:1]
     refuse(
         [
-            f"the mid-point {at(one)} on '{facets.name}' is prescribed and the ends of its edge "
+            f"the mid-point {at(point)} on '{facets.name}' is prescribed and the ends of its edge "
             "are not: prescribe all nodes of an edge, or none"
-            for one in where
+            for point in where
         ],
         space.comm,
     )
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
-    nodes, normals = space.node_of_block[rows], outward(mesh, local, geometry)
-    found = Bubbles(nodes[:, :3], nodes[:, 3:], unknowns[:, 3:], normals, *_integrals(points[rows]))
-    # tied ones count there
-    corners = np.hstack([found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)])
+    nodes = space.node_of_block[rows]
+    normals = outward(mesh, local, geometry)
+    own = Bubbles(nodes[:, :3], nodes[:, 3:], unknowns[:, 3:], normals, *_integrals(points[rows]))
+    # facets with a vertex that another rank owns go to all ranks; tied ones count at their leaders
+    corners = np.hstack([own.vertices, space.leaders(own.vertices.ravel()).reshape(-1, 3)])
     away = everywhere | ~np.isin(corners, space.nodes).all(axis=1)
-    parts = from_each(space.comm, found.pick(away))
+    parts = from_each(space.comm, own.pick(away))
     if not everywhere:
-        parts[space.comm.rank] = found
+        parts[space.comm.rank] = own
     return Bubbles(
         *(
             np.concatenate([getattr(part, name) for part in parts])
@@ -100,14 +117,16 @@ def _integrals(x: Array) -> tuple[Array, Array]:
     These are the points of vertices and mid-points (k, 6, 3).
     """
     place, weight = np.polynomial.legendre.leggauss(POINTS)
-    s, t = (one.ravel() for one in np.meshgrid(0.5 + 0.5 * place, 0.5 + 0.5 * place, indexing="ij"))
-    # of a triangle: its point (s, (1 - s) t)
+    # Gauss points of a square, of which one side is drawn together: (s, (1 - s) t) of a triangle
+    line = 0.5 + 0.5 * place
+    s, t = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
     weights = 0.25 * np.outer(weight, weight).ravel() * (1.0 - s)
     hats = np.stack([1.0 - s - (1.0 - s) * t, s, (1.0 - s) * t])
     slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     bubbles = 4.0 * hats[OTHERS].prod(axis=1)
     # slopes of bubbles
     bent = np.einsum("kaq,kag->kgq", 4.0 * hats[OTHERS], slopes[OTHERS[:, ::-1]])
+    # x = sum phi_i x_i + sum b_k e_k, and its slopes: their cross product is the area
     straight = x[:, :3]
     e = x[:, 3:] - straight[:, OTHERS].mean(axis=2)
     along = np.einsum("fix,ig->fxg", straight, slopes)[..., None] + np.einsum(
@@ -115,7 +134,9 @@ def _integrals(x: Array) -> tuple[Array, Array]:
     )
     sizes = weights * np.linalg.norm(np.cross(along[:, :, 0], along[:, :, 1], axis=1), axis=1)
     areas = sizes @ hats.T
-    gram, products = (np.einsum("fq,iq,jq->fij", sizes, hats, one) for one in (hats, bubbles))
+    # psi = A phi with A = diag(∫ phi) (∫ phi phiᵀ)⁻¹, so that ∫ psi b = A ∫ phi b
+    gram = np.einsum("fq,iq,jq->fij", sizes, hats, hats)
+    products = np.einsum("fq,iq,jq->fij", sizes, hats, bubbles)
     return areas, areas[:, :, None] * np.linalg.solve(gram, products)
 
 
@@ -129,27 +150,38 @@ def averaged(
 
     Where a node has several conditions each facet belongs to the one with the normal nearest to its
     own. Collective. InputError for a mid-point that is held while an end of its edge is free.
+
+    Args:
+        space: the body's unknowns.
+        facets: those of the contact.
+        nodes: this rank's with conditions, or those that are faced.
+        share: (conditions, nodes) shares of nodes that are faced, None for nodes with conditions.
     """
     if space.hierarchy is None:
         return ()
-    found = _bubbles(space, space.hierarchy, facets, share is not None)
+    facet = _bubbles(space, space.hierarchy, facets, share is not None)
+    # the rows of nodes at each corner of a facet: from ``starts`` to ``ends`` in their order
     order = np.argsort(nodes.numbers, kind="stable")
-    corner = found.vertices.ravel()
+    corner = facet.vertices.ravel()
     corner = np.where(np.isin(corner, nodes.numbers), corner, space.leaders(corner))
     starts, ends = (
         np.searchsorted(nodes.numbers, corner, side, sorter=order) for side in ("left", "right")
     )
     known = np.flatnonzero(ends > starts)
-    best, row = np.full(len(known), -np.inf), np.zeros(len(known), dtype=np.int64)
+    # of several, the one with the normal nearest to that of the facet
+    best = np.full(len(known), -np.inf)
+    row = np.zeros(len(known), dtype=np.int64)
     for k in range(int((ends - starts).max(initial=0))):
         candidate = order[np.minimum(starts[known] + k, ends[known] - 1)]
-        cosine = np.sum(found.normals[known // 3] * nodes.normals[candidate], axis=1)
-        row, best = np.where(cosine > best, candidate, row), np.maximum(cosine, best)
-    numbers, first, column = np.unique(found.middles, return_index=True, return_inverse=True)
-    sums = np.bincount(row, found.areas.ravel()[known], minlength=len(nodes.numbers))
+        cosine = np.sum(facet.normals[known // 3] * nodes.normals[candidate], axis=1)
+        row = np.where(cosine > best, candidate, row)
+        best = np.maximum(cosine, best)
+    # c_ik = ∫ psi_i b_k / ∫ psi_i, summed over the facets of each
+    numbers, first, column = np.unique(facet.middles, return_index=True, return_inverse=True)
+    sums = np.bincount(row, facet.areas.ravel()[known], minlength=len(nodes.numbers))
     places = np.repeat(row, 3), column.reshape(-1, 3)[known // 3].ravel()
-    values = found.integrals.reshape(-1, 3)[known] / sums[row][:, None]
-    unknowns = found.unknowns.reshape(-1, space.dimension)[first]
+    values = facet.integrals.reshape(-1, 3)[known] / sums[row][:, None]
+    unknowns = facet.unknowns.reshape(-1, space.dimension)[first]
     nothing = np.zeros(unknowns.shape)
     middles = Nodes(numbers, nothing, nothing, nothing[:, 0], unknowns < 0, unknowns)
     c = sp.csr_matrix((values.ravel(), places), shape=(len(nodes.numbers), len(numbers)))

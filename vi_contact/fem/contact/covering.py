@@ -59,9 +59,9 @@ class Covered:
 
     def sums(self, values: Array) -> Array:
         """Return sums (m,) at the nodes of side 1 of values (k, v) at the nodes of facets."""
-        found = np.zeros(len(self.common))
-        np.add.at(found, self.facets, values)
-        return found
+        sums = np.zeros(len(self.common))
+        np.add.at(sums, self.facets, values)
+        return sums
 
     @property
     def share(self) -> Array:
@@ -77,10 +77,12 @@ class Covered:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Say which nodes (m,) of side 1 are carried, and by which facets.
+    """Say which nodes of side 1 are carried, and by which facets.
 
-    They are carried by the nodes (k, v) of a facet on each covered facet. It is told which facets
-    (k,) are used at all.
+    Attributes:
+        nodes: (m,) which nodes are carried.
+        by: (k, v) nodes of the facet that carries what each covered facet has to be carried.
+        used: (k,) which facets are used at all.
     """
 
     nodes: Mask
@@ -95,16 +97,21 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
 
     None is where there is no whole facet to carry them, and none of a facet at a weld.
     """
-    facets, common = covered.facets, covered.common
+    facets = covered.facets
+    common = covered.common
+    # no node of a facet at a weld is carried
     nodes = asked.copy()
     nodes[facets[common[facets].any(axis=1)]] = False
+    # whole facets: those none of whose nodes is carried, if there are any all in front of side 2
     inside = covered.sums(covered.inside.astype(float)) > 0.0
     apart = ~(nodes | common)[facets].any(axis=1)  # facets that carry themselves
     within = apart & inside[facets].all(axis=1)
     whole = np.flatnonzero(within if within.any() else apart)
     some = np.flatnonzero(nodes[facets].any(axis=1))
     if not len(whole):
-        nodes, some = np.zeros_like(nodes), some[:0]
+        nodes = np.zeros_like(nodes)
+        some = some[:0]
+    # a facet that is hardly covered counts unless it has a node whose condition it alone would be
     alone = (covered.share < LEAST_SHARE) & ~nodes
     used = (covered.parts > LEAST_COVERED) | ~alone[facets].any(axis=1)
     if not len(some):
@@ -117,10 +124,17 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
 
 
 def extrapolation(corners: Array, points: Array) -> Array:
-    """Return E (k, p, v), what each of the corners of facets counts at points.
+    """Return E, what each of the corners of facets counts at points, linearly.
 
-    The corners are (k, v, c), the points (k, p, c); it counts linearly.
+    Args:
+        corners: (k, v, c) of facets, c coordinates [m].
+        points: (k, p, c) [m].
+
+    Returns:
+        (k, p, v), of which each row has the sum one.
     """
+    # the linear function that fits values at the corners best, evaluated at the points: lengths
+    # are taken over the size of a facet, so that its columns are alike
     middle = corners.mean(axis=1, keepdims=True)
     size = np.abs(corners - middle).max(axis=(1, 2))[:, None, None]
     known, wanted = (
@@ -134,29 +148,36 @@ def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
     """Return the carried nodes (m,) that leave too little weight to a node which carries them.
 
     It is too little of its own weight, and of these nodes the one with the largest weight for each.
-    ``weights``: (m,) with what is carried [m], [m²].
 
     A linear function that is positive at one node of a facet and beyond is negative at the other:
     where much is carried far this one would be pulled.
+
+    Args:
+        covered: what is covered of side 1.
+        carried: which nodes are carried.
+        weights: (m,) with what is carried [m], [m²].
     """
     own = covered.sums(covered.weights)
     light = ~(carried.nodes | covered.common) & (own > 0.0) & (weights < LEAST_WEIGHT * own)
-    found = np.zeros(len(own), dtype=bool)
+    too_much = np.zeros(len(own), dtype=bool)
     for node in np.flatnonzero(light):
         around = covered.facets[(carried.by == node).any(axis=1)].ravel()
         around = around[carried.nodes[around]]
         if len(around):
-            found[around[np.argmax(own[around])]] = True
-    return found
+            too_much[around[np.argmax(own[around])]] = True
+    return too_much
 
 
 @dataclass(frozen=True, eq=False)
 class Coupled:
-    """Hold the coupling of two sides.
+    """Hold the coupling of two sides, of m and n nodes.
 
-    This is D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node,
-    the carried nodes (m,), which have no row in either, and the covered share (m,) of the facets of
-    each node.
+    Attributes:
+        D: (m,) ∫ psi of each node [m], [m²].
+        M: (m, n) ∫ psi_s phi_j [m], [m²].
+        overlap: (m,) what polygons of one curve may have at each node [m].
+        carried: (m,) nodes that others carry, which have no row in either.
+        share: (m,) covered share of the facets of each node.
     """
 
     D: Array
@@ -175,6 +196,7 @@ def coupled(
     """
     share = covered.share
     asked = share < LEAST_SHARE
+    # carry all, then take back what would leave a carrying node too little weight, until none does
     while True:
         carried = carried_by(covered, asked)
         D, M, overlap = assembled(carried)

@@ -23,9 +23,8 @@ from ...core.corners import FEATURE_ANGLE
 MARGIN = 2.0
 # CHOSEN: times as much where functions are carried on beyond their facet, to twice its length
 FARTHER = 4.0
-FLAT = (
-    1e-2  # least over largest moment of the nodes of a facet: directions in which it has no extent
-)
+# least over largest moment of the nodes of a facet: directions in which it has no extent
+FLAT = 1e-2
 
 
 def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
@@ -42,6 +41,7 @@ def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
         facets: (k, v) their nodes.
         normals: (k, d) outward unit normals.
     """
+    # the fit n = H x of the normals at the nodes of each facet, in the directions that it has
     nodal, rim = _nodal_normals(facets, normals)
     x = corners - corners.mean(axis=1, keepdims=True)
     n = nodal - nodal.mean(axis=1, keepdims=True)
@@ -81,25 +81,34 @@ def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) ->
 
 
 def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
-    """Return normals (k, v, d) of smooth faces at the nodes of their facets.
+    """Return normals of smooth faces at the nodes of their facets.
 
-    Which facets (k,) are at a rim of a face is returned too.
+    Args:
+        facets: (k, v) nodes.
+        normals: (k, d) outward unit normals.
+
+    Returns:
+        (k, v, d) unit normals, and which facets (k,) are at a rim of a face.
     """
     k, v = facets.shape
-    node, facet = facets.ravel(), np.repeat(np.arange(k), v)
-    sums, alone = normals[facet].copy(), np.ones(k * v, dtype=bool)
+    node = facets.ravel()
+    facet = np.repeat(np.arange(k), v)
+    sums = normals[facet].copy()
+    alone = np.ones(k * v, dtype=bool)
     turned = np.zeros(k * v, dtype=bool)
     order = np.argsort(node, kind="stable")
+    # all pairs of facets at one node: sorted by nodes they are 1, 2, … places apart
     for apart in range(1, int(np.unique(node, return_counts=True)[1].max(initial=1))):
-        one, other = order[:-apart], order[apart:]
-        same = node[one] == node[other]
-        one, other = one[same], other[same]
-        close = np.sum(normals[facet[one]] * normals[facet[other]], axis=1) > np.cos(FEATURE_ANGLE)
-        for a, b in ((one, other), (other, one)):
-            turned[a[~close]] = True
-            a, b = a[close], b[close]
-            sums[a] += normals[facet[b]]
-            alone[a] = False
+        same = node[order[:-apart]] == node[order[apart:]]
+        first = order[:-apart][same]
+        second = order[apart:][same]
+        cosine = np.sum(normals[facet[first]] * normals[facet[second]], axis=1)
+        close = cosine > np.cos(FEATURE_ANGLE)
+        # both of a pair get the normal of the other, unless an edge lies between them
+        for own, other in ((first, second), (second, first)):
+            turned[own[~close]] = True
+            sums[own[close]] += normals[facet[other[close]]]
+            alone[own[close]] = False
     length = np.linalg.norm(sums, axis=1, keepdims=True)
     rim = (alone | turned).reshape(k, v).any(axis=1) | _at_border(facets)
     return (sums / length).reshape(k, v, -1), rim

@@ -60,13 +60,13 @@ class Boundary:
         normals = self.normals.reshape(-1, self.normals.shape[2])
         order = np.argsort(node, kind="stable")
         links = []
+        # all pairs of facets at one node: sorted by nodes they are 1, 2, … places apart
         for apart in range(1, int(np.unique(node, return_counts=True)[1].max(initial=1))):
-            one, other = order[:-apart], order[apart:]
-            same = node[one] == node[other]
-            one, other = one[same], other[same]
-            turn = _turn(normals[one], normals[other])
-            close = turn <= angle * (1.0 + 1e-9)
-            links.append(np.stack([one[close], other[close]]))
+            same = node[order[:-apart]] == node[order[apart:]]
+            first = order[:-apart][same]
+            second = order[apart:][same]
+            close = _turn(normals[first], normals[second]) <= angle * (1.0 + 1e-9)
+            links.append(np.stack([first[close], second[close]]))
         pairs = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
         return connected(len(node), *pairs).reshape(self.vertices.shape)
 
@@ -90,18 +90,26 @@ def checked_angle(owner: str, value: Any) -> float:
 def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) -> Boundary:
     """Gather the facets of a group. Collective.
 
-    With the angle ``beyond`` these are only those round nodes where some may turn by more than it
-    from others: of a smooth boundary none.
+    Args:
+        space: the body's unknowns.
+        facets: the group.
+        beyond: an angle [rad]: only facets round nodes where some may turn by more than it from
+            others, of a smooth boundary none; all when None.
     """
-    mesh, local = space.mesh, np.asarray(facets.indices)
+    mesh = space.mesh
+    local = np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
-    vertices, plane = space.corners_of_facets(local), outward(mesh, local, geometry)
+    vertices = space.corners_of_facets(local)
+    plane = outward(mesh, local, geometry)
     normals = np.repeat(plane[:, None], vertices.shape[1], axis=1)
     if is_curved(mesh) and space.dimension > 1:
         normals = _curved(space, local, plane)[:, : vertices.shape[1]]
     if beyond is not None:
         kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
-        local, vertices, normals = local[kept], vertices[kept], normals[kept]
+        local = local[kept]
+        vertices = vertices[kept]
+        normals = normals[kept]
+    # those of all ranks, each once, with the nodes of a facet in the order of their numbers
     parts = from_each(space.comm, (vertices, normals))
     rows, normals = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     if not len(rows):
@@ -109,6 +117,7 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     order = np.argsort(rows, axis=1)
     normals = np.take_along_axis(normals, order[:, :, None], axis=1)
     unique, first = np.unique(np.take_along_axis(rows, order, axis=1), axis=0, return_index=True)
+    # where this rank's facets are among them
     known, own = number_alike(unique, vertices)
     order = np.argsort(known)
     return Boundary(unique, normals[first], local, order[np.searchsorted(known[order], own)])
@@ -119,6 +128,12 @@ def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -
 
     Their facets have normals in too large a box for all to be within the angle of one another. Of
     nodes that other ranks own every rank tells the box of those facets that it holds.
+
+    Args:
+        space: the body's unknowns.
+        vertices: (k, v) numbers of the nodes of this rank's facets.
+        normals: (k, v, d) outward there.
+        angle: [rad].
     """
     every = normals.reshape(-1, normals.shape[2])
     numbers, low, high = _boxes(vertices.ravel(), every, every)
@@ -130,7 +145,13 @@ def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -
 
 
 def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Array]:
-    """(each node once, least values, largest values) of rows for nodes."""
+    """Return each node once, and the least and largest values of its rows.
+
+    Args:
+        nodes: (n,) the node of each row.
+        low: (n, d) values, of which the least are sought.
+        high: (n, d) values, of which the largest are sought.
+    """
     if not len(nodes):
         return nodes, low, high
     order = np.argsort(nodes, kind="stable")
@@ -143,7 +164,13 @@ def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Arr
 
 
 def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
-    """Return outward unit normals (k, d) of local facets with these nodes."""
+    """Return outward unit normals (k, d) of local facets.
+
+    Args:
+        mesh: the DOLFINx mesh.
+        facets: (k,) local numbers.
+        geometry: (k, v) local geometry nodes of their vertices.
+    """
     d = mesh.geometry.dim
     x = mesh.geometry.x[geometry][:, :, :d]
     middle = x.mean(axis=1)
@@ -159,10 +186,13 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
 def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
     """Return outward unit normals (k, n, d) at the nodes of curved facets.
 
-    ``plane``: the normals of the planes of their vertices.
+    At a vertex it is at right angles to the tangents of its edges, at mid-points the mean of those
+    of the vertices around.
 
-    At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices
-    around.
+    Args:
+        space: the body's unknowns.
+        facets: (k,) local numbers.
+        plane: (k, d) outward normals of the planes of their vertices.
     """
     x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][
         :, :, : space.dimension
@@ -171,14 +201,13 @@ def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
     corners = x.shape[1] - len(around)
     normals = np.empty_like(x)
     for p in range(corners):
-        ends = [
-            (corners + i, sum(one) - p)
-            for i, one in enumerate(around)
-            if p in one and len(one) == 2
+        # of each edge p-q with the mid-point m, the tangent at p is 4 x_m - 3 x_p - x_q
+        edges = [
+            (corners + i, sum(ends) - p)
+            for i, ends in enumerate(around)
+            if len(ends) == 2 and p in ends
         ]
-        along = np.stack(
-            [4.0 * x[:, middle] - 3.0 * x[:, p] - x[:, end] for middle, end in ends], axis=1
-        )
+        along = np.stack([4.0 * x[:, m] - 3.0 * x[:, p] - x[:, q] for m, q in edges], axis=1)
         normal = np.linalg.svd(along)[2][:, -1]
         normals[:, p] = np.where(np.sum(normal * plane, axis=1)[:, None] < 0.0, -normal, normal)
     for i, one in enumerate(around):
@@ -187,7 +216,7 @@ def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
 
 
 def _turn(one: Array, other: Array) -> Array:
-    """Angles between unit vectors (k, d)."""
+    """Return the angles (k,) between unit vectors (k, d) [rad]."""
     return np.asarray(
         2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
     )
@@ -198,7 +227,8 @@ def integrals(space: FemSpace, indices: Any) -> Array:
 
     In a hierarchy they are those of the vertices, which are of first order.
     """
-    mesh, d = space.mesh, space.dimension
+    mesh = space.mesh
+    d = space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
     V, blocks = (space.V, slice(None)) if space.hierarchy is None else space.hierarchy.vertices
     v = ufl.TestFunction(V)
@@ -208,43 +238,49 @@ def integrals(space: FemSpace, indices: Any) -> Array:
     normal = compat.assemble_vector(
         compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)
     ).array_r
-    found = np.zeros((len(space.nodes), 1 + d))
-    found[blocks] = np.column_stack([one[:, 0], normal.reshape(-1, d)])
-    return found
+    nodal = np.zeros((len(space.nodes), 1 + d))
+    nodal[blocks] = np.column_stack([one[:, 0], normal.reshape(-1, d)])
+    return nodal
 
 
 def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
-    """Return (nodes, a facet of the face of each, -1 elsewhere).
+    """Split nodes at corners into one for each face, with its normal and weight. Collective.
 
-    At corners there is one node for each face with its normal and weight.
+    Args:
+        space: the body's unknowns.
+        around: the facets round its corners.
+        nodes: those of this rank or of all; the order is kept.
+        angle: that up to which facets round a node are one face [rad].
 
-    ``nodes``: of this rank or of all, the order is kept. Collective.
+    Returns:
+        nodes, and a facet of the face of each, -1 elsewhere.
     """
     if not len(around.vertices):
         return nodes, np.full(len(nodes.numbers), -1)
-    corners, labels = (
-        nodes.numbers[np.isin(nodes.numbers, around.vertices)],
-        around.corner_faces(angle),
-    )
+    corners = nodes.numbers[np.isin(nodes.numbers, around.vertices)]
+    labels = around.corner_faces(angle)
     known = np.isin(around.vertices, np.concatenate(from_each(space.comm, corners)))
     if not known.any():
         return nodes, np.full(len(nodes.numbers), -1)
+    # pairs of a node and a face, of nodes with several faces
     pairs = np.unique(np.column_stack([around.vertices[known], labels[known]]), axis=0)
     numbers, counts = np.unique(pairs[:, 0], return_counts=True)
     pairs = pairs[np.isin(pairs[:, 0], numbers[counts > 1])]
     if not len(pairs):
         return nodes, np.full(len(nodes.numbers), -1)
     starts, ends = (np.searchsorted(pairs[:, 0], nodes.numbers, side) for side in ("left", "right"))
+    # each of these nodes as often as it has faces, the others once
     times = np.maximum(ends - starts, 1)
-    found = nodes.pick(np.repeat(np.arange(len(times)), times))
+    repeated = nodes.pick(np.repeat(np.arange(len(times)), times))
     among = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
     pair = np.where(np.repeat(ends > starts, times), np.repeat(starts, times) + among, -1)
-    double, values = pair >= 0, _of_faces(space, around, labels, pairs)[pair]
+    double = pair >= 0
+    values = _of_faces(space, around, labels, pairs)[pair]
     unit = values[:, 1:] / np.linalg.norm(values[:, 1:], axis=1)[:, None]
-    normals = np.where(double[:, None], in_symmetry_planes(unit, found.held), found.normals)
+    normals = np.where(double[:, None], in_symmetry_planes(unit, repeated.held), repeated.normals)
     facet = np.unique(labels, return_index=True)[1] // labels.shape[1]
     split_nodes = replace(
-        found, normals=normals, weights=np.where(double, values[:, 0], found.weights)
+        repeated, normals=normals, weights=np.where(double, values[:, 0], repeated.weights)
     )
     return split_nodes, np.where(double, facet[pairs[pair, 1]], -1)
 
@@ -256,15 +292,22 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
 
     Facets are sorted into classes, in which those at one node are all of one face, and each class
     is integrated.
+
+    Args:
+        space: the body's unknowns.
+        around: the facets round its corners.
+        labels: (k, v) the face of each facet at each of its nodes.
+        pairs: (p, 2) node and face.
     """
     corners = np.unique(pairs[:, 0])
-    classes, row_of = _classes(around.vertices, labels, corners), np.full(int(labels.max()) + 1, -1)
+    classes = _classes(around.vertices, labels, corners)
+    row_of = np.full(int(labels.max()) + 1, -1)
     row_of[pairs[:, 1]] = np.arange(len(pairs))
     total = np.zeros((len(pairs), 1 + space.dimension))
-    for number_ in range(int(classes.max()) + 1):
-        local = np.asarray(around.local)[classes[around.place] == number_]
+    for chosen in range(int(classes.max()) + 1):
+        local = np.asarray(around.local)[classes[around.place] == chosen]
         values = space.at_nodes(corners, integrals(space, local))
-        inside = classes == number_
+        inside = classes == chosen
         rows = np.unique(row_of[labels[inside]])
         rows = rows[rows >= 0]
         total[rows] += values[np.searchsorted(corners, pairs[rows, 0])]
@@ -274,7 +317,13 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
 def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
     """Return the class (k,) of every facet at a corner, -1 for others.
 
-    Facets of different faces at a node differ in class.
+    Facets of different faces at a node differ in class: facets are coloured one after the other,
+    each with the first class that no facet of another face at its nodes has.
+
+    Args:
+        vertices: (k, v) numbers of the nodes of facets.
+        labels: (k, v) the face of each facet at each of them.
+        corners: numbers of the nodes at corners.
     """
     classes = np.full(len(vertices), -1, dtype=np.int64)
     at_corner = np.isin(vertices, corners)
@@ -310,7 +359,15 @@ def in_symmetry_planes(normals: Array, held: Mask) -> Array:
 
 
 def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle: float) -> None:
-    """Log, on rank 0, how many nodes have several conditions, and where. Collective."""
+    """Log, on rank 0, how many nodes have several conditions, and where. Collective.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        nodes: this rank's, one for each condition.
+        slots: their numbers among those of all ranks.
+        angle: the feature angle [rad].
+    """
     _, first, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
     rows = first[counts > 1]
     parts = from_each(space.comm, (slots[rows], nodes.points[rows]))

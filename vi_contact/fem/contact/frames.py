@@ -37,9 +37,11 @@ INDEPENDENT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """Hold what contact nodes face.
+    """Hold what m contact nodes face: opposite node s the other body moves by sum_j P_sj u_j.
 
-    Opposite node s the other body moves by sum_j P_sj u_j, nodes of all ranks.
+    Attributes:
+        nodes: the n nodes j, of all ranks.
+        P: (m, n).
     """
 
     nodes: Nodes
@@ -48,11 +50,15 @@ class Facing:
 
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
-    """Hold this rank's conditions u·direction <= gap at nodes.
+    """Hold this rank's m conditions u·direction <= gap at nodes.
 
-    u is relative to what they are ``facing`` if that deforms too, and less what the ``bubbles`` of
-    edges add where displacements have them (``.bubbles``); ``slots``: their numbers among those of
-    all ranks, ascending. ``borrowed``: pressures of nodes without one.
+    Attributes:
+        nodes: their nodes.
+        directions: (m, d) unit vectors.
+        slots: (m,) their numbers among those of all ranks, ascending.
+        facing: what they face if that deforms too: u is relative to it.
+        bubbles: what the bubbles of edges add to u, where displacements have them (``.bubbles``).
+        borrowed: pressures of nodes without a condition.
     """
 
     nodes: Nodes
@@ -95,14 +101,18 @@ class NodalFrames:
     """
 
     def __init__(self, numbers: Indices, points: Array, directions: Array, held: Mask) -> None:
-        self.points, self.directions = points, directions
+        self.points = points
+        self.directions = directions
         self._refuse_prescribed(held)
+        # one frame for each node, from the direction of its first condition
         self.numbers, first, place = np.unique(numbers, return_index=True, return_inverse=True)
         self.place: Indices = place.ravel()
         self.double: Mask = np.bincount(self.place) > 1
         column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
-        self.column, self.turns = column[self.place], self.blocks.copy()
+        self.column = column[self.place]
+        self.turns = self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
+        # nodes with several conditions have all their directions in it
         for slots in same_node(self.place):
             self._refuse_dependent(slots)
             self._turn_corner(slots)
@@ -125,7 +135,8 @@ class NodalFrames:
 
         They are its direction, and those that rub.
         """
-        m, d = self.place.size, self.blocks.shape[1]
+        m = self.place.size
+        d = self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
         np.put_along_axis(own, tangential_columns(self.column, d), self.rubs, axis=1)
         own[np.arange(m), self.column] = True
@@ -186,18 +197,22 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
 
     ``data``: gap0, weights and whatever else it holds of each condition of this rank. Collective.
     """
-    comm, d = space.comm, space.dimension
-    starts = np.cumsum([0, *comm.sum(np.array([float(len(part.slots)) for part in parts]))]).astype(
-        np.int64
-    )
+    comm = space.comm
+    d = space.dimension
+    # conditions of one part after those of the parts before
+    sizes = comm.sum(np.array([float(len(part.slots)) for part in parts]))
+    starts = np.cumsum([0, *sizes]).astype(np.int64)
     slots = np.concatenate(
         [start + part.slots for start, part in zip(starts[:-1], parts, strict=True)]
     )
     frames: NodalFrames = asked(
         comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts)
     )[0]
+    # T and T⁻ᵀ, and which unknowns û of a node its conditions and tangents are
     index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
-    place, column, count = frames.place, frames.column, len(slots)
+    place = frames.place
+    column = frames.column
+    count = len(slots)
     tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
     turn = _turn(space, frames.turns, index)
     dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
@@ -224,10 +239,16 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
     """Return the identity but for the blocks of contact nodes (T, or T⁻ᵀ). Collective.
 
     It is None when all blocks are the identity too.
+
+    Args:
+        space: what the unknowns mean.
+        blocks: (k, d, d) the block of each node.
+        index: (k, d) owned unknowns of the nodes, -1 for held components.
     """
     n = len(space.ids)
     if not largest(space.comm, np.any(blocks != np.eye(space.dimension))):
         return None
+    # entries between free components of a node; all other unknowns stay as they are
     free = index >= 0
     used = free[:, :, None] & free[:, None, :]
     rows, columns = (
@@ -248,26 +269,39 @@ def _coupling(
     e_k).
 
     At nodes with several conditions each one's own vectors only are relative to what it faces.
+
+    Args:
+        space: what the unknowns mean.
+        parts: this rank's conditions.
+        frames: those of their nodes.
+        index: (k, d) owned unknowns of these nodes, -1 for held components.
     """
     if all(part.facing is None and not part.bubbles for part in parts):
         return None
     _refuse_chains(space, parts)
-    algebra, n = space.algebra, len(space.ids)
-    first, total = algebra.first(n), space.unknowns
-    own, entries, start = [np.zeros(0, dtype=np.int64)], [sp.csr_matrix((0, total))], 0
+    algebra = space.algebra
+    n = len(space.ids)
+    first = algebra.first(n)
+    total = space.unknowns
+    own = [np.zeros(0, dtype=np.int64)]
+    entries = [sp.csr_matrix((0, total))]
+    start = 0
     relative = frames.own_vectors()
     for part in parts:
         slots = slice(start, start + len(part.nodes.numbers))
         start = slots.stop
-        place, faced = frames.place[slots], []
+        place = frames.place[slots]
+        # other bodies have frames of their own where they are in contact; bubbles have none
+        faced = []
         if part.facing is not None:
             faced.append((part.facing, _turns(space, frames, part.facing.nodes.numbers)))
         faced += [
-            (one, np.tile(np.eye(space.dimension), (len(one.nodes.numbers), 1, 1)))
-            for one in part.bubbles
+            (bubble, np.tile(np.eye(space.dimension), (len(bubble.nodes.numbers), 1, 1)))
+            for bubble in part.bubbles
         ]
         if not faced:
             continue
+        # rows of R, of the c-th vector of each node's frame
         for c in range(space.dimension):
             rows = np.flatnonzero(relative[slots, c] & (index[place, c] >= 0))
             own.append(index[place[rows], c])
@@ -277,7 +311,7 @@ def _coupling(
             directions = frames.blocks[place[rows], :, c]
             entries.append(
                 sum(
-                    (_faced(one, rows, turns, directions, total) for one, turns in faced),
+                    (_faced(other, rows, turns, directions, total) for other, turns in faced),
                     start=diagonal,
                 )
             )
@@ -285,24 +319,40 @@ def _coupling(
 
 
 def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
-    """T (k, d, d) of nodes that are faced, of all ranks; the axes where nothing else touches them.
+    """Return T (k, d, d) of nodes that are faced; the axes where nothing else touches them.
 
     Collective.
+
+    Args:
+        space: what the unknowns mean.
+        frames: those of this rank's nodes.
+        numbers: (k,) nodes that are faced.
     """
     d = space.dimension
     known = np.zeros((len(space.nodes), 1 + d * d))
     own = space.blocks_of(frames.numbers)
-    known[own, 0], known[own, 1:] = 1.0, frames.turns.reshape(-1, d * d)
-    found = space.at_nodes(space.leaders(numbers), known)
-    return np.asarray(np.where(found[:, :1, None] > 0.0, found[:, 1:].reshape(-1, d, d), np.eye(d)))
+    known[own, 0] = 1.0
+    known[own, 1:] = frames.turns.reshape(-1, d * d)
+    there = space.at_nodes(space.leaders(numbers), known)
+    turns = there[:, 1:].reshape(-1, d, d)
+    return np.asarray(np.where(there[:, :1, None] > 0.0, turns, np.eye(d)))
 
 
 def _faced(
     facing: Facing, rows: Indices, turns: Array, directions: Array, total: int
 ) -> sp.csr_matrix:
-    """Coefficients (rows, ``total`` unknowns û) of direction·sum_j P_sj u_j."""
+    """Return coefficients (rows, total) of direction·sum_j P_sj u_j in the unknowns û.
+
+    Args:
+        facing: what nodes face.
+        rows: which of these nodes.
+        turns: (n, d, d) T of the nodes that are faced.
+        directions: (rows, d) unit vectors.
+        total: how many unknowns there are on all ranks.
+    """
     shares = sp.csr_matrix(facing.P[rows])
-    row, partners = np.repeat(np.arange(len(rows)), np.diff(shares.indptr)), shares.indices
+    row = np.repeat(np.arange(len(rows)), np.diff(shares.indptr))
+    partners = shares.indices
     values = shares.data[:, None] * np.matmul(directions[row][:, None, :], turns[partners])[:, 0]
     unknowns = facing.nodes.unknowns[partners]
     used = (unknowns >= 0) & (values != 0.0)
@@ -313,8 +363,7 @@ def _faced(
 def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
     """Raise InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another.
 
-    R⁻¹ = 2
-    - R needs them apart. Collective.
+    R⁻¹ = 2 - R needs them apart. Collective.
     """
     coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles]
     first = np.zeros((len(space.nodes), 1))

@@ -31,8 +31,12 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     as a facet is of two cells and may be of two ranks, all those round the node. Mid-points of
     edges and sides are no hinges.
     """
-    mesh, d = space.mesh, space.mesh.topology.dim
-    names, vertices = node_numbers(mesh), len(compat.sub_entities(mesh, 0))
+    # facets at cells that have one of the nodes, and numbers of their own for pairs of a node and
+    # a facet, the same on every rank
+    mesh = space.mesh
+    d = space.mesh.topology.dim
+    names = node_numbers(mesh)
+    vertices = len(compat.sub_entities(mesh, 0))
     corners = names[compat.geometry_dofmap(mesh)[:, :vertices]]
     cells = np.flatnonzero(np.isin(corners, numbers).any(axis=1))
     mesh.topology.create_entities(d - 1)
@@ -52,15 +56,19 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     cell = np.broadcast_to(
         np.arange(len(cells))[:, None, None], (*sides.shape, nodes.shape[1])
     ).ravel()
-    node, key = nodes[side].ravel(), keys[side].ravel()
+    node = nodes[side].ravel()
+    key = keys[side].ravel()
     wanted = np.isin(node, numbers)
-    cell, node, key = cell[wanted], node[wanted], key[wanted]
+    cell = cell[wanted]
+    node = node[wanted]
+    key = key[wanted]
     things, member = np.unique(key, return_inverse=True)
 
     # Link all things of one cell and node.
     order = np.lexsort((node, cell))
     same = (np.diff(cell[order]) == 0) & (np.diff(node[order]) == 0)
-    one, other = member[order[:-1][same]], member[order[1:][same]]
+    one = member[order[:-1][same]]
+    other = member[order[1:][same]]
 
     # What ranks share: facets that are ghosts of some.
     ghosts = np.concatenate(from_each(space.comm, known[facets >= local.size_local]))
@@ -85,6 +93,11 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
     """Raise InputError for hinges at these points (k, d), if there are any.
 
     The points are ordered; ``names`` are those of the boundaries.
+
+    Args:
+        owner: who asks.
+        names: those of the boundaries, one or two.
+        points: (k, d) places of the hinges, ordered [m].
     """
     if not len(points):
         return
@@ -104,7 +117,13 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
 
 
 def gathered_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
-    """Return the points of the chosen nodes of all ranks, by their numbers. Collective."""
+    """Return the points of the chosen nodes of all ranks, by their numbers. Collective.
+
+    Args:
+        comm: the ranks.
+        nodes: those of this rank.
+        chosen: which of them.
+    """
     parts = from_each(comm, (nodes.numbers[chosen], nodes.points[chosen]))
     numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
     return np.asarray(points[np.argsort(numbers)])

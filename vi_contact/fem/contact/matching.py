@@ -23,9 +23,8 @@ NEARBY = 8  # nodes of side 2 that are looked at first
 # cosine of the angle between a normal and what it is seen from: under less no side faces another
 EDGE_ON = 0.01
 BESIDE = 0.01  # of the distance to the next node: how far beside a normal a partner may lie
-ONE_PLACE = (
-    1e-6  # of the distance that a partner may lie beside a normal: nodes as close as this coincide
-)
+# of the distance that a partner may lie beside a normal: nodes as close as this coincide
+ONE_PLACE = 1e-6
 DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 
@@ -33,10 +32,12 @@ DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 class Side:
     """Hold a boundary that may touch another, the same on every rank.
 
-    This is its name, nodes, and facets as rows of their places.
-
-    ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all
-    components, -1 for others. None: there are no such nodes.
+    Attributes:
+        name: that of its group.
+        nodes: its m nodes.
+        facets: (k, v) places of their nodes.
+        tied: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all
+            components, -1 for others. None: there are no such nodes.
     """
 
     name: str
@@ -100,7 +101,13 @@ class Matching(Protocol):
     """Find what the nodes of side 1 face. InputError when they do not."""
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
-        """Return what the nodes of side ``one`` face on side ``two``; ``size``: of the mesh [m]."""
+        """Return what the nodes of side ``one`` face on side ``two``.
+
+        Args:
+            one: side 1.
+            two: side 2.
+            size: that of the mesh [m].
+        """
 
 
 @dataclass(frozen=True)
@@ -122,7 +129,13 @@ class NodeToNode:
         check_fields(self)
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
-        """Return what every node of side 1 faces; InputError where a node has no partner."""
+        """Return what every node of side 1 faces; InputError where a node has no partner.
+
+        Args:
+            one: side 1.
+            two: side 2.
+            size: that of the mesh [m].
+        """
         partner = self._partners(one, two, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
@@ -143,15 +156,21 @@ class NodeToNode:
         return Matched(np.arange(m), P, one.nodes.weights, np.zeros(m))
 
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
-        """Place of the nearest node opposite among those of side 2, -1 for none."""
-        x, count, spacing = (
-            one.nodes.points,
-            len(two.nodes.points),
-            _spacing(one.nodes.points, size),
-        )
-        reach, together = self.tolerance * spacing, 2.0 * min(self.tolerance, BESIDE) * spacing
+        """Return the place of the nearest node opposite among those of side 2, -1 for none.
+
+        Args:
+            one: side 1.
+            two: side 2.
+            size: that of the mesh [m].
+        """
+        x = one.nodes.points
+        count = len(two.nodes.points)
+        spacing = _spacing(one.nodes.points, size)
+        reach = self.tolerance * spacing
+        together = 2.0 * min(self.tolerance, BESIDE) * spacing
         from scipy.spatial import cKDTree  # late: it takes a while
 
+        # the nearest nodes first
         away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
         partner, along, turned, crowds = _opposite(
             one.nodes, two.nodes, np.sort(nearby, axis=1), reach
@@ -159,28 +178,26 @@ class NodeToNode:
         # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it
         # was looked at, all nodes are
         unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
-        for rows in (
-            np.array_split(unsure, -(-len(unsure) * count // DISTANCES)) if len(unsure) else ()
-        ):
-            whole = np.arange(count)[None, :]
+        whole = np.arange(count)[None, :]
+        groups = -(-len(unsure) * count // DISTANCES)
+        for rows in np.array_split(unsure, groups) if len(unsure) else ():
             partner[rows], _, turned[rows], more = _opposite(
                 one.nodes.pick(rows), two.nodes, whole, reach[rows]
             )
             crowds |= {int(rows[row]): crowd for row, crowd in more.items()}
-        surfaces = Surface(x, one.facets), Surface(two.nodes.points, two.facets)
+        # where several nodes lie at one place, facets tell which is the partner
+        surface1 = Surface(x, one.facets)
+        surface2 = Surface(two.nodes.points, two.facets)
         for row, (these, apart) in sorted(crowds.items()):
-            at_one_place = (
-                np.linalg.norm(two.nodes.points[these] - two.nodes.points[these[0]], axis=1)
-                <= together[row]
-            )
-            these, apart = these[at_one_place], apart[at_one_place]
+            offset = two.nodes.points[these] - two.nodes.points[these[0]]
+            alike = np.linalg.norm(offset, axis=1) <= together[row]
             chosen = one_of(
-                surfaces[0],
+                surface1,
                 row,
                 one.nodes.normals[row],
-                surfaces[1],
-                these,
-                apart,
+                surface2,
+                these[alike],
+                apart[alike],
                 ONE_PLACE * reach[row],
             )
             if chosen < 0:
@@ -204,7 +221,14 @@ def _opposite(
     Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the
     normal, infinite for none; whether all that are there face away; where several are about as
     near).
+
+    Args:
+        one: m nodes of side 1.
+        two: nodes of side 2.
+        places: (m, k) which of these are looked at.
+        reach: (m,) how far beside the normal a partner may lie [m].
     """
+    # how far along its normal, and how far beside it, each node of side 2 is
     offset = two.points[places] - one.points[:, None, :]
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
@@ -215,22 +239,31 @@ def _opposite(
     # where several bodies meet they have a node each at one place, told apart by their normals
     # first
     alike = distance <= least[:, None] + ONE_PLACE * reach[:, None]
-    rows, nearest = np.arange(len(reach)), np.where(alike, slope, np.inf).argmin(axis=1)
-    found = np.isfinite(least)
+    rows = np.arange(len(reach))
+    nearest = np.where(alike, slope, np.inf).argmin(axis=1)
+    any_there = np.isfinite(least)
     places = np.broadcast_to(places, distance.shape)
-    partner = np.where(found, places[rows, nearest], -1)
+    partner = np.where(any_there, places[rows, nearest], -1)
+    # nodes about as near as the nearest, which comes first
     crowds = {}
-    for row in np.flatnonzero(found & (np.sum(distance <= (least + reach)[:, None], axis=1) > 1)):
+    for row in np.flatnonzero(
+        any_there & (np.sum(distance <= (least + reach)[:, None], axis=1) > 1)
+    ):
         these = np.flatnonzero(distance[row] <= least[row] + reach[row])
         these = np.concatenate([[nearest[row]], these[these != nearest[row]]])
         crowds[int(row)] = places[row, these], distance[row, these]
-    return partner, distance[rows, nearest], near.any(axis=1) & ~found, crowds
+    return partner, distance[rows, nearest], near.any(axis=1) & ~any_there, crowds
 
 
 def _refuse_several(one: Side, two: Side, row: int) -> None:
     """Raise InputError for a node of side 1 that faces several nodes of side 2.
 
     Each of them has a part of what it faces.
+
+    Args:
+        one: side 1.
+        two: side 2.
+        row: the place of the node on side 1.
     """
     where = (
         f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of "
@@ -248,7 +281,13 @@ def _refuse_several(one: Side, two: Side, row: int) -> None:
 
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
-    """Raise InputError for sides whose outward normals point the same way."""
+    """Raise InputError for sides whose outward normals point the same way.
+
+    Args:
+        one: name of side 1.
+        two: name of side 2.
+        point: (d,) where [m].
+    """
     raise InputError(
         f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same "
         "way: choose the two boundaries between the bodies"

@@ -59,7 +59,13 @@ class DualMortar:
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
     def match(self, one: Side, two: Side, size: float) -> Matched:
-        """Return what the nodes of side 1 face by the dual mortar coupling."""
+        """Return what the nodes of side 1 face by the dual mortar coupling.
+
+        Args:
+            one: side 1.
+            two: side 2.
+            size: that of the mesh [m]; nothing here needs it.
+        """
         d = one.nodes.points.shape[1]
         if d == 1:
             raise InputError(
@@ -72,13 +78,15 @@ class DualMortar:
                 f"'{two.name}' have mid-points (degree=2): mesh both sides alike for "
                 "matching=NodeToNode(), or use degree=1"
             )
-        found = in_space(one, two) if d == 3 else _in_plane(one, two)
-        D = found.D
+        coupling = in_space(one, two) if d == 3 else _in_plane(one, two)
+        D = coupling.D
         if not (D > 0.0).any():
             _refuse(one, two)
-        rows, carried = np.flatnonzero(D > 0.0), np.flatnonzero(found.carried)
-        P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ found.M[rows])
-        return Matched(rows, P, D[rows], found.overlap[rows], found.share[rows], carried)
+        # P = D⁻¹ M, at the nodes that have a function
+        rows = np.flatnonzero(D > 0.0)
+        P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ coupling.M[rows])
+        carried = np.flatnonzero(coupling.carried)
+        return Matched(rows, P, D[rows], coupling.overlap[rows], coupling.share[rows], carried)
 
 
 def _refuse(one: Side, two: Side) -> None:
@@ -98,8 +106,13 @@ def _refuse(one: Side, two: Side) -> None:
 class _Segment:
     """Hold a segment of side 1 in front of side 2.
 
-    This is its nodes, ends, pieces, ∫ phi phiᵀ (2, 2), by segment of side 2 ∫ phi_i phi_j (2, 2),
-    and by how much polygons of one curve may overlap on it [m].
+    Attributes:
+        nodes: (2,) its nodes.
+        ends: (2, 2) their points [m].
+        pieces: (low, high, segment of side 2, its coordinates at low and high) of each piece.
+        own: (2, 2) ∫ phi phiᵀ over the pieces [m].
+        mixed: by segment of side 2, (2, 2) ∫ phi_i phi_j [m].
+        overlap: by how much polygons of one curve may overlap on it [m].
     """
 
     nodes: Array
@@ -111,6 +124,7 @@ class _Segment:
 
     @property
     def length(self) -> float:
+        """Return the distance of its ends [m]."""
         return float(np.linalg.norm(self.ends[1] - self.ends[0]))
 
     def places(self, points: Array) -> Array:
@@ -121,9 +135,13 @@ class _Segment:
 
 def _in_plane(one: Side, two: Side) -> Coupled:
     """Integrate the coupling of sides of plane bodies."""
-    ends1, ends2 = one.nodes.points[one.facets], two.nodes.points[two.facets]
-    normals1, normals2 = (_normals(side, ends) for side, ends in ((one, ends1), (two, ends2)))
-    segments, H = [], curvatures(ends2, two.facets, normals2)
+    ends1 = one.nodes.points[one.facets]
+    ends2 = two.nodes.points[two.facets]
+    normals1 = _normals(one, ends1)
+    normals2 = _normals(two, ends2)
+    H = curvatures(ends2, two.facets, normals2)
+    segments = []
+    # project side 2 onto each segment of side 1, and integrate over the pieces that this makes
     for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
@@ -139,8 +157,13 @@ def _overlap(
 ) -> float:
     """Return by how much the polygon of side 2 may overlap a segment of side 1 [m].
 
-    Side 2 is of curvature H at its segments.
+    Args:
+        pieces: those of the segment.
+        ends: (2, 2) its ends [m].
+        ends2: (k, 2, 2) ends of the segments of side 2 [m].
+        H: (k, 2, 2) their curvature [1/m].
     """
+    # at both ends and in the middle of each piece, in the coordinates of both segments
     segment = [piece[2] for piece in pieces]
     share = np.array([0.0, 0.5, 1.0])
     own = np.array([low + share * (high - low) for low, high, *_ in pieces])
@@ -152,48 +175,64 @@ def _overlap(
 
 def _covered(segments: list[_Segment], common: Mask) -> Covered:
     """Return what is covered of these segments; ``common``: nodes (m,) of both sides."""
-    ends = np.array(
-        [
-            [min(piece[0] for piece in one.pieces), max(piece[1] for piece in one.pieces)]
-            for one in segments
-        ]
-    ).reshape(-1, 2)
-    corners = np.array([one.ends for one in segments]).reshape(-1, 2, 2)
-    weights = np.array([one.own.sum(axis=1) for one in segments]).reshape(-1, 2)
+    spans = [_span(segment) for segment in segments]
+    ends = np.array(spans).reshape(-1, 2)
+    corners = np.array([segment.ends for segment in segments]).reshape(-1, 2, 2)
+    weights = np.array([segment.own.sum(axis=1) for segment in segments]).reshape(-1, 2)
     lengths = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     return Covered(
-        facets=np.array([one.nodes for one in segments], dtype=np.int64).reshape(-1, 2),
+        facets=np.array([segment.nodes for segment in segments], dtype=np.int64).reshape(-1, 2),
         middles=corners[:, 0] + ends.mean(axis=1)[:, None] * (corners[:, 1] - corners[:, 0]),
         weights=weights,
         full=np.repeat(0.5 * lengths[:, None], 2, axis=1),
         inside=np.column_stack([ends[:, 0] < AT_NODE, ends[:, 1] > 1.0 - AT_NODE]),
-        parts=np.array([sum(piece[1] - piece[0] for piece in one.pieces) for one in segments]),
+        parts=np.array([_share(segment) for segment in segments]),
         common=common,
     )
+
+
+def _span(segment: _Segment) -> list[float]:
+    """Return where the covered part of a segment begins and ends, in its coordinate."""
+    return [min(piece[0] for piece in segment.pieces), max(piece[1] for piece in segment.pieces)]
+
+
+def _share(segment: _Segment) -> float:
+    """Return the covered share of a segment."""
+    return sum(piece[1] - piece[0] for piece in segment.pieces)
 
 
 def _assembled(
     one: Side, two: Side, segments: list[_Segment], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
-    """Return D (m,), M (m, n) and by how much polygons of one curve may overlap.
+    """Return D (m,), M (m, n) and by how much polygons of one curve may overlap (m,) [m].
 
-    They may overlap so at each node of side 1 (m,) [m].
+    Args:
+        one: side 1, of m nodes.
+        two: side 2, of n nodes.
+        segments: those of side 1 in front of side 2.
+        carried: nodes that others carry.
     """
-    m, n = len(one.nodes.points), len(two.nodes.points)
-    D, M, overlap, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
+    m = len(one.nodes.points)
+    n = len(two.nodes.points)
+    D = np.zeros(m)
+    M = sp.lil_matrix((m, n))
+    overlap = np.zeros(m)
+    partner = common_nodes(one, two)
     for part, by, used in zip(segments, carried.by, carried.used, strict=True):
         if not used:
             continue
-        facet, own = part.nodes, part.own
+        facet = part.nodes
+        own = part.own
         overlap[facet] = np.maximum(overlap[facet], part.overlap)
         if carried.nodes[facet].any():
             overlap[by] = np.maximum(overlap[by], FARTHER * part.overlap)
             _carry(D, M, one.nodes.points, two.facets, part, by, carried.nodes)
             continue
+        # psi = A phi; nodes of both sides hand their functions over
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
         common = partner[facet]
         dual, own_D, forces = (
-            a[0] for a in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
+            array[0] for array in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
         )
         D[facet] += own_D
         for segment, values in part.mixed.items():
@@ -214,11 +253,20 @@ def _carry(
     by: Indices,
     carried: Mask,
 ) -> None:
-    """Add to D and M what a segment adds with nodes that are carried.
+    """Add to D and M what a segment adds of which some node is carried (``covering``).
 
-    Some node of it is carried by the nodes of another (``covering``).
+    Args:
+        D: (m,) ∫ psi of each node of side 1; it is added to.
+        M: (m, n) ∫ psi_s phi_j; it is added to.
+        points: (m, 2) nodes of side 1 [m].
+        facets2: (k, 2) nodes of the segments of side 2.
+        part: the segment.
+        by: (2,) nodes of the segment that carries.
+        carried: (m,) which nodes are carried.
     """
-    weights, inverse = part.own.sum(axis=1), np.linalg.inv(part.own)
+    weights = part.own.sum(axis=1)
+    inverse = np.linalg.inv(part.own)
+    # E: what each node that carries counts at each node of this segment
     there = part.places(points[by])[None, :, None]
     shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
     for i, (node, weight) in enumerate(zip(part.nodes, weights, strict=True)):
@@ -232,7 +280,7 @@ def _carry(
 
 
 def _normals(side: Side, ends: Array) -> Array:
-    """Outward unit normals (k, 2) of the segments with these ends (k, 2, 2)."""
+    """Return outward unit normals (k, 2) of the segments with these ends (k, 2, 2)."""
     along = ends[:, 1] - ends[:, 0]
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     outward = np.sum(normals[:, None, :] * side.nodes.normals[side.facets], axis=(1, 2))
@@ -242,18 +290,27 @@ def _normals(side: Side, ends: Array) -> Array:
 def _pieces(
     ends: Array, normal: Array, ends2: Array, normals2: Array
 ) -> Iterator[tuple[float, float, int, Array]]:
-    """Return the pieces of a segment of side 1, in its coordinate from 0 to 1.
+    """Yield the pieces of a segment of side 1, in its coordinate from 0 to 1.
 
     Each is (low, high, segment of side 2, its coordinates at low and high): where several segments
     lie opposite, the nearest.
+
+    Args:
+        ends: (2, 2) ends of the segment [m].
+        normal: (2,) its outward normal.
+        ends2: (k, 2, 2) ends of the segments of side 2 [m].
+        normals2: (k, 2) their outward normals.
     """
+    # project the ends of all segments of side 2; those that face this one cut it at their ends
     along = ends[1] - ends[0]
     place = (ends2 - ends[0]) @ along / (along @ along)  # (k, 2): projections of the ends of side 2
     height = (ends2 - ends[0]) @ normal
-    low, high = np.maximum(place.min(axis=1), 0.0), np.minimum(place.max(axis=1), 1.0)
+    low = np.maximum(place.min(axis=1), 0.0)
+    high = np.minimum(place.max(axis=1), 1.0)
     near = np.flatnonzero((normals2 @ normal < 0.0) & (high - low > 1e-12))
     cuts = np.unique(np.concatenate([low[near], high[near]]))
     for start, end in zip(cuts[:-1], cuts[1:], strict=True):
+        # of the segments in front of a piece, the nearest at its middle
         middle = 0.5 * (start + end)
         over = near[(low[near] < middle) & (middle < high[near])]
         if end - start > 1e-12 and len(over):
@@ -268,8 +325,12 @@ def _pieces(
 def _integrals(
     pieces: list[tuple[float, float, int, Array]], length: float
 ) -> tuple[Array, dict[int, Array]]:
-    """∫ phi phiᵀ (2, 2) over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2)."""
-    own, mixed = np.zeros((2, 2)), dict[int, Array]()
+    """Return ∫ phi phiᵀ (2, 2) over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2).
+
+    ``length``: that of the segment of side 1 [m].
+    """
+    own = np.zeros((2, 2))
+    mixed: dict[int, Array] = {}
     for low, high, segment, across in pieces:
         for point in POINTS:
             weight = 0.5 * length * (high - low)
@@ -281,5 +342,5 @@ def _integrals(
 
 
 def _hats(x: float) -> Array:
-    """Both linear functions of a segment."""
+    """Return the values of both linear functions of a segment at a coordinate from 0 to 1."""
     return np.array([1.0 - x, x])

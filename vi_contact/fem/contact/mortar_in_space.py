@@ -14,7 +14,7 @@ grow without bound as the strip thins. Both keep sum_s psi_s = 1, ∫ psi_s = D_
 D_s x_s, and are the same on triangles.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,34 +35,44 @@ POINTS = 2**18  # at which functions are held at once, a few for each triangle o
 
 
 def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
-    """Return ∫ phi phiᵀ (looks, v, v) over the pieces of looks, and those by piece.
+    """Integrate products of shape functions over what looks share with facets of side 2.
 
-    By piece they are ∫ phi_i phi_j (pieces, v, w) with the functions of side 2.
+    Args:
+        looks: those of side 1.
+        pieces: what they share.
+
+    Returns:
+        ∫ phi phiᵀ (looks, v, v) of the functions of side 1, summed over the pieces of a look, and
+        ∫ phi_i phi_j (pieces, v, w) of the functions of both sides by piece [m²].
     """
-    k, v, w = len(looks.nodes), looks.polygons.shape[1], pieces.seen.shape[1]
-    own, mixed = np.zeros((len(pieces.look), v * v)), np.zeros((len(pieces.look), v * w))
+    k = len(looks.nodes)
+    v = looks.polygons.shape[1]
+    w = pieces.seen.shape[1]
+    own = np.zeros((len(pieces.look), v * v))
+    mixed = np.zeros((len(pieces.look), v * w))
     orders = np.maximum(order_of(looks.polygons)[pieces.look], order_of(pieces.seen))
-    groups = [
-        group
-        for order in np.unique(orders)
-        for same in [np.flatnonzero(orders == order)]
-        for group in np.array_split(same, 1 + len(same) * order**2 // POINTS)
-    ]
-    for group in groups:
-        piece, corners = triangles(pieces.polygons[group])
-        piece, (places, weights) = group[piece], rule(int(orders[group[0]]))
+    for group in _groups_of(orders):
+        # triangles of the pieces, and the points of the rule in them
+        part, corners = triangles(pieces.polygons[group])
+        piece = group[part]
+        look = pieces.look[piece]
+        places, weights = rule(int(orders[group[0]]))
         points = np.einsum("qc,kcx->kqx", places, corners)
-        phi, other = (
-            hats(looks.polygons[pieces.look[piece]], points),
-            hats(pieces.seen[piece], points),
-        )
-        weighted = phi * (
-            weights[:, None] * (areas(corners) / looks.slant[pieces.look[piece]])[:, None, None]
-        )
+        # functions of both sides at these points; areas are those on the facet of side 1
+        phi = hats(looks.polygons[look], points)
+        other = hats(pieces.seen[piece], points)
+        weighted = phi * (weights[:, None] * (areas(corners) / looks.slant[look])[:, None, None])
         weighted = weighted.swapaxes(1, 2)
         own += summed(piece, weighted @ phi, len(own))
         mixed += summed(piece, weighted @ other, len(own))
     return summed(pieces.look, own, k).reshape(k, v, v), mixed.reshape(-1, v, w)
+
+
+def _groups_of(orders: Indices) -> Iterator[Indices]:
+    """Yield groups of pieces of one order (k,), few enough to hold functions at their points."""
+    for order in np.unique(orders):
+        same = np.flatnonzero(orders == order)
+        yield from np.array_split(same, 1 + len(same) * order**2 // POINTS)
 
 
 def order_of(polygons: Array) -> Indices:
@@ -73,8 +83,10 @@ def order_of(polygons: Array) -> Indices:
     """
     if polygons.shape[1] == 3:
         return np.full(len(polygons), 2)
+    # how unlike the determinants at the corners of a quadrilateral are: 0 of a parallelogram
     corner = turns(polygons)
-    low, high = corner.min(axis=1), corner.max(axis=1)
+    low = corner.min(axis=1)
+    high = corner.max(axis=1)
     distorted = np.maximum((high - low) / (high + low), 1e-16)
     # measured: an error of 1e-11 of the integrals where a piece is a whole facet, less on smaller
     # pieces
@@ -84,7 +96,16 @@ def order_of(polygons: Array) -> Indices:
 
 
 def summed(place: Indices, values: Array, count: int) -> Array:
-    """Return sums (count, ...) of rows of values that have the same place, as rows of numbers."""
+    """Return sums of rows of values that have the same place.
+
+    Args:
+        place: (n,) the row of the sum to which each row of values belongs.
+        values: (n, ...) rows.
+        count: how many sums there are.
+
+    Returns:
+        (count, size of a row).
+    """
     ones = sp.csr_matrix(
         (np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place))
     )
@@ -92,7 +113,14 @@ def summed(place: Indices, values: Array, count: int) -> Array:
 
 
 def dual(looks: Looks, own: Array, whole: Mask) -> Array:
-    """Return A (looks, v, v) of the functions psi = A phi of looks."""
+    """Return A (looks, v, v) of the functions psi = A phi of looks.
+
+    Args:
+        looks: those of side 1.
+        own: (looks, v, v) ∫ phi phiᵀ over their parts in front of side 2.
+        whole: (looks,) those that are in front of side 2 as a whole: b = phi there, else b = (1,
+            x, y).
+    """
     linear, inverse, _ = linear_functions(looks, own)
     A = linear @ inverse @ linear.swapaxes(1, 2)
     A[whole] = np.linalg.inv(own[whole])
@@ -104,6 +132,10 @@ def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
 
     There b = (1, 0, 0): the middles (looks, 1, 2) of what is in front of side 2. Lengths are over
     the reach of the facet.
+
+    Args:
+        looks: those of side 1.
+        own: (looks, v, v) ∫ phi phiᵀ over their parts in front of side 2.
     """
     D = own.sum(axis=2)
     middle = np.einsum("kv,kvc->kc", D, looks.polygons) / D.sum(axis=1)[:, None]
@@ -113,9 +145,14 @@ def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
 
 
 def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
-    """Return values (k, v, w) summed at their rows (k, v) and columns (k, w).
+    """Return values summed at their rows and columns.
 
-    Column -1 stands for none.
+    Args:
+        values: (k, v, w).
+        rows: (k, v).
+        columns: (k, w), -1 for none.
+        m: how many rows there are.
+        n: how many columns.
     """
     places = [place.ravel() for place in np.broadcast_arrays(rows[:, :, None], columns[:, None, :])]
     used = places[1] >= 0
@@ -125,10 +162,16 @@ def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> s
 
 
 def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
-    """Return (psi (k, v, v), D (k, v), forces (k, v, v)) where nodes (k, v) are ``common``.
+    """Let nodes of both sides hand their functions to the others of their facets (``mortar``).
 
-    They are common to both sides (``mortar``): others of their facet share their functions.
-    ``forces`` are shares of ∫ psi_t, which they pass to the former.
+    Args:
+        functions: (k, v, v) A of psi = A phi.
+        D: (k, v) ∫ psi.
+        common: (k, v) nodes t of both sides.
+
+    Returns:
+        A and D, in which others share the functions of common nodes, and forces (k, v, v): shares
+        of ∫ psi_t, which the others pass to t.
     """
     if not common.any():
         return functions, D, np.zeros_like(functions)
@@ -146,8 +189,11 @@ def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array,
 class _Block:
     """Hold some looks with something in front of them.
 
-    This is what they share with side 2 (``pieces``), the covered share (looks,) of each, and
-    ``integrals`` of the functions of side 1, and of both sides.
+    Attributes:
+        looks: those of side 1.
+        pieces: what they share with side 2.
+        covered: (looks,) share of each that is covered.
+        own, mixed: ``integrals`` of the functions of side 1, and of both sides.
     """
 
     looks: Looks
@@ -159,16 +205,18 @@ class _Block:
     def inside(self) -> Mask:
         """Return which nodes (looks, v) of the facets are in front of side 2 themselves."""
         phi = hats(self.looks.polygons[self.pieces.look], self.pieces.polygons)
-        found = np.zeros(self.looks.nodes.shape)
-        np.maximum.at(found, self.pieces.look, phi.max(axis=1))
-        return np.asarray(found >= 1.0 - WHOLE)
+        # a corner of a piece is a node where its function is one
+        largest = np.zeros(self.looks.nodes.shape)
+        np.maximum.at(largest, self.pieces.look, phi.max(axis=1))
+        return np.asarray(largest >= 1.0 - WHOLE)
 
     def middles(self) -> Array:
         """Return the middles (looks, 3) of the covered parts.
 
         They are means of those of the pieces, weighted with areas.
         """
-        size, looks = areas(self.pieces.polygons), self.looks
+        size = areas(self.pieces.polygons)
+        looks = self.looks
         seen = summed(
             self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes)
         )
@@ -178,11 +226,14 @@ class _Block:
 
 def in_space(one: Side, two: Side) -> Coupled:
     """Integrate the coupling of sides of solid bodies."""
-    ours, theirs = facets_of(one, 1), facets_of(two, -1)
+    ours = facets_of(one, 1)
+    theirs = facets_of(two, -1)
     from scipy.spatial import cKDTree  # late: it takes a while
 
-    tree, looks = cKDTree(theirs.middles), looks_of(ours, one.nodes)
+    tree = cKDTree(theirs.middles)
+    looks = looks_of(ours, one.nodes)
     blocks = []
+    # cut and integrate some looks at a time; those with nothing in front of them are left out
     for rows in np.array_split(np.arange(len(looks.nodes)), 1 + len(looks.nodes) // BLOCK):
         if not len(rows):
             continue
@@ -200,12 +251,17 @@ def in_space(one: Side, two: Side) -> Coupled:
 
 
 def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
-    """Return what is covered of the looks of these blocks.
+    """Return what is covered of the looks of these blocks, of each for the nodes that ask.
 
-    It is told of each for the nodes that ask; ``common``: nodes (m,) of both sides.
+    Args:
+        ours: the facets of side 1.
+        blocks: their looks, some at a time.
+        common: (m,) nodes of side 1 that are nodes of side 2 too.
     """
     v = ours.nodes.shape[1]
-    weights, full, inside = [], [], []
+    weights = []
+    full = []
+    inside = []
     for block in blocks:
         looks = block.looks
         weights.append(block.own.sum(axis=2) * looks.asking)
@@ -225,7 +281,7 @@ def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
 
 
 def _whole_weights(looks: Looks) -> Array:
-    """Integrals (looks, v) of the functions of the nodes over whole facets."""
+    """Return integrals (looks, v) of the functions of the nodes over whole facets [m²]."""
     k, v = looks.nodes.shape
     piece, corners = triangles(looks.polygons)
     places, weights = rule(3)
@@ -237,23 +293,40 @@ def _whole_weights(looks: Looks) -> Array:
 def _assembled(
     one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
-    """Return D (m,), M (m, n) and by how much facets of one curved face may overlap.
+    """Return D (m,), M (m, n) and by how much facets of one curved face may overlap (m,) [m].
 
-    They may overlap so at each node of side 1 (m,) [m].
+    Args:
+        one: side 1, of m nodes.
+        two: side 2, of n nodes.
+        theirs: the facets of side 2.
+        blocks: the looks of side 1, some at a time.
+        carried: nodes that others carry.
     """
-    m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
-    D, overlap, parts, start = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))], 0
-    points, H = one.nodes.points, curvatures(theirs.corners, theirs.nodes, theirs.normals)
+    m = len(one.nodes.points)
+    n = len(two.nodes.points)
+    partner = common_nodes(one, two)
+    D = np.zeros(m)
+    overlap = np.zeros(m)
+    parts = [sp.coo_matrix((m, n))]
+    start = 0
+    points = one.nodes.points
+    H = curvatures(theirs.corners, theirs.nodes, theirs.normals)
     curved = bool(np.any(np.linalg.norm(H, axis=(1, 2)) * theirs.reach > PLANE))
     for block in blocks:
-        some, pieces, own = block.looks, block.pieces, block.own
+        some = block.looks
+        pieces = block.pieces
+        own = block.own
         rows = slice(start, start + len(some.nodes))
-        by, used = carried.by[rows], carried.used[rows, None]
+        by = carried.by[rows]
+        used = carried.used[rows, None]
         start = rows.stop
+        # functions of the nodes that ask, are used, and are not carried by others
         borne = carried.nodes[some.nodes] & some.asking
-        common, asking = partner[some.nodes], (some.asking & used & ~borne)[:, :, None]
+        asking = (some.asking & used & ~borne)[:, :, None]
+        common = partner[some.nodes]
         functions = dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
         functions, own_D, forces = handed_over(functions, own.sum(axis=2), common >= 0)
+        # their share in M and D, and what they pass to nodes of both sides
         values = (functions * asking)[pieces.look] @ block.mixed
         parts.append(entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
         if (common >= 0).any():
@@ -276,10 +349,16 @@ def _assembled(
 def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
     """Return by how much the pieces (k,) of looks may overlap facets of one curved face [m].
 
-    The looks have these corners (looks, v, 3), the facets are of side 2, of curvature H. It is told
-    at the corners and in the middle of each.
+    It is the most at the corners and in the middle of each.
+
+    Args:
+        corners: (looks, v, 3) of the facets of side 1 [m].
+        theirs: the facets of side 2.
+        H: (facets, 3, 3) their curvature [1/m].
+        block: the looks and their pieces.
     """
-    looks, pieces = block.looks, block.pieces
+    looks = block.looks
+    pieces = block.pieces
     points = np.concatenate([pieces.polygons, pieces.polygons.mean(axis=1, keepdims=True)], axis=1)
     one = hats(looks.polygons[pieces.look], points), corners[pieces.look]
     two = hats(pieces.seen, points), theirs.corners[pieces.facet]
@@ -289,15 +368,26 @@ def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
 def _carry(
     D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, borne: Mask, n: int
 ) -> sp.coo_matrix:
-    """Add to D what the nodes ``by`` (looks, v) of other facets carry of those ``borne``.
+    """Add to D what nodes of other facets carry, and return what belongs to it in M (``covering``).
 
-    The borne nodes are (looks, v). Return what belongs to it in M (``covering``).
+    Args:
+        D: (m,) ∫ psi of each node of side 1; it is added to.
+        points: (m, 3) nodes of side 1 [m].
+        theirs: the facets of side 2.
+        block: looks and their pieces.
+        by: (looks, v) nodes of the facet that carries.
+        borne: (looks, v) which nodes are carried.
+        n: how many nodes side 2 has.
     """
-    looks, pieces = block.looks, block.pieces
+    looks = block.looks
+    pieces = block.pieces
     rows = np.flatnonzero(borne.any(axis=1))
-    some, place = looks.pick(rows), np.full(len(looks.nodes), -1)
+    some = looks.pick(rows)
+    place = np.full(len(looks.nodes), -1)
     place[rows] = np.arange(len(rows))
-    own, there = block.own[rows], points[by[rows]] - some.middles[:, None, :]
+    own = block.own[rows]
+    # E of the nodes that carry, as the look sees them, and their weights D_k = sum_t E_tk D_t
+    there = points[by[rows]] - some.middles[:, None, :]
     seen = np.einsum("kvi,kic->kvc", there, some.frames)
     shares = extrapolation(seen, some.polygons) * borne[rows][:, :, None]
     weights = np.einsum("kpv,kp->kv", shares, own.sum(axis=2))

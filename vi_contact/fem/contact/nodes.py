@@ -22,15 +22,20 @@ class Rows:
 
     def pick(self, rows: Any) -> Self:
         """Return what is in these rows."""
-        return type(self)(*(getattr(self, one.name)[rows] for one in fields(cast(Any, self))))
+        return type(self)(*(getattr(self, each.name)[rows] for each in fields(cast(Any, self))))
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes(Rows):
-    """Hold nodes of a boundary, those of this rank or all.
+    """Hold k nodes of a boundary, those of this rank or all.
 
-    This is original numbers, coordinates, body normals, weights, held components, and the numbers
-    over all ranks of their free unknowns, -1 for held ones.
+    Attributes:
+        numbers: (k,) their original numbers.
+        points: (k, d) coordinates [m].
+        normals: (k, d) outward unit normals of the body.
+        weights: (k,) shares of the boundary [m], [m²].
+        held: (k, d) which components are prescribed.
+        unknowns: (k, d) numbers of their free unknowns over all ranks, -1 for held ones.
     """
 
     numbers: Indices
@@ -44,7 +49,7 @@ class Nodes(Rows):
 def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
     """Return the nodes of all parts, one part after the other."""
     return Nodes(
-        *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Nodes))
+        *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Nodes))
     )
 
 
@@ -53,8 +58,8 @@ def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
 
     It takes about 90 bytes for each in space.
     """
-    found = joined_nodes(from_each(comm, nodes))
-    return found.pick(np.argsort(found.numbers))
+    every = joined_nodes(from_each(comm, nodes))
+    return every.pick(np.argsort(every.numbers))
 
 
 def slots_of(comm: Comm, keys: Indices) -> Indices:
@@ -75,10 +80,17 @@ def asked(
 
     Where it raises on some rank it is asked for the rows of all, in the order of their slots, so
     that all ranks raise what one rank alone would. Collective.
+
+    Args:
+        comm: the ranks.
+        slots: (m,) numbers of this rank's rows among those of all ranks.
+        ask: a function of the values of some rows.
+        *values: arrays (m, …) of this rank's rows.
     """
     if comm.size == 1:
         return ask(*values)
-    answer, failed = (), False
+    answer = ()
+    failed = False
     try:
         answer = ask(*values)
     except Exception:  # also of a user's function: the other ranks must not wait for this one
@@ -91,4 +103,4 @@ def asked(
     # a function that depends on the rank may fail on one, and not on the others
     with together(comm):
         whole = ask(*rows)
-    return tuple(one[slots] for one in whole)
+    return tuple(array[slots] for array in whole)

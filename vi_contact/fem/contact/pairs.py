@@ -35,7 +35,7 @@ from .borrowing import Borrowed, borrowed
 from .bubbles import averaged
 from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
-from .faces import Boundary, boundary, checked_angle, split, tell_corners
+from .faces import boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
 from .hinges import hinges as hinge_numbers
 from .hinges import refuse_hinges
@@ -98,21 +98,25 @@ def contact_pair(
     """
     space, angle = _checked_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
+
+    # what faces what: nodes of both sides, and of each face of side 1 what it has in front
     one, two, shared = _two_sides(space, facets1, facets2)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
-    places = _tied_over(space, one, two)
-    one = replace(one, tied=places)
-    tied = one.nodes.numbers[places >= 0]
-    around = boundary(space, facets1, beyond=angle)
-    faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
+    one = replace(one, tied=_tied_over(space, one, two))
+    tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
+    faces = _faces(space, facets1, one, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
         nodes, matched = _by_face(
             faces, two, NodeToNode() if matching is None else matching, space.size
         )
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
+
+    # which nodes have a condition, and what became of the others: those of both sides, tied over,
+    # clamped or prescribed, hardly covered, not listed
     kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
-    nodes, matched = nodes.pick(kept), matched.pick(kept)
+    nodes = nodes.pick(kept)
+    matched = matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
     kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
     kinds |= _sorted_out(space, one, kinds["clamped"])
@@ -123,22 +127,30 @@ def contact_pair(
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
     kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
     _warn_of_coarse(space, one, two, little)
-    kinds["shared with another body"] = hinge & ~shared
-    kinds["tied to the other side"] = np.isin(one.nodes.numbers, tied)
+    kinds |= {
+        "shared with another body": hinge & ~shared,
+        "tied to the other side": np.isin(one.nodes.numbers, tied),
+    }
     kinds["in front of nothing"] &= ~kinds["tied to the other side"]
-    nodes, matched = nodes.pick(free), matched.pick(free)
+    nodes = nodes.pick(free)
+    matched = matched.pick(free)
     if points is not None:
         nodes, matched, kinds["not listed"] = _pick_listed(space, one, nodes, matched, points)
+
+    # gaps along the normals; nodes that are tied to one another share one condition
     alone = nodes.numbers
     directions = snapped(nodes.normals)
-    gap, P = _gap(space, one.name, two, nodes, directions, matched), matched.P
+    gap = _gap(space, one.name, two, nodes, directions, matched)
+    P = matched.P
     if len(space.tied_nodes):
         nodes, directions, shares = merged(space, one.name, nodes, directions, angle)
-        gap, P = shares @ gap, sp.csr_matrix(shares @ P)
+        gap = shares @ gap
+        P = sp.csr_matrix(shares @ P)
         kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
     uncovered = np.isin(nodes.numbers, little)
     census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
+
     # from here on every rank has its own nodes of side 1
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     nodes = nodes.pick(slots)
@@ -148,9 +160,13 @@ def contact_pair(
     conditions = NodalConditions(
         nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside
     )
-    weights = nodes.weights * space.forms.section.thickness
     surface = surface_of(
-        space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,), watched=watched
+        space,
+        [conditions],
+        gap0=gap[slots],
+        weights=nodes.weights * space.forms.section.thickness,
+        censuses=(census,),
+        watched=watched,
     )
     if uncovered.any():
         surface = replace(surface, uncovered=uncovered[slots])
@@ -165,7 +181,16 @@ def _checked_pair(
     matching: Matching | None,
     feature_angle: float,
 ) -> tuple[FemSpace, float]:
-    """Return the space of the system and the angle [rad]; InputError for wrong arguments."""
+    """Return the space of the system and the angle [rad]; InputError for wrong arguments.
+
+    Args:
+        system: the system of both bodies.
+        facets1: side 1.
+        facets2: side 2.
+        points: a list of coordinates, or None.
+        matching: how nodes find what they face.
+        feature_angle: [rad].
+    """
     space = contact_space(
         "contact_pair",
         system,
@@ -195,8 +220,14 @@ def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side,
     """Return both sides, and which nodes of side 1 are shared; InputError unless they can part.
 
     Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        facets1: side 1.
+        facets2: side 2.
     """
-    one, two = side_of(space, facets1), side_of(space, facets2)
+    one = side_of(space, facets1)
+    two = side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
     if shared.all():
         raise InputError(
@@ -214,7 +245,15 @@ def _pick_listed(
     matched: Matched,
     points: Sequence[Sequence[float]],
 ) -> tuple[Nodes, Matched, Mask]:
-    """Return the nodes nearest to the points, in their order, and which of side 1 are not."""
+    """Return the nodes nearest to the points, in their order, and which of side 1 are not.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1.
+        nodes: those of it with a condition.
+        matched: what they face.
+        points: (k, d) coordinates [m].
+    """
     chosen = listed(space, nodes, points, one.name)
     rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
     others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
@@ -237,7 +276,11 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
     """Return kind -> mask of the nodes of side 1 without a condition.
 
-    ``opposite``, ``clamped``: numbers of those in front of side 2, and of those that are clamped.
+    Args:
+        one: side 1, of m nodes.
+        shared: (m,) nodes of both sides.
+        opposite: numbers of those in front of side 2.
+        clamped: numbers of those that are clamped.
     """
     numbers = one.nodes.numbers
     return {
@@ -248,7 +291,14 @@ def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict
 
 
 def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> None:
-    """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered."""
+    """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1.
+        two: side 2.
+        little: numbers of these nodes.
+    """
     if len(little) and space.comm.rank == 0:
         where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
         log.warning(
@@ -265,9 +315,14 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
 
 
 def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
-    """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved.
+    """Return kind -> mask of the nodes of side 1 held in every component, at rest or moved.
 
     Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        clamped: (m,) nodes held in every component.
     """
     sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
     moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
@@ -280,9 +335,17 @@ def _watched(
     """Return what watches nodes of side 1 that are held in every component. Collective.
 
     They are given of all ranks, and in front of others that are held so too.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1.
+        two: side 2.
+        nodes: nodes of side 1, of all ranks.
+        matched: what they face.
     """
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
-    nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
+    nodes = nodes.pick(known)
+    matched = matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
         return ()
     directions = snapped(nodes.normals)
@@ -300,6 +363,13 @@ def _borrowed(
     """Return what nodes of side 1 without a pressure of their own take of neighbours.
 
     Those in front of nothing are left out.
+
+    Args:
+        space: the bodies' unknowns.
+        facets: those of side 1.
+        one: side 1.
+        kinds: what became of its nodes.
+        having: numbers of this rank's nodes with a pressure.
     """
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
@@ -309,6 +379,13 @@ def _borrowed(
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
     """Return which nodes of side 1 only glue bodies together. Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        two: side 2.
+        shared: (m,) nodes of both sides.
+        allowed: whether bodies may hang together so.
 
     Raises:
         InputError: there are some, and they are not ``allowed``.
@@ -331,11 +408,17 @@ def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
 
     They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
     They cannot part, as the two sides of a weld.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        two: side 2.
     """
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
-    own, others = space.leaders(one.nodes.numbers), space.leaders(two.nodes.numbers)
+    own = space.leaders(one.nodes.numbers)
+    others = space.leaders(two.nodes.numbers)
     for row in np.flatnonzero(
         np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
     ):
@@ -356,15 +439,32 @@ def _refuse_common(one: Side, two: Side) -> None:
         )
 
 
-def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1, with normals and weights of their own.
+def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tuple[Side, Array]]:
+    """Return the smooth faces of side 1, and the normals of their nodes over the whole side.
 
-    The nodes' normals and weights over the whole side are returned too.
+    Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        facets1: the facets of side 1.
+        one: side 1.
+        angle: that up to which facets round a node are one face [rad].
+
+    Returns:
+        pairs of a side, with normals and weights of its own, and normals (n, d).
+
+    Raises:
+        InputError: a face that meets itself.
     """
+    # the facets of all ranks are gathered only where some of them may turn so far
+    around = boundary(space, facets1, beyond=angle)
+    if len(around.vertices):
+        around = boundary(space, facets1)
     nodes, facet = split(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
-    face_of, found = around.faces(angle), []
+    face_of = around.faces(angle)
+    faces = []
     for face in range(int(face_of.max()) + 1):
         facets = one.facets[face_of == face]
         used = np.unique(facets)
@@ -380,23 +480,27 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
                 "feature_angle=)"
             )
         tied = None if one.tied is None else one.tied[used]
-        found.append(
-            (Side(one.name, own, np.searchsorted(used, facets), tied), one.nodes.normals[used])
-        )
-    return found
+        side = Side(one.name, own, np.searchsorted(used, facets), tied)
+        faces.append((side, one.nodes.normals[used]))
+    return faces
 
 
 def _by_face(
     faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
-    """Return (nodes with the normals and weights of their faces, what they face).
+    """Return nodes with the normals and weights of their faces, and what they face.
 
-    They are ordered by number; ``carried`` are numbers of nodes then.
+    They are ordered by number; ``carried`` are numbers of nodes then. Faces in front of nothing are
+    left out where the matching leaves out parts of sides, unless all are.
 
-    Faces in front of nothing are left out where the matching leaves out parts of sides, unless all
-    are.
+    Args:
+        faces: those of side 1, and the normals of their nodes over the whole side.
+        two: side 2.
+        matching: how nodes find what they face.
+        size: that of the mesh [m].
     """
-    refusal, found = None, []
+    refusal = None
+    found: list[tuple[Nodes, Matched]] = []
     for side, mean in faces:
         try:
             matched = _match(side, mean, two, matching, size)
@@ -405,26 +509,25 @@ def _by_face(
                 raise
             refusal = refusal or error
         else:
-            found.append(
-                (
-                    side.nodes.pick(matched.rows),
-                    replace(matched, carried=side.nodes.numbers[matched.carried]),
-                )
-            )
+            carried = side.nodes.numbers[matched.carried]
+            found.append((side.nodes.pick(matched.rows), replace(matched, carried=carried)))
     if refusal is not None and not found:
         raise refusal
+    # all faces together; a node of several of them has several rows, side by side
     nodes = joined_nodes([nodes for nodes, _ in found])
-    order = (
-        np.argsort(nodes.numbers, kind="stable")
-        if len(found) > 1
-        else np.arange(len(nodes.numbers))
+    order = np.arange(len(nodes.numbers))
+    if len(found) > 1:
+        order = np.argsort(nodes.numbers, kind="stable")
+    matches = [matched for _, matched in found]
+    weights = np.concatenate([matched.weights for matched in matches])
+    whole = Matched(
+        rows=np.arange(len(order)),
+        P=sp.csr_matrix(sp.vstack([matched.P for matched in matches])),
+        weights=weights,
+        overlap=np.concatenate([matched.overlap for matched in matches]),
+        covered=np.concatenate([matched.shares for matched in matches]),
+        carried=np.concatenate([matched.carried for matched in matches]),
     )
-    P = sp.csr_matrix(sp.vstack([matched.P for _, matched in found]))
-    weights, overlap, shares, carried = (
-        np.concatenate([getattr(matched, name) for _, matched in found])
-        for name in ("weights", "overlap", "shares", "carried")
-    )
-    whole = Matched(np.arange(len(order)), P, weights, overlap, shares, carried)
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
 
@@ -434,6 +537,13 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
     It is sought along its own normals or, since across a gap the partner of a corner lies on the
     bisector, along the ``mean`` normals of its nodes. This is not so where a matching leaves out
     what faces nothing: sides of a block would see the ground beside its base.
+
+    Args:
+        side: a face of side 1.
+        mean: (n, d) normals of its nodes over the whole side.
+        two: side 2.
+        matching: how nodes find what they face.
+        size: that of the mesh [m].
     """
     try:
         return matching.match(side, two, size)
@@ -448,7 +558,14 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 
 def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Return what is matched and not clamped.
+    """Return which of the matched nodes are not clamped.
+
+    Args:
+        space: the bodies' unknowns.
+        name: that of side 1.
+        nodes: its matched nodes.
+        two: side 2.
+        matched: what they face.
 
     Raises:
         InputError: clamped nodes face free ones, or none are left.
@@ -474,9 +591,20 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
 def _gap(
     space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
-    """Return initial gaps n·(P x_2 - x_1) >= 0.
+    """Return initial gaps n·(P x_2 - x_1) >= 0 [m].
 
     Overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0.
+
+    Args:
+        space: the bodies' unknowns.
+        name: that of side 1.
+        two: side 2.
+        nodes: m nodes of side 1.
+        directions: (m, d) unit vectors n towards side 2.
+        matched: what they face.
+
+    Raises:
+        InputError: a larger overlap.
     """
     gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)

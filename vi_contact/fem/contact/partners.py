@@ -34,6 +34,13 @@ def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int)
     """Return in front of which facets at a node of side 1 (m,) those at its partner lie.
 
     They are seen along the normal.
+
+    Args:
+        one: side 1.
+        node: the place of the node on side 1.
+        normal: (d,) its normal.
+        two: side 2.
+        partner: the place of its partner on side 2.
     """
     frame = nodal_frames(normal[None])[0][:, 1:]
     ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
@@ -94,7 +101,8 @@ def _within(ways: Array, arm: Array) -> Mask:
     middle = arm.sum(axis=0)
     if np.linalg.norm(middle) < FLAT:  # the node is in the middle of its facet
         return np.ones(len(ways), dtype=bool)
-    low, high = np.min(_angles(middle, arm)), np.max(_angles(middle, arm))
+    low = np.min(_angles(middle, arm))
+    high = np.max(_angles(middle, arm))
     angles = _angles(middle, ways)
     return np.asarray((angles >= low - BORDER) & (angles <= high + BORDER) & (high - low > BORDER))
 

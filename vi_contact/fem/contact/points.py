@@ -91,7 +91,8 @@ def contact_points(
             f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle"
         )
     numbers = integers(OWNER, "nodes", nodes, (None,))
-    m, d = len(numbers), space.dimension
+    m = len(numbers)
+    d = space.dimension
     if not m:
         raise InputError(f"{OWNER}: nodes is empty; list the nodes that may touch")
     outward = _spread("normals", normals, (m, d))
@@ -102,7 +103,8 @@ def contact_points(
         )
     area = _spread("weights", 1.0 if weights is None else weights, (m,), "m²")
     every = _nodes(space, "nodes", numbers, outward / length[:, None], area)
-    directions, faced = every.normals, None
+    directions = every.normals
+    faced = None
     gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
     if obstacle is not None:
         with together(space.comm):  # an obstacle of the user's may fail on one rank
@@ -123,7 +125,14 @@ def contact_points(
 
 
 def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") -> Array:
-    """Values of this shape, also given once for all nodes."""
+    """Values of this shape, also given once for all nodes.
+
+    Args:
+        meaning: what messages call the value.
+        value: numbers for each node, or once for all.
+        shape: that of the result, nodes first.
+        unit: what messages call its unit.
+    """
     once = shape[1:] if np.ndim(value) < len(shape) else shape
     return np.array(np.broadcast_to(array(OWNER, meaning, value, once, unit=unit), shape))
 
@@ -131,11 +140,17 @@ def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") ->
 def _nodes(
     space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array
 ) -> Nodes:
-    """Return what all ranks need to know of nodes. Collective."""
-    d, own = (
-        space.dimension,
-        np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers]),
-    )
+    """Return what all ranks need to know of nodes. Collective.
+
+    Args:
+        space: the unknowns of the matrices.
+        meaning: what messages call the nodes.
+        numbers: (m,) of nodes on any ranks.
+        normals: (m, d) outward unit normals.
+        weights: (m,) shares of the boundary [m], [m²].
+    """
+    d = space.dimension
+    own = np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
     found = space.at_nodes(numbers, own)
     for number in numbers[found[:, 0] == 0.0]:
         raise InputError(

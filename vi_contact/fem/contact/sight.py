@@ -31,10 +31,14 @@ PAIRS = 2**18  # of pieces that are cut at once
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Hold the facets of a side.
+    """Hold the k facets of a side.
 
-    This is rows of nodes (k, v), corners (k, v, 3), middles, outward normals, and the largest
-    distance of a corner from the middle.
+    Attributes:
+        nodes: (k, v) rows of nodes.
+        corners: (k, v, 3) points of these [m].
+        middles: (k, 3) means of the corners [m].
+        normals: (k, 3) outward unit normals.
+        reach: (k,) largest distance of a corner from the middle [m].
     """
 
     nodes: Indices
@@ -47,7 +51,9 @@ class Facets:
 def facets_of(side: Side, sense: int) -> Facets:
     """Return the facets of a side.
 
-    They are anticlockwise (sense 1) or clockwise (-1) seen from outside.
+    Args:
+        side: the boundary.
+        sense: 1 for corners anticlockwise as seen from outside, -1 for clockwise ones.
 
     Raises:
         InputError: slivers, and quadrilaterals that are not convex.
@@ -56,21 +62,21 @@ def facets_of(side: Side, sense: int) -> Facets:
     corners = side.nodes.points[nodes]
     middles = corners.mean(axis=1)
     spokes = corners - middles[:, None, :]
-    normals = np.linalg.svd(spokes)[2][:, -1]  # along which the facet extends least
+    # the plane of a facet is at right angles to the direction in which it extends least
+    normals = np.linalg.svd(spokes)[2][:, -1]
     inward = np.sum(normals[:, None, :] * side.nodes.normals[nodes], axis=(1, 2)) < 0.0
     normals = np.where(inward[:, None], -normals, normals)
+    # order the corners by their angle round the middle, from that of the first one on
     seen = np.einsum("kvi,kic->kvc", spokes, nodal_frames(normals)[:, :, 1:])
-    angle = np.arctan2(cross(seen[:, :1], seen), np.sum(seen[:, :1] * seen, axis=2)) % (2.0 * np.pi)
+    sine = cross(seen[:, :1], seen)
+    cosine = np.sum(seen[:, :1] * seen, axis=2)
+    angle = np.arctan2(sine, cosine) % (2.0 * np.pi)
     angle[:, 0] = 0.0
     order = np.argsort(angle, axis=1)
-    nodes, corners = (
-        np.take_along_axis(nodes, order, axis=1),
-        np.take_along_axis(corners, order[:, :, None], axis=1),
-    )
-    seen, reach = (
-        np.take_along_axis(seen, order[:, :, None], axis=1),
-        np.linalg.norm(spokes, axis=2).max(axis=1),
-    )
+    nodes = np.take_along_axis(nodes, order, axis=1)
+    corners = np.take_along_axis(corners, order[:, :, None], axis=1)
+    seen = np.take_along_axis(seen, order[:, :, None], axis=1)
+    reach = np.linalg.norm(spokes, axis=2).max(axis=1)
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
         raise InputError(
             f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal "
@@ -103,16 +109,25 @@ class Looks(Rows):
 
 
 def looks_of(ours: Facets, nodes: Nodes) -> Looks:
-    """Return the looks of all nodes of side 1, one a facet where they all look along its normal."""
+    """Return the looks of all nodes of side 1, one a facet where they all look along its normal.
+
+    Looks along which a facet is seen edge on, or folded, are left out.
+
+    Args:
+        ours: the facets of side 1.
+        nodes: its nodes, with their normals.
+    """
     v = ours.nodes.shape[1]
     normals = nodes.normals[ours.nodes]
     plane = np.linalg.norm(normals - ours.normals[:, None, :], axis=2).max(axis=1) < 1e-12
+    # one look for all nodes of a plane facet, then one for each node of every other facet
     facet = np.concatenate([np.flatnonzero(plane), np.repeat(np.flatnonzero(~plane), v)])
-    asking = (
-        np.concatenate([np.ones((plane.sum(), v)), np.tile(np.eye(v), ((~plane).sum(), 1))]) > 0.0
-    )
+    all_nodes = np.ones((plane.sum(), v))
+    each_node = np.tile(np.eye(v), ((~plane).sum(), 1))
+    asking = np.concatenate([all_nodes, each_node]) > 0.0
     along = np.concatenate([ours.normals[plane], normals[~plane].reshape(-1, 3)])
-    frames, slant = nodal_frames(along)[:, :, 1:], np.sum(along * ours.normals[facet], axis=1)
+    frames = nodal_frames(along)[:, :, 1:]
+    slant = np.sum(along * ours.normals[facet], axis=1)
     polygons = np.einsum("kvi,kic->kvc", ours.corners[facet] - ours.middles[facet, None, :], frames)
     looks = Looks(
         ours.nodes[facet],
@@ -131,8 +146,11 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
 class Pieces(Rows):
     """Hold what looks share with facets of side 2.
 
-    This is numbers of both, polygons (k, m, 2), the facet as it is seen (k, v, 2), and its height h
-    along the look, h_0 + h_1 x + h_2 y.
+    Attributes:
+        look, facet: (k,) numbers of both.
+        polygons: (k, m, 2) what they share, in the plane of the look [m].
+        seen: (k, v, 2) the facet as it is seen [m].
+        height: (k, 3) its height along the look, h_0 + h_1 x + h_2 y [m].
     """
 
     look: Indices
@@ -157,85 +175,114 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 
 def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
-    """Return what these looks share with these facets of side 2.
+    """Return what looks share with facets of side 2, where these face each other.
 
-    They do where they face each other and share something.
+    Args:
+        looks: those of side 1.
+        theirs: the facets of side 2.
+        look: (n,) rows of looks.
+        facet: (n,) the facet that each is compared with.
     """
-    offset, normals = theirs.middles[facet] - looks.middles[look], looks.normals[look]
+    # pairs that can share something: opposite normals, and circles that meet
+    offset = theirs.middles[facet] - looks.middles[look]
+    normals = looks.normals[look]
     away = np.linalg.norm(offset - np.sum(offset * normals, axis=1)[:, None] * normals, axis=1)
     slope = np.sum(theirs.normals[facet] * normals, axis=1)
     near = (slope < -EDGE_ON) & (away <= looks.reach[look] + theirs.reach[facet])
-    look, facet, offset, slope = look[near], facet[near], offset[near], slope[near]
+    look = look[near]
+    facet = facet[near]
+    offset = offset[near]
+    slope = slope[near]
+    # clip the facet, as it is seen, by the look's own polygon
     frames = looks.frames[look]
     seen = np.einsum("kvi,kic->kvc", theirs.corners[facet] - looks.middles[look, None, :], frames)
     polygons = overlaps(seen, looks.polygons[look])
+    # the plane of the facet, n·(x - x_f) = 0, solved for the height along the look
     normals = theirs.normals[facet]
     height = np.column_stack(
         [np.sum(offset * normals, axis=1), -np.einsum("kic,ki->kc", frames, normals)]
     )
-    found = Pieces(look, facet, polygons, seen, height / slope[:, None])
+    pieces = Pieces(look, facet, polygons, seen, height / slope[:, None])
     large = areas(polygons) > SHARED * areas(looks.polygons)[look]
-    return found.pick(np.flatnonzero(large & (turns(seen) > 0.0).all(axis=1)))
+    return pieces.pick(np.flatnonzero(large & (turns(seen) > 0.0).all(axis=1)))
 
 
 def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
-    """Return (what looks share with the nearest facets of side 2, share of each covered).
+    """Return what looks share with the nearest facets of side 2 in front of them.
 
-    The facets are the nearest in front of them; ``tree``: that of the middles of the facets of side
-    2.
+    Args:
+        looks: those of side 1.
+        theirs: the facets of side 2.
+        tree: a KD-tree of their middles.
+
+    Returns:
+        pieces, and the share (looks,) of each look that they cover.
     """
-    k, size = len(looks.nodes), areas(looks.polygons)
-    found, radius = nearby(looks, theirs, tree)
-    sure = complete(found, looks, theirs, radius)
-    found = joined(
-        [
-            found.pick(np.flatnonzero(sure[found.look])),
-            *everything(looks, np.flatnonzero(~sure), theirs),
-        ]
-    )
-    twice = np.bincount(found.look, areas(found.polygons), k) > (1.0 + WHOLE) * size
-    found = nearest(found, twice | (layers(found, theirs, k) > 1), size)
-    return found, np.bincount(found.look, areas(found.polygons), k) / size
+    count = len(looks.nodes)
+    size = areas(looks.polygons)
+    # facets near by first; all of side 2 only where something nearer may be farther to the side
+    pieces, radius = nearby(looks, theirs, tree)
+    sure = complete(pieces, looks, theirs, radius)
+    rest = everything(looks, np.flatnonzero(~sure), theirs)
+    pieces = joined([pieces.pick(np.flatnonzero(sure[pieces.look])), *rest])
+    # where several layers lie behind one another, only the nearest counts
+    twice = np.bincount(pieces.look, areas(pieces.polygons), count) > (1.0 + WHOLE) * size
+    pieces = nearest(pieces, twice | (layers(pieces, theirs, count) > 1), size)
+    return pieces, np.bincount(pieces.look, areas(pieces.polygons), count) / size
 
 
 def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
-    """Return (what looks share with facets of side 2 in a ball around each, the radii [m]).
+    """Return what looks share with facets of side 2 in a ball around each, and the radii [m].
 
-    The balls are large enough for the facets next to the one with the nearest middle; where it
+    The balls are large enough for the facets next to the one with the nearest middle; where one
     holds too many nothing is looked at.
+
+    Args:
+        looks: those of side 1.
+        theirs: the facets of side 2.
+        tree: a KD-tree of their middles.
     """
-    radius = (tree.query(looks.middles)[0] + looks.reach + float(theirs.reach.max())) * (
-        1.0 + WHOLE
-    )
+    farthest = tree.query(looks.middles)[0] + looks.reach + float(theirs.reach.max())
+    radius = farthest * (1.0 + WHOLE)
     few = tree.query_ball_point(looks.middles, radius, return_length=True) <= NEARBY
     near = tree.query_ball_point(looks.middles, np.where(few, radius, 0.0))
-    look = np.repeat(np.arange(len(radius)), [len(one) for one in near])
+    look = np.repeat(np.arange(len(radius)), [len(facets) for facets in near])
     return shared(looks, theirs, look, np.concatenate(near).astype(np.int64)), radius
 
 
-def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask:
-    """Return whether nothing that is nearer to a look can lie outside of its ball.
-
-    It would be nearer than what was found.
+def complete(pieces: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask:
+    """Return whether nothing nearer to a look than its pieces can lie outside of its ball.
 
     Where one layer, at most h away along the normal, covers all of a look, a nearer facet has its
     middle at most h along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 +
     reach_2)²) of the look's middle.
+
+    Args:
+        pieces: what was found in the balls.
+        looks: those of side 1.
+        theirs: the facets of side 2.
+        radius: (looks,) of the balls [m].
+
+    Returns:
+        (looks,) truth values.
     """
-    covered, farthest = (
-        np.bincount(found.look, areas(found.polygons), len(radius)),
-        np.zeros(len(radius)),
-    )
-    np.maximum.at(farthest, found.look, found.distances(found.polygons).max(axis=1, initial=0.0))
+    covered = np.bincount(pieces.look, areas(pieces.polygons), len(radius))
+    farthest = np.zeros(len(radius))
+    np.maximum.at(farthest, pieces.look, pieces.distances(pieces.polygons).max(axis=1, initial=0.0))
     whole = np.abs(covered / areas(looks.polygons) - 1.0) <= WHOLE
     inside = np.hypot(farthest, looks.reach + float(theirs.reach.max())) <= radius
-    return np.asarray(whole & inside & (layers(found, theirs, len(radius)) == 1))
+    return np.asarray(whole & inside & (layers(pieces, theirs, len(radius)) == 1))
 
 
 def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
     """Yield what these rows of looks share with any facet of side 2.
 
     Rows whose normal misses a ball around all of it are left out.
+
+    Args:
+        looks: those of side 1.
+        rows: (r,) which of them.
+        theirs: the facets of side 2.
     """
     middle = 0.5 * (theirs.middles.min(axis=0) + theirs.middles.max(axis=0))
     span = (
@@ -244,16 +291,23 @@ def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
         + np.linalg.norm(theirs.middles - middle, axis=1).max()
     )
     rows = rows[beside(looks, rows, middle) <= (1.0 + WHOLE) * span[rows]]
-    for some in (
-        np.array_split(rows, -(-len(rows) * len(theirs.nodes) // DISTANCES)) if len(rows) else ()
-    ):
+    if not len(rows):
+        return
+    # so many rows at once that a table of their distances to all facets is not too large
+    for some in np.array_split(rows, -(-len(rows) * len(theirs.nodes) // DISTANCES)):
         away = beside(looks, some[:, None], theirs.middles)
         look, facet = np.nonzero(away <= (1.0 + WHOLE) * (looks.reach[some, None] + theirs.reach))
         yield shared(looks, theirs, some[look], facet)
 
 
 def beside(looks: Looks, rows: Indices, points: Array) -> Array:
-    """Return how far points are from the normals through the middles of these rows of looks [m]."""
+    """Return how far points are from the normals through the middles of these rows of looks [m].
+
+    Args:
+        looks: those of side 1.
+        rows: which of them.
+        points: (…, 3) [m].
+    """
     offset = points - looks.middles[rows]
     along = np.sum(offset * looks.normals[rows], axis=-1)
     return np.sqrt(np.maximum(np.sum(offset**2, axis=-1) - along**2, 0.0))
@@ -263,7 +317,16 @@ def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
     """Return how many parts without a common node the pieces in front of each look are of.
 
     One may hide another.
+
+    Args:
+        pieces: what looks share with facets.
+        theirs: the facets of side 2.
+        count: how many looks there are.
+
+    Returns:
+        (count,) numbers of parts.
     """
+    # a node of side 2 as each look sees it is a thing of its own: link pieces to their nodes
     nodes = pieces.look[:, None] * (int(theirs.nodes.max()) + 1) + theirs.nodes[pieces.facet]
     nodes = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape)
     links = np.repeat(np.arange(len(nodes)), nodes.shape[1]), len(nodes) + nodes.ravel()
@@ -272,37 +335,53 @@ def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
 
 
 def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
-    """Return the pieces, in front of looks with several layers without what lies behind others."""
+    """Return the pieces, in front of looks with several layers without what lies behind others.
+
+    Args:
+        pieces: what looks share with facets.
+        several: (looks,) which looks have several layers in front of them.
+        size: (looks,) areas of their polygons [m²].
+    """
     among = several[pieces.look]
     ours = pieces.pick(np.flatnonzero(among))
     ours = ours.pick(np.argsort(ours.look, kind="stable"))
+    least = SHARED * size[ours.look]
+
+    # of two pieces of one look that overlap, the one that is nearer where they do hides the other
     piece, other = pairs_of(ours.look)
-    least, hides = SHARED * size[ours.look], np.zeros(len(piece), dtype=bool)
+    hides = np.zeros(len(piece), dtype=bool)
     for rows in np.array_split(np.arange(len(piece)), 1 + len(piece) // PAIRS):
-        one, two = ours.pick(piece[rows]), ours.pick(other[rows])
+        one = ours.pick(piece[rows])
+        two = ours.pick(other[rows])
         common = overlaps(one.polygons, two.polygons)
-        middles, shares = common.mean(axis=1, keepdims=True), areas(common)
-        hides[rows] = (shares > least[piece[rows]]) & (
-            two.distances(middles) < one.distances(middles)
-        )[:, 0]
-    piece, other = piece[hides], other[hides]
+        middles = common.mean(axis=1, keepdims=True)
+        behind = two.distances(middles) < one.distances(middles)
+        hides[rows] = (areas(common) > least[piece[rows]]) & behind[:, 0]
+    piece = piece[hides]
+    other = other[hides]
+
+    # cut out of each piece what hides it, one hider of every piece at a time; what is left may be
+    # several polygons, each with the number of its piece
     turn = np.arange(len(piece)) - np.searchsorted(piece, piece)
-    owner, left = np.arange(len(ours.look)), ours.polygons
-    # what is left of each, without the next that hides it
+    owner = np.arange(len(ours.look))
+    left = ours.polygons
     for k in range(int(turn.max(initial=-1)) + 1):
         hider = np.full(len(ours.look), -1)
         hider[piece[turn == k]] = other[turn == k]
-        cut_now = hider[owner] >= 0
-        now = owner[cut_now]
-        place, rest = without(left[cut_now], ours.polygons[hider[now]], least[now])
-        owner, left = np.concatenate([owner[~cut_now], now[place]]), stacked([left[~cut_now], rest])
+        hidden = hider[owner] >= 0
+        now = owner[hidden]
+        place, rest = without(left[hidden], ours.polygons[hider[now]], least[now])
+        owner = np.concatenate([owner[~hidden], now[place]])
+        left = stacked([left[~hidden], rest])
     return joined([pieces.pick(np.flatnonzero(~among)), replace(ours.pick(owner), polygons=left)])
 
 
 def pairs_of(groups: Indices) -> tuple[Indices, Indices]:
     """Return all pairs of different places with the same number in ``groups``, which ascend."""
     _, first, counts = np.unique(groups, return_index=True, return_counts=True)
-    start, count = np.repeat(first, counts), np.repeat(counts, counts)
+    # each member of a group of n is followed by n others, that count up from the group's first
+    start = np.repeat(first, counts)
+    count = np.repeat(counts, counts)
     one = np.repeat(np.arange(len(groups)), count)
     two = np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(start, count)
     return one[one != two], two[one != two]

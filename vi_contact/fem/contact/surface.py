@@ -27,7 +27,7 @@ from .borrowing import borrowed
 from .bubbles import averaged
 from .counting import census_on_ranks, tell
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
+from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
 from .hinges import gathered_points, hinges_of, refuse_hinges
 from .matching import EDGE_ON
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
@@ -96,16 +96,21 @@ def contact_surface(
     )
     angle = checked_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
-    comm, every = space.comm, nodes_on(space, facets)
-    whole, hinge = every, hinges_of(space, every)
+    comm = space.comm
+
+    # this rank's nodes of the facets, and those of them that are asked for: listed, or not clamped
+    every = nodes_on(space, facets)
+    hinge = hinges_of(space, every)
     if not hinges:
         refuse_hinges("contact_surface", (facets.name,), gathered_points(comm, every, hinge))
-    chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
-    whole = (
-        free_nodes(space, whole, facets.name)
-        if chosen is None
-        else whole.pick(_rows_of(whole, chosen))
-    )
+    if points is None:
+        chosen = None
+        whole = free_nodes(space, every, facets.name)
+    else:
+        chosen = listed(space, everywhere(comm, every), points, facets.name)
+        whole = every.pick(_rows_of(every, chosen))
+
+    # one node for each face, the obstacle's answer there, and one condition for each direction
     around = boundary(space, facets, beyond=angle)
     nodes, _ = split(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
@@ -113,8 +118,12 @@ def contact_surface(
     directions, gap = asked(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
+
+    # conditions in the order of their nodes, or of the list
     order = np.argsort(_places(nodes, chosen), kind="stable")
-    nodes, directions, gap = nodes.pick(order), directions[order], gap[order]
+    nodes = nodes.pick(order)
+    directions = directions[order]
+    gap = gap[order]
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
@@ -124,7 +133,10 @@ def contact_surface(
     conditions = NodalConditions(
         nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
     )
-    held, kept = every.held.all(axis=1), np.isin(every.numbers, whole.numbers)
+
+    # what became of the nodes without a condition
+    held = every.held.all(axis=1)
+    kept = np.isin(every.numbers, whole.numbers)
     kinds = dict(clamped_or_prescribed(space, every, held))
     kinds |= {
         "not listed": ~(held | kept),
@@ -148,12 +160,13 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
 
     There are some where what they face, or bubbles are measured from, is moved.
     """
-    parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
+    parts = _faced_by(conditions)
     moves = bool(parts) and space.moves
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
-    moved, values = moved_by_held(space, [conditions]), space.prescribed_values
+    moved = moved_by_held(space, [conditions])
+    values = space.prescribed_values
     return {"motion": lambda t: moved(values(t))[0], "slide": lambda t: moved(values(t))[1]}
 
 
@@ -166,18 +179,17 @@ def moved_by_held(
     conditions move towards their nodes, (m,), and along their tangents, (m, d-1). Both are
     collective.
     """
-    frames, free = (
-        NodalFrames(*given(conditions)),
-        ~joined_nodes([one.nodes for one in conditions]).held,
-    )
+    # which tangents of each condition are free, and its vectors
+    frames = NodalFrames(*given(conditions))
+    free = ~joined_nodes([one.nodes for one in conditions]).held
     free = (
         np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
         & frames.rubs
     )
-    tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
-    faced = [
-        [part for part in (one.facing, *one.bubbles) if part is not None] for one in conditions
-    ]
+    tangents = tangent_vectors(frames.directions, frames.place)
+    directions = frames.directions
+    # what conditions face, and shares of it
+    faced = [_faced_by(part) for part in conditions]
     own = [np.zeros(0, dtype=np.int64), *(part.nodes.numbers for parts in faced for part in parts)]
     numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate(own))))
     shares = [
@@ -187,18 +199,22 @@ def moved_by_held(
 
     def moved(nodal: Array) -> tuple[Array, Array]:
         nodal = nodal.reshape(-1, space.dimension)
-        found = space.at_nodes(
-            numbers, nodal if space.hierarchy is None else space.hierarchy.bent(nodal)
-        )
-        there = np.concatenate(
-            [
-                sum((P @ found[place] for P, place in parts), start=np.zeros_like(one.directions))
-                for one, parts in zip(conditions, shares, strict=True)
-            ]
-        )
+        if space.hierarchy is not None:
+            nodal = space.hierarchy.bent(nodal)
+        values = space.at_nodes(numbers, nodal)
+        motions = []
+        for part, pairs in zip(conditions, shares, strict=True):
+            still = np.zeros_like(part.directions)
+            motions.append(sum((P @ values[place] for P, place in pairs), start=still))
+        there = np.concatenate(motions)
         return -np.sum(there * directions, axis=1), np.einsum("ijk,ij->ik", tangents, there) * free
 
     return moved
+
+
+def _faced_by(part: NodalConditions) -> list[Facing]:
+    """Return what conditions face, and bubbles that they are measured from."""
+    return [other for other in (part.facing, *part.bubbles) if other is not None]
 
 
 def _obstacle(
@@ -208,6 +224,13 @@ def _obstacle(
 
     This is directions and initial gaps, of all ``count`` points of a boundary or of those of a
     rank.
+
+    Args:
+        obstacle: what the boundary faces; Touching() when None.
+        size: that of the mesh [m].
+        name: that of the boundary.
+        angle: the feature angle [rad].
+        count: how many points the boundary has on all ranks.
     """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
@@ -229,6 +252,12 @@ def _watched(
 
     They are nodes of this rank, watched at each of their faces that looks towards the obstacle.
     There is an InputError where such a face is in the obstacle at the start.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        nodes: those of this rank that are held.
+        obstacle: what the boundary faces.
     """
     slots = slots_of(space.comm, nodes.numbers)
     directions, gap = asked(
@@ -247,23 +276,18 @@ def _looking(
     """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
-        directions, gap = np.zeros_like(points), np.zeros(len(points))
+        directions = np.zeros_like(points)
+        gap = np.zeros(len(points))
+        if not len(points):  # users' functions need not cope with none
+            return directions, gap
         try:
-            found = (
-                facing(Touching() if obstacle is None else obstacle, points, normals)
-                if len(points)
-                else None
-            )
+            ways, gaps = facing(Touching() if obstacle is None else obstacle, points, normals)
         except InputError:
-            found = None
-        if found is not None:
-            rows = np.flatnonzero(
-                np.sum(found[0] * normals, axis=1) > EDGE_ON * np.linalg.norm(found[0], axis=1)
-            )
-            directions[rows], gap[rows] = (
-                snapped(found[0][rows]),
-                admissible_gap(found[1][rows], points[rows], size),
-            )
+            return directions, gap
+        cosine = np.sum(ways * normals, axis=1)
+        rows = np.flatnonzero(cosine > EDGE_ON * np.linalg.norm(ways, axis=1))
+        directions[rows] = snapped(ways[rows])
+        gap[rows] = admissible_gap(gaps[rows], points[rows], size)
         return directions, gap
 
     return ask
@@ -294,10 +318,18 @@ def one_per_direction(
     Faces of one direction at a node are one condition: weights added, smaller gap.
 
     ``whole``: the nodes with the weights of all their faces.
+
+    Args:
+        whole: the nodes, with the weights of all their faces.
+        nodes: one for each face of a node, those of one node in a row.
+        directions: (k, d) contact directions of these.
+        gap: (k,) their gaps [m].
     """
     if len(nodes.numbers) == len(whole.numbers):
         return nodes, directions, gap
-    weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
+    weights = nodes.weights.copy()
+    gap = gap.copy()
+    kept = np.ones(len(nodes.numbers), dtype=bool)
     numbers, starts, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
     entire = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
     for node, start, count in zip(
@@ -324,6 +356,13 @@ def contact_space(
 ) -> FemSpace:
     """Return the space of a system. Collective.
 
+    Args:
+        owner: who asks.
+        system: the system of ``assemble``.
+        groups: what each boundary group means, and the group.
+        points: a list of coordinates, or None.
+        others: arguments that all ranks must give alike.
+
     Raises:
         InputError: another kind, groups of another mesh, a list of no points, and where ranks give
             other ``groups``, ``points`` or ``others``.
@@ -347,7 +386,9 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     if space.hierarchy is not None:
         blocks = np.intersect1d(blocks, space.hierarchy.vertices[1])
     blocks = blocks[np.argsort(space.nodes[blocks])]
-    weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
+    weights = values[blocks, 0]
+    sums = values[blocks, 1:]
+    held = space.held[blocks]
     if not largest(space.comm, len(blocks)):
         raise InputError(
             f"no contact nodes: boundary group '{facets.name}' is empty: choose a group with facets"
@@ -365,7 +406,13 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
-    """Return the nodes that are not clamped; InputError when none is left on any rank."""
+    """Return the nodes that are not clamped; InputError when none is left on any rank.
+
+    Args:
+        space: the body's unknowns.
+        nodes: those of this rank.
+        name: that of the boundary.
+    """
     clamped = nodes.held.all(axis=1)
     count = round(total(space.comm, clamped.sum()))
     if not largest(space.comm, (~clamped).any()):
@@ -379,9 +426,15 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
 
 
 def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
-    """Return the numbers of those nodesthat are nearest to the listed points.
+    """Return the numbers of those nodes that are nearest to the listed points.
 
     The nodes are given of all ranks; the numbers are in the order of the points.
+
+    Args:
+        space: the body's unknowns.
+        nodes: those of all ranks.
+        points: (k, d) coordinates [m].
+        name: that of the boundary.
     """
     rows = []
     for point in points:
@@ -426,8 +479,17 @@ def merged(
 
     InputError for a node that is tied in some components only, or to one without such a
     condition.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        nodes: those of all m conditions.
+        directions: (m, d) contact directions.
+        angle: the feature angle [rad].
     """
-    leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
+    leaders = space.leaders(nodes.numbers)
+    # the row of a leader with the direction nearest to that of each node which follows it
+    target = np.arange(len(nodes.numbers))
     for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
         alike = np.flatnonzero(nodes.numbers == leaders[row])
         turn = directions[alike] @ directions[row]
@@ -446,6 +508,7 @@ def merged(
                 f"the others as points=, or {remedy}"
             )
         target[row] = alike[turn.argmax()]
+    # one condition for all that have one target: shares are their weights over the sum of these
     kept, place = np.unique(target, return_inverse=True)
     sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))
     weights = np.asarray(sums.sum(axis=1)).ravel()
@@ -462,19 +525,23 @@ def with_ties(
     """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``.
 
     Collective.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        nodes: those of this rank's m conditions.
+        directions: (m, d) contact directions.
+        gap: (m,) [m].
+        angle: the feature angle [rad].
     """
     tied = np.isin(nodes.numbers, space.tied_nodes)
     parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
-    every, (n, g) = (
-        joined_nodes([part[0] for part in parts]),
-        (np.concatenate([p[i] for p in parts]) for i in (1, 2)),
-    )
+    every = joined_nodes([part[0] for part in parts])
+    n, g = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
     if not len(g):
         return nodes, directions, gap
     every, n, shares = merged(space, name, every, n, angle)
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
-    nodes, directions = (
-        joined_nodes([nodes.pick(~tied), every.pick(own)]),
-        np.concatenate([directions[~tied], n[own]]),
-    )
+    nodes = joined_nodes([nodes.pick(~tied), every.pick(own)])
+    directions = np.concatenate([directions[~tied], n[own]])
     return nodes, directions, np.concatenate([gap[~tied], (shares @ g)[own]])

@@ -129,6 +129,15 @@ def watched_nodes(
     """Return what watches these nodes of this rank; none where nothing moves that is prescribed.
 
     Collective.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        nodes: this rank's, held in every component.
+        directions: (k, d) towards what they face.
+        gap0: (k,) gaps at rest [m].
+        facing: nodes of side 2 that they face, None before a rigid obstacle.
+        side: name of side 2.
     """
     if not largest(space.comm, len(nodes.numbers)) or not space.moves:
         return ()
@@ -140,6 +149,11 @@ def clamped_or_prescribed(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, 
 
     They are those of this rank, prescribed in every component: those that some condition moves are
     "prescribed", the others "clamped".
+
+    Args:
+        space: the body's unknowns.
+        nodes: k nodes of a boundary.
+        mask: (k,) which of them.
     """
     moved = np.zeros(len(space.nodes), dtype=bool)
     for support in space.supports:

@@ -20,19 +20,23 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
 
     It is None without CHOLMOD, and where it cannot: not positive definite, which PETSc says better,
     or too large.
+
+    Args:
+        comm: the ranks.
+        mat: the PETSc matrix.
+        last: owned unknowns that come last.
     """
     functions = load_cholmod(comm)
     if functions is None:
         return None
-    rows, made = rows_of(mat), None
+    rows = rows_of(mat)
+    made = None
     try:
         if comm.size == 1:
             made = ContactLast(functions, rows, last)
         else:
-            whole, first = (
-                sp.vstack(comm.mpi.allgather(rows), format="csr"),
-                mat.getOwnershipRange(),
-            )
+            whole = sp.vstack(comm.mpi.allgather(rows), format="csr")
+            first = mat.getOwnershipRange()
             made = ContactLast(
                 functions, whole, last, whole=_gathering(comm.mpi, mat), mine=slice(*first)
             )
@@ -46,7 +50,9 @@ def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
 
     It reads the matrix once for eight of them.
     """
-    functions, A, n = load_loops(SerialComm()), rows_of(matrix.mat), matrix.rows
+    functions = load_loops(SerialComm())
+    A = rows_of(matrix.mat)
+    n = matrix.rows
     if functions is None or A.indices.dtype != np.int32:
         return lambda x: np.stack([matrix @ row for row in x])
     kept = A.indptr, A.indices, A.data, np.empty(AT_ONCE * n)
@@ -64,7 +70,8 @@ def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
 def _gathering(mpi: Any, mat: Any) -> Callable[[Array], Array]:
     """Return what gathers the owned entries of a vector, into one array again and again."""
     ends = mat.getOwnershipRanges()
-    counts, x = np.diff(ends), np.empty(ends[-1])
+    counts = np.diff(ends)
+    x = np.empty(ends[-1])
 
     def whole(b: Array) -> Array:
         mpi.Allgatherv(np.ascontiguousarray(b), [x, counts])

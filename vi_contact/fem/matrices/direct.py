@@ -52,6 +52,11 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
 
     The log says what is taken instead of what is missing, unless options of the user choose
     (``own``). Collective.
+
+    Args:
+        mat: the PETSc matrix.
+        symmetric: whether it is.
+        own: whether options of the user choose the factor.
     """
     serves = symmetric and own_serves(mat)
     mumps = packages.petsc_has("mumps") and not serves
@@ -76,6 +81,11 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
 
     PETSc raised ``error``, or solved to numbers that are not finite. Collective where nothing was
     raised.
+
+    Args:
+        pc: the preconditioner that was to factorise.
+        mat: the PETSc matrix.
+        error: what PETSc raised, or None.
     """
     rows = mat.getSize()[0]
     said = "" if error is None else str(error).splitlines()[-1].split("] ", 1)[-1].strip()

@@ -20,8 +20,8 @@ from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra, as_pet
 from .petsc_rows import aij_of, rows_of
 
 COMPACT = 20_000  # unknowns in space from which on it pays: those that are solved iteratively
-# entries of blocks over those that are not zero, at so many nodes: with more, no blocks
-WASTE, SAMPLE = (1.8, 1000)
+WASTE = 1.8  # entries of blocks over those that are not zero: with more, no blocks
+SAMPLE = 1000  # nodes at which these are counted
 
 
 class Half(PetscMatrix):
@@ -52,7 +52,9 @@ class Replaced(PetscMatrix):
 
     def __init__(self, base: PetscMatrix, rows: Indices, part: Any, alike: bool) -> None:
         super().__init__(part)
-        self._base, self._rows, self._alike = base, rows, alike
+        self._base = base
+        self._rows = rows
+        self._alike = alike
 
     @property
     def rows(self) -> int:
@@ -62,7 +64,9 @@ class Replaced(PetscMatrix):
     @property
     def mat(self) -> Any:
         """Return the whole matrix, made anew."""
-        whole, part, kind = self._base.mat, rows_of(self.stored), PETSc.IntType
+        whole = self._base.mat
+        part = rows_of(self.stored)
+        kind = PETSc.IntType
         whole = whole.copy() if whole is self._base.stored else whole
         if self._alike:
             rows = (whole.getOwnershipRange()[0] + self._rows).astype(kind)
@@ -71,7 +75,8 @@ class Replaced(PetscMatrix):
             )
             whole.assemble()
             return whole
-        both, order = sp.vstack([rows_of(whole), part], format="csr"), np.arange(self.rows)
+        both = sp.vstack([rows_of(whole), part], format="csr")
+        order = np.arange(self.rows)
         whole.destroy()
         order[self._rows] = self.rows + np.arange(len(self._rows))
         return aij_of(both[order], self.stored.comm)
@@ -89,7 +94,8 @@ class Replaced(PetscMatrix):
 
     def diagonal(self) -> Array:
         """Return the diagonal entries of the owned rows."""
-        values, part = self._base.diagonal(), rows_of(self.stored)
+        values = self._base.diagonal()
+        part = rows_of(self.stored)
         row = np.repeat(self._rows, np.diff(part.indptr))
         own = part.indices == self.stored.getOwnershipRangeColumn()[0] + row
         values[self._rows] = 0.0
@@ -106,7 +112,8 @@ class CompactAlgebra(PetscAlgebra):
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Return Tᵀ K T."""
-        P, A = as_petsc(T).mat, as_petsc(K).mat
+        P = as_petsc(T).mat
+        A = as_petsc(K).mat
         rows = self._changed(P, A)
         if total(self.comm, len(rows)) > 0.5 * A.getSize()[0]:
             return self.held(triple_product(A, P))
@@ -125,20 +132,23 @@ class CompactAlgebra(PetscAlgebra):
     def held(self, mat: Any) -> PetscMatrix:
         """Return the matrix stored compactly; the given one is destroyed."""
         give_back(self.comm.mpi)
-        rows, first, width = rows_of(mat), mat.getOwnershipRange()[0], self._dimension
-        (n, size), kind = rows.shape, PETSc.IntType
+        rows = rows_of(mat)
+        first = mat.getOwnershipRange()[0]
+        width = self._dimension
+        n, size = rows.shape
+        kind = PETSc.IntType
         mat.destroy()
         odd, wasted = self.comm.sum(
             np.array([n % width, 0.0 if n % width or size % width else _wasted(rows, width)])
         )
         if odd or wasted > 0.0:
-            width, kept, every = 1, rows.data != 0.0, np.arange(n, dtype=kind)
+            width = 1
+            kept = rows.data != 0.0
+            every = np.arange(n, dtype=kind)
             # and the diagonal, as PETSc expects
             row = np.append(np.repeat(every, np.diff(rows.indptr))[kept], every)
-            values, columns = (
-                np.append(rows.data[kept], np.zeros(n)),
-                np.append(rows.indices[kept], first + every),
-            )
+            values = np.append(rows.data[kept], np.zeros(n))
+            columns = np.append(rows.indices[kept], first + every)
             del rows
             rows = sp.csr_matrix((values, (row, columns)), shape=(n, size))
             del values, row, columns, kept
@@ -155,7 +165,8 @@ class CompactAlgebra(PetscAlgebra):
 
     def _changed(self, P: Any, A: Any) -> Indices:
         """Return the owned rows in which PᵀAP may differ from A, ascending. Collective."""
-        rows, first = rows_of(P), P.getOwnershipRange()[0]
+        rows = rows_of(P)
+        first = P.getOwnershipRange()[0]
         changed = np.flatnonzero(np.diff(sp.csr_matrix(rows - sp.eye(*rows.shape, k=first)).indptr))
         reached = [self.entries(PetscMatrix(one), changed).indices for one in (P, A)]
         columns = np.unique(np.concatenate([first + changed, *reached])).astype(PETSc.IntType)
@@ -168,7 +179,14 @@ class CompactAlgebra(PetscAlgebra):
 def algebra_for(
     comm: Any, dimension: int, unknowns: int, *, symmetric: bool = True
 ) -> PetscAlgebra:
-    """Return the algebra for the matrices of a body of this size."""
+    """Return the algebra for the matrices of a body of this size.
+
+    Args:
+        comm: the communicator.
+        dimension: unknowns of a node.
+        unknowns: how many there are on all ranks.
+        symmetric: whether all matrices are.
+    """
     if not symmetric:
         return UnsymmetricAlgebra(comm)
     return (
@@ -179,7 +197,10 @@ def algebra_for(
 
 
 def _wasted(rows: sp.csr_matrix, width: int) -> float:
-    """How many of the entries in blocks are too many, by some nodes all over the rows."""
+    """Return how many of the entries in blocks are too many, by some nodes all over the rows.
+
+    ``width``: unknowns of a node, which a block is of.
+    """
     nodes = (
         np.unique(np.linspace(0, rows.shape[0] // width - 1, SAMPLE).astype(int))
         if rows.shape[0]

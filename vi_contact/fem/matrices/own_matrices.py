@@ -121,8 +121,16 @@ def own_system(
 
     What is given of this rank's rows and nodes is checked here. ``unsymmetric``: the algebra for C
     or K that are not symmetric.
+
+    Args:
+        owner: who asks.
+        algebra: that of symmetric matrices.
+        unsymmetric: that for C or K that are not symmetric.
+        matrices: M, K and perhaps C, of n owned rows.
+        given: the other arguments by name.
     """
-    comm, n = algebra.comm, matrices["K"].rows
+    comm = algebra.comm
+    n = matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
     d = points.shape[1]
@@ -143,7 +151,8 @@ def own_system(
     if largest(comm, not free.all()):
         matrices = {name: algebra.block(A, free) for name, A in matrices.items()}
         load = load.in_basis(SerialMatrix(sp.identity(n, format="csc")[:, free]))
-    M, K = matrices["M"], matrices["K"]
+    M = matrices["M"]
+    K = matrices["K"]
     # of rows that stand still, when all move
     momenta = [(every @ r)[free] - M @ r[free] for r in influence.T]
     massless = M.diagonal() == 0.0
@@ -170,7 +179,13 @@ def own_system(
 
 
 def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indices, Indices, Mask]:
-    """(points, node of each row, component of each row, rows that are free)."""
+    """(points, node of each row, component of each row, rows that are free).
+
+    Args:
+        owner: who asks.
+        n: how many rows this rank owns.
+        given: arguments by name.
+    """
     points = array(owner, "coordinates", given["coordinates"], (None, None), unit="metres")
     k, d = points.shape
     if d not in (1, 2, 3):
@@ -199,7 +214,8 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
         raise InputError(
             f"{owner}: component {c} of node {node} has several rows in unknowns; give it one"
         )
-    rows, free = integers(owner, "clamped", given["clamped"], (None,)), np.ones(n, dtype=bool)
+    rows = integers(owner, "clamped", given["clamped"], (None,))
+    free = np.ones(n, dtype=bool)
     if len(rows) and not 0 <= rows.min() <= rows.max() < n:
         raise InputError(
             f"{owner}: clamped goes from {rows.min()} to {rows.max()}; give numbers of rows below "
@@ -210,7 +226,13 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
 
 
 def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array, Array]:
-    """Load and initial values of all rows, zero where there are none."""
+    """Load and initial values of all rows, zero where there are none.
+
+    Args:
+        owner: who asks.
+        n: how many rows this rank owns.
+        given: arguments by name.
+    """
 
     def vector(name: str, value: Any, unit: str) -> Array:
         return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
@@ -243,11 +265,19 @@ class MatrixSpace(NodalSpace):
 
         Collective.
         """
-        self.algebra, self.comm, self.points = algebra, algebra.comm, points
-        (k, d), n, first = points.shape, len(block), algebra.first(len(block))
-        self.dimension, self.unknowns = d, round(total(self.comm, n))
-        self.nodes, self.size = algebra.first(k) + np.arange(k), bounding_box(self.comm, points)
-        self.component, moves, every = component, component >= 0, np.arange(n)
+        self.algebra = algebra
+        self.comm = algebra.comm
+        self.points = points
+        k, d = points.shape
+        n = len(block)
+        first = algebra.first(len(block))
+        self.dimension = d
+        self.unknowns = round(total(self.comm, n))
+        self.nodes = algebra.first(k) + np.arange(k)
+        self.size = bounding_box(self.comm, points)
+        self.component = component
+        moves = component >= 0
+        every = np.arange(n)
         self.free_index = np.full(k * d, -1)
         self.free_index[(block * d + component)[moves]] = every[moves]
         self.numbers = np.where(self.free_index >= 0, first + self.free_index, -1).reshape(k, d)
@@ -263,15 +293,23 @@ def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
 
     Bodies are in the order of least numbers; K or a node joins those of one body. ``block``: (n,)
     the node of each, all on one rank.
+
+    Args:
+        algebra: that of K.
+        K: stiffness, of n owned rows.
+        block: (n,) the node of each row.
     """
-    n, first = K.rows, algebra.first(K.rows)
-    entries, own = algebra.entries(K, np.arange(n)), first + np.arange(n)
+    n = K.rows
+    first = algebra.first(K.rows)
+    entries = algebra.entries(K, np.arange(n))
+    own = first + np.arange(n)
     entries.eliminate_zeros()
     _, leader, node = np.unique(block, return_index=True, return_inverse=True)
     row = np.concatenate([own, np.repeat(own, np.diff(entries.indptr))])
     column = np.concatenate([first + leader[node.ravel()], entries.indices])
     numbers = np.union1d(own, column)  # those of other ranks too
     away = (column < first) | (column >= first + n)
-    one, two = np.searchsorted(numbers, row), np.searchsorted(numbers, column)
+    one = np.searchsorted(numbers, row)
+    two = np.searchsorted(numbers, column)
     shared = np.union1d(one[away], two[away])
     return parts_of(algebra.comm, one, two, numbers, shared)[np.searchsorted(numbers, own)]

@@ -32,6 +32,11 @@ def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
     """Return room that all matrices share, and a vector in it.
 
     A product needs it only for as long as it takes.
+
+    Args:
+        comm: the communicator.
+        size: how many entries this rank owns.
+        way: 1 for what a matrix takes, 0 for what it makes.
     """
     room = _ROOM.get((size, way))
     if room is None:
@@ -171,7 +176,14 @@ class PetscFactor:
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
-        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says."""
+        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says.
+
+        Args:
+            owned: owned unknowns j of some of the unit vectors.
+            slots: their columns.
+            m: how many unit vectors there are on all ranks.
+            rows: owned rows that are asked for, all when None.
+        """
         size = self._x.getLocalSize()
         rows = np.arange(size) if rows is None else rows
         columns = np.zeros((len(rows), m))
@@ -260,8 +272,16 @@ class PetscAlgebra:
         return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of entries between the n unknowns of one rank."""
-        places, every = (rows, self.first(n) + np.asarray(columns)), int(self.comm.mpi.allreduce(n))
+        """Return the matrix of entries between the n unknowns of one rank.
+
+        Args:
+            rows: owned rows.
+            columns: owned columns.
+            values: entries.
+            n: how many unknowns this rank owns.
+        """
+        places = (rows, self.first(n) + np.asarray(columns))
+        every = int(self.comm.mpi.allreduce(n))
         return PetscMatrix(aij_of(sp.coo_matrix((values, places), shape=(n, every)), self.comm.mpi))
 
     def first(self, n: int) -> int:
@@ -271,7 +291,8 @@ class PetscAlgebra:
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
         """Return these owned rows of A, their columns numbered over all ranks."""
         mat = as_petsc(A).mat
-        (start, _), (first, last) = mat.getOwnershipRange(), mat.getOwnershipRangeColumn()
+        start, _ = mat.getOwnershipRange()
+        first, last = mat.getOwnershipRangeColumn()
         chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
         whole = PETSc.IS().createStride(last - first, first, 1, comm=mat.comm)
         part = mat.createSubMatrix(chosen, whole)
@@ -280,7 +301,13 @@ class PetscAlgebra:
         return found
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        """Return the identity of n owned rows with some of them replaced."""
+        """Return the identity of n owned rows with some of them replaced.
+
+        Args:
+            n: how many rows this rank owns.
+            rows: which of them are replaced.
+            entries: (rows, unknowns of all ranks) what takes their place.
+        """
         return PetscMatrix(
             aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi)
         )
@@ -308,7 +335,8 @@ class PetscAlgebra:
 
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
         """Return a factor with these unknowns last, or None where there is none."""
-        mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
+        mat = as_petsc(A).mat
+        given = PETSc.Options(PREFIX).getAll()
         # options of the user choose the factor
         chosen = any(not name.startswith(TUNING) for name in given)
         serves = not chosen and (self.comm.size == 1 or own_serves(mat))

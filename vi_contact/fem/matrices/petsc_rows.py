@@ -17,7 +17,8 @@ def moved(mat: Any, comm: Any) -> Any:
 
     The matrix is destroyed.
     """
-    rows, columns = rows_of(mat), mat.getLocalSize()[1]
+    rows = rows_of(mat)
+    columns = mat.getLocalSize()[1]
     mat.destroy()
     return aij_of(rows, comm, columns)
 
@@ -27,8 +28,15 @@ def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
 
     Columns are numbered over all ranks; ``columns``: how many this rank owns, as many as rows
     unless given.
+
+    Args:
+        rows: (n, unknowns of all ranks).
+        comm: the communicator.
+        columns: how many of the columns this rank owns; n when None.
     """
-    entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
+    entries = sp.csr_matrix(rows)
+    kind = PETSc.IntType
+    n = rows.shape[0]
     csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
     mat = PETSc.Mat().createAIJ(
         ((n, None), (n if columns is None else columns, None)), csr=csr, comm=comm

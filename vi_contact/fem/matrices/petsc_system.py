@@ -73,7 +73,8 @@ def system_from_matrices(
     rows = on_all(MpiComm(comm), OWNER, lambda: {name: _rows(name, A, K) for name, A in named})
     matrices = {name: PetscMatrix(aij_of(one, comm)) for name, one in rows.items()}
     if hasattr(coordinates, "tabulate_dof_coordinates"):
-        count, d = coordinates.dofmap.index_map.size_local, coordinates.mesh.geometry.dim
+        count = coordinates.dofmap.index_map.size_local
+        d = coordinates.mesh.geometry.dim
         given["coordinates"] = coordinates.tabulate_dof_coordinates()[:count, :d]
     return own_system(OWNER, PetscAlgebra(comm), UnsymmetricAlgebra(comm), matrices, given)
 
@@ -81,10 +82,17 @@ def system_from_matrices(
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
     """Return a copy of this rank's rows of a matrix with the layout of K.
 
+    Args:
+        name: "M", "C" or "K".
+        A: what was given.
+        K: the matrix whose layout counts.
+
     Raises:
         InputError: another type or layout.
     """
-    (n, _), (_, columns), first = K.getLocalSize(), K.getSize(), K.getOwnershipRangeColumn()[0]
+    n, _ = K.getLocalSize()
+    _, columns = K.getSize()
+    first = K.getOwnershipRangeColumn()[0]
     if name == "M" and not isinstance(A, PETSc.Mat):
         masses = array(OWNER, name, A.array_r if isinstance(A, PETSc.Vec) else A, (n,), unit="kg")
         return sp.csr_matrix((masses, (np.arange(n), first + np.arange(n))), shape=(n, columns))

@@ -20,6 +20,12 @@ KINDS: dict[type[Group], str] = {Facets: "boundary group", Cells: "cell group"}
 def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Facets:
     """Return the boundary group, of this mesh if one is given.
 
+    Args:
+        owner: who asks.
+        meaning: what messages call the group.
+        group: what was given.
+        mesh: the mesh that it must be of, or None for any.
+
     Raises:
         InputError: anything else; it tells the remedy.
     """
@@ -28,6 +34,12 @@ def facets_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) ->
 
 def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> Cells:
     """Return the cell group, of this mesh if one is given.
+
+    Args:
+        owner: who asks.
+        meaning: what messages call the group.
+        group: what was given.
+        mesh: the mesh that it must be of, or None for any.
 
     Raises:
         InputError: anything else; it tells the remedy.
@@ -63,6 +75,11 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
     """Raise InputError unless it is a function or a vector of numbers.
 
     Size and NaN are told where it is used.
+
+    Args:
+        owner: who asks.
+        meaning: what messages call the value.
+        value: what was given.
     """
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
@@ -76,6 +93,11 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
 
 def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -> tuple[int, ...]:
     """Return the components that are given, all of them for None.
+
+    Args:
+        meaning: the beginning of messages.
+        given: components, or None.
+        dimension: d.
 
     Raises:
         InputError: one does not exist.

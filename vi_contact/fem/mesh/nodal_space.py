@@ -60,6 +60,11 @@ class NodalSpace:
         """Expand a vector of unknowns (n,) at time t to displacements of owned nodes (k, d).
 
         Or to the derivatives of these.
+
+        Args:
+            u: (n,) vector of unknowns.
+            t: time [s].
+            derivative: 0 for displacements, 1 and 2 for their rates.
         """
         where = self.free_index.reshape(-1, self.dimension)
         return np.where(where >= 0, u.take(where, mode="clip") if len(u) else 0.0, 0.0)
@@ -84,12 +89,20 @@ class NodalSpace:
 
         They are zero for nodes of nobody.
         """
-        found, where = np.zeros((len(numbers), values.shape[1])), self.blocks_of(numbers)
+        found = np.zeros((len(numbers), values.shape[1]))
+        where = self.blocks_of(numbers)
         found[where >= 0] = values[where[where >= 0]]
         return self.comm.sum(found)
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
-        """Return the displacements (k, d) at node numbers, equal on all ranks. Collective."""
+        """Return the displacements (k, d) at node numbers, equal on all ranks. Collective.
+
+        Args:
+            u: (n,) vector of unknowns.
+            nodes: numbers of k nodes.
+            t: time [s].
+            derivative: 0 for displacements, 1 and 2 for their rates.
+        """
         return self.at_nodes(nodes, self.expand(u, t, derivative))
 
     def find_nodes(self, points: Array) -> Indices:
@@ -133,6 +146,13 @@ def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indi
     Parts are 0, 1, ..., in the order of least numbers, when ``first`` and ``second``, places among
     the numbers, are joined; ``shared``: places of those that other ranks have too, where parts of
     different ranks meet and are one.
+
+    Args:
+        comm: the ranks.
+        first: places of things, one end of each link.
+        second: places of the other ends.
+        numbers: (n,) of the things of this rank.
+        shared: places of things that other ranks have too.
     """
     part = _smallest(first, second, numbers)
     meeting = np.column_stack([numbers[shared], part[shared]])
@@ -145,7 +165,13 @@ def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indi
 
 
 def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
-    """Return the smallest number (n,) among those that edges first-second join each one to."""
+    """Return the smallest number (n,) among those that edges first-second join each one to.
+
+    Args:
+        first: places of things, one end of each edge.
+        second: places of the other ends.
+        numbers: (n,) of the things.
+    """
     part = connected(len(numbers), first, second)
     smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, part, numbers)

@@ -81,7 +81,8 @@ def supports(V: Any) -> list[list[int]]:
 
     ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``.
     """
-    dim, count = V.mesh.topology.dim, V.dofmap.dof_layout.num_dofs
+    dim = V.mesh.topology.dim
+    count = V.dofmap.dof_layout.num_dofs
     return [vertices for one in range(dim + 1) for vertices in compat.sub_entities(V.mesh, one)][
         :count
     ]
@@ -160,7 +161,9 @@ def _with_mid_points(
     Returns:
         numbers (blocks,) and points (blocks, d) [m] of the local blocks.
     """
-    mesh, around, local = V.mesh, supports(V), V.dofmap.index_map
+    mesh = V.mesh
+    around = supports(V)
+    local = V.dofmap.index_map
     numbers = np.full(local.size_local + local.num_ghosts, -1, dtype=np.int64)
     points = np.zeros((len(numbers), mesh.geometry.dim))
     first = count = 1 + mesh.comm.allreduce(int(names.max(initial=-1)), op=MPI.MAX)
@@ -220,7 +223,8 @@ def facet_rows(V: Any, facets: Any) -> Indices:
     Returns:
         (k, n) blocks: those of the vertices of a facet come first, then those of mid-points.
     """
-    mesh, tdim = V.mesh, V.mesh.topology.dim
+    mesh = V.mesh
+    tdim = V.mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     mesh.topology.create_connectivity(tdim, tdim - 1)
     beside = mesh.topology.connectivity(tdim - 1, tdim)

@@ -50,7 +50,9 @@ class Group:
         mesh = instance(
             owner, "mesh", self.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to"
         )
-        count, numbers, defect = local_count(mesh, self.codimension), np.asarray(self.indices), ""
+        count = local_count(mesh, self.codimension)
+        numbers = np.asarray(self.indices)
+        defect = ""
         if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
             defect = (
                 f"{owner}: indices is {shown(self.indices)}; give local numbers, such as "
@@ -73,11 +75,19 @@ class Group:
 
         InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
         any rank has.
+
+        Args:
+            name: that of the group.
+            meshtags: DOLFINx MeshTags of the mesh.
+            value: which of their values.
+            mesh: the mesh.
         """
-        owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
+        owner = f"{cls.__name__}.tagged"
+        things = cls.__name__.lower()
         instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
-        dim, values = mesh.topology.dim - cls.codimension, np.asarray(meshtags.values)
+        dim = mesh.topology.dim - cls.codimension
+        values = np.asarray(meshtags.values)
         chosen = np.asarray(meshtags.indices)[
             values == whole(owner, "value", value, least=-(2**31))
         ]
@@ -111,8 +121,15 @@ class Group:
 
         ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
         it fails or marks none on any rank.
+
+        Args:
+            name: that of the group.
+            mesh: the mesh.
+            marker: x (3, n) [m] -> (n,) truth values, as in DOLFINx.
         """
-        owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
+        owner = f"{cls.__name__}.where"
+        things = cls.__name__.lower()
+        defects = [""]
         instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
         function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
 

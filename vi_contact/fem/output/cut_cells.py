@@ -36,6 +36,14 @@ def work_beyond(
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not
     positive. ``motion``: points (k, d) -> virtual displacements (motions, k, d), linear in them;
     ``density``: one for all or one of each local cell. Collective.
+
+    Args:
+        space: the body's unknowns.
+        crossed: mask of local cells that count.
+        level: points (…, d) -> (…), not positive in the parts that count.
+        motion: points (k, d) -> virtual displacements (motions, k, d), linear in them.
+        density: a number, or one of each local cell.
+        load: a traction or body force, None for ``density`` alone.
     """
     d = space.dimension
     cells, nodes = _entities(
@@ -44,7 +52,8 @@ def work_beyond(
     whole = space.mesh.geometry.x[nodes][:, :, :d]
     corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, Traction)), level(whole))
     at = np.matmul(corners, whole[owner])
-    edges, r = at[:, 1:] - at[:, :1], motion(at.reshape(-1, d))
+    edges = at[:, 1:] - at[:, :1]
+    r = motion(at.reshape(-1, d))
     r = r.reshape(len(r), *at.shape)
     if isinstance(load, TangentialTraction):
         r = r @ (np.linalg.pinv(edges) @ edges)
@@ -52,7 +61,8 @@ def work_beyond(
         centres = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)[cells]].mean(axis=1)[
             owner, None, :d
         ]
-        sides, away = np.diff(whole, axis=1)[owner], whole[owner, :1] - centres
+        sides = np.diff(whole, axis=1)[owner]
+        away = whole[owner, :1] - centres
         outward = away - away @ np.linalg.pinv(sides) @ sides
         r = (
             -(r @ (outward / np.linalg.norm(outward, axis=2, keepdims=True)).swapaxes(1, 2))
@@ -76,8 +86,14 @@ def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
     """Return (cells, geometry nodes) of the crossed cells of this rank.
 
     Or the nodes are those of the outer facets beside them.
+
+    Args:
+        mesh: the mesh.
+        crossed: mask of local cells.
+        facets: local facets of a traction, or None for cells.
     """
-    dim, owned = mesh.topology.dim, mesh.topology.index_map
+    dim = mesh.topology.dim
+    owned = mesh.topology.index_map
     if facets is None:
         cells = np.flatnonzero(crossed[: owned(dim).size_local])
         return cells, compat.geometry_dofmap(mesh)[cells]
@@ -113,14 +129,19 @@ def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
     corners = np.concatenate([corners, corners @ level[owner][:, :, None]], axis=2)
     # a cut edge leaves one corner less on the wrong side in both halves
     for _ in range(whole.shape[1] - 1):
-        low, high = corners[:, :, -1].argmin(axis=1), corners[:, :, -1].argmax(axis=1)
+        low = corners[:, :, -1].argmin(axis=1)
+        high = corners[:, :, -1].argmax(axis=1)
         every = np.arange(len(owner))
-        below, above = corners[every, low], corners[every, high]
+        below = corners[every, low]
+        above = corners[every, high]
         cut = np.flatnonzero((below[:, -1] < 0.0) & (above[:, -1] > 0.0))
-        below, above, rest = below[cut], above[cut], corners[cut]
+        below = below[cut]
+        above = above[cut]
+        rest = corners[cut]
         middle = (above[:, -1:] * below - below[:, -1:] * above) / (above - below)[:, -1:]
         middle[:, -1] = 0.0
         corners[cut, high[cut]] = rest[np.arange(len(cut)), low[cut]] = middle
-        corners, owner = np.concatenate([corners, rest]), np.concatenate([owner, owner[cut]])
+        corners = np.concatenate([corners, rest])
+        owner = np.concatenate([owner, owner[cut]])
     kept = (corners[:, :, -1] <= 0.0).all(axis=1)
     return corners[kept, :, :-1], owner[kept]

@@ -62,7 +62,9 @@ class VonMises:
         from .. import compat
         from .outline import cell_volumes
 
-        space, self._forms, self._assembled = forms.space, forms, compat.assemble_vector
+        space = forms.space
+        self._forms = forms
+        self._assembled = compat.assemble_vector
         self._u = compat.function(space.V)
         sigma, across = (one / forms.section.thickness for one in forms.stresses(self._u))
         mean = (ufl.tr(sigma) + across) / 3
@@ -154,9 +156,14 @@ class FrameWriter:
         shown: Cells,
     ) -> None:
         space: Any = problem.system.space
-        self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
+        self._problem = problem
+        self._space = space
+        self._folder = folder
+        self._per_file = per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
-        self._type, self._cell_numbers, self._von_mises = shown.kind, shown.numbers, shown.von_mises
+        self._type = shown.kind
+        self._cell_numbers = shown.numbers
+        self._von_mises = shown.von_mises
         points = on_first(space.comm, space.nodes, _three(space.points))
         cells = on_first(space.comm, self._cell_numbers, shown.nodes)
         self._shape = (len(points), *cells.shape)
@@ -167,7 +174,8 @@ class FrameWriter:
         folder = make_inner_folder(self._folder, FIELDS)
 
         def fill(file: Any) -> None:
-            file["points"], file["cells"] = points, cells
+            file["points"] = points
+            file["cells"] = cells
 
         hdf5_atomically(folder / "mesh.h5", fill)
         found = frames_of(self._folder)
@@ -193,10 +201,8 @@ class FrameWriter:
 
     def _remove_others(self) -> None:
         """Remove files of frames that hold none of the index; files of others stay."""
-        known, folder = (
-            {path for path, _ in self._places.values()},
-            inner_folder(self._folder, FIELDS),
-        )
+        known = {path for path, _ in self._places.values()}
+        folder = inner_folder(self._folder, FIELDS)
         for name in os.listdir(folder):
             if folder / name not in known and (FRAME.fullmatch(name) or FRAMES.fullmatch(name)):
                 remove(folder / name)
@@ -206,7 +212,8 @@ class FrameWriter:
 
         Collective.
         """
-        problem, space = self._problem, self._space
+        problem = self._problem
+        space = self._space
         moving = [
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
@@ -239,7 +246,8 @@ class FrameWriter:
 
     def _along_axes(self, tangential: Array) -> Array:
         """Components (m, d - 1) in nodal tangents as vectors at the owned nodes."""
-        space, surface = self._space, self._problem.surface
+        space = self._space
+        surface = self._problem.surface
         turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
         along = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
         return NodalSpace.expand(space, along, 0.0)  # not what is prescribed or follows
@@ -248,16 +256,15 @@ class FrameWriter:
         def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
                 file[name] = nodal[:, 3 * i : 3 * i + 3]
-            file["contact_pressure"], file["contact_status"] = (
-                nodal[:, -2],
-                nodal[:, -1].astype(np.int32),
-            )
+            file["contact_pressure"] = nodal[:, -2]
+            file["contact_status"] = nodal[:, -1].astype(np.int32)
             if stress is not None:
                 file["von_mises"] = stress
 
         path = inner_folder(self._folder, FIELDS) / f"frame_{state.k:06d}.h5"
         hdf5_atomically(path, fill)
-        self._times[state.k], self._places[state.k] = state.t, (path, "/")
+        self._times[state.k] = state.t
+        self._places[state.k] = (path, "/")
         single = [k for k, (_, group) in self._places.items() if group == "/"]
         full = len(single) >= self._per_file > 1
         if full:
@@ -279,15 +286,14 @@ class FrameWriter:
     def _grid(self, k: int, t: float) -> str:
         nodes, cells, corners = self._shape
         path, group = self._places[k]
-        mesh, frame = f"{FIELDS}/mesh.h5", f"{FIELDS}/{path.name}:{group.rstrip('/')}"
+        mesh = f"{FIELDS}/mesh.h5"
+        frame = f"{FIELDS}/{path.name}:{group.rstrip('/')}"
 
         def attribute(
             name: str, center: str, *shape: int, number: str = "Float", size: int = 8
         ) -> str:
-            kind, item = (
-                "Vector" if len(shape) == 2 else "Scalar",
-                _item(shape, f"{frame}/{name}", number, size),
-            )
+            kind = "Vector" if len(shape) == 2 else "Scalar"
+            item = _item(shape, f"{frame}/{name}", number, size)
             return (
                 f'<Attribute Name="{name}" AttributeType="{kind}" '
                 f'Center="{center}">{item}</Attribute>\n'
@@ -313,8 +319,14 @@ def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple
 
     They are made of those of the conditions: of several faces of a node the pressure of the one
     that is pressed most, and the highest status.
+
+    Args:
+        problem: the problem.
+        state: a state of it.
+        status: (conditions,) a number for each condition.
     """
-    space, blocks = cast(NodalSpace, problem.system.space), blocks_of_conditions(problem)
+    space = cast(NodalSpace, problem.system.space)
+    blocks = blocks_of_conditions(problem)
     surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
     each = state.r_n / surface.weights
@@ -335,6 +347,11 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
 
     These are added where conditions are those of vertices only: linear from end to end, zero at
     ends without a condition, so that ∫ p = sum r_n.
+
+    Args:
+        problem: the problem.
+        nodal: (k, c) owned nodal values.
+        mean: how the ends of an edge make the value of its mid-point.
     """
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:
@@ -350,13 +367,15 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
 
 def slipped(report: Report) -> Mask:
     """Return the points (m,) that moved along their support in a step with friction."""
-    step, result = report.step, report.result
+    step = report.step
+    result = report.result
     return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
 
 
 def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:
     """Return a DataItem in an HDF5 file."""
-    dimensions, kind = " ".join(map(str, shape)), f'NumberType="{number}" Precision="{size}"'
+    dimensions = " ".join(map(str, shape))
+    kind = f'NumberType="{number}" Precision="{size}"'
     return f'<DataItem Dimensions="{dimensions}" {kind} Format="HDF">{where}</DataItem>'
 
 
@@ -380,7 +399,8 @@ def _cells_of_body(problem: ContactProblem) -> Cells:
         log.info(
             "XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)"
         )
-    mesh, stress = space.mesh, VonMises(space.forms) if space.forms.tells_stress else None
+    mesh = space.mesh
+    stress = VonMises(space.forms) if space.forms.tells_stress else None
     dim = mesh.topology.dim
     rows = space.node_of_block[
         compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]

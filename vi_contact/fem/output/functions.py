@@ -74,7 +74,8 @@ def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
     The nodes of contact boundaries that have none of their own take the mean of those of their
     neighbours (``contact.borrowing``).
     """
-    space, surface = space_of("contact_pressure", problem.system), problem.surface
+    space = space_of("contact_pressure", problem.system)
+    surface = problem.surface
     blocks = blocks_of_conditions(problem)
     told = np.zeros(len(space.nodes), dtype=bool)
     told[blocks if surface.uncovered is None else blocks[~surface.uncovered]] = True
@@ -116,7 +117,9 @@ def read_function(
         int,
         "give its number, 0 for the first and -1 for the last",
     )
-    kind, comm, d = "u" if name == "stress" else name, space.comm, space.dimension
+    kind = "u" if name == "stress" else name
+    comm = space.comm
+    d = space.dimension
     points, values, t = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
     fits = len(points) > np.max(space.nodes, initial=-1)
     fits = (
@@ -139,6 +142,12 @@ def read_function(
 def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     """Return the space of the problem.
 
+    Args:
+        owner: who asks.
+        problem: what was given.
+        name: the quantity.
+        continuous: whether the stress is projected.
+
     Raises:
         InputError: there is none, or no such quantity.
     """
@@ -157,8 +166,16 @@ def _function(
     """Return the Function of values at the owned nodes, (k,) or (k, d), at a time.
 
     The stress is that of displacements.
+
+    Args:
+        problem: the problem.
+        name: the quantity.
+        nodal: values at the owned nodes.
+        t: time [s].
+        continuous: whether the stress is projected.
     """
-    system, space = problem.system, space_of(name, problem.system)
+    system = problem.system
+    space = space_of(name, problem.system)
     V = (
         system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
         if nodal.ndim == 1
@@ -180,7 +197,8 @@ def _blocks(of: Any, among: Any) -> Indices:
 
     Both have the same element.
     """
-    owned, ghosts = of.dofmap.index_map.size_local, of.dofmap.index_map.num_ghosts
+    owned = of.dofmap.index_map.size_local
+    ghosts = of.dofmap.index_map.num_ghosts
     blocks = np.zeros(owned + ghosts, dtype=np.int64)
     blocks[compat.cell_blocks(of)] = compat.cell_blocks(among)
     return blocks[:owned]
@@ -193,23 +211,15 @@ class Stress:
     """
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
-        d, degree = (
-            space.dimension,
-            space.degree - (compat.is_simplex(space.mesh) and not continuous),
-        )
+        d = space.dimension
+        degree = space.degree - (compat.is_simplex(space.mesh) and not continuous)
         self._tensors = compat.lagrange(space.mesh, degree, (d, d), continuous=continuous)
-        self._u, scalars = (
-            compat.function(space.V),
-            compat.lagrange(space.mesh, degree, continuous=continuous),
-        )
-        self._blocks, dx = (
-            _blocks(scalars, self._tensors),
-            ufl.dx(metadata={"quadrature_degree": 2 * degree + 2}),
-        )
-        self._forms, sigma = (
-            space.forms,
-            space.forms.stress(self._u) / space.forms.section.thickness,
-        )
+        self._u = compat.function(space.V)
+        scalars = compat.lagrange(space.mesh, degree, continuous=continuous)
+        self._blocks = _blocks(scalars, self._tensors)
+        dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
+        self._forms = space.forms
+        sigma = space.forms.stress(self._u) / space.forms.section.thickness
         self._load = compat.compile_form(ufl.inner(sigma, ufl.TestFunction(self._tensors)) * dx)
         mass = ufl.inner(ufl.TrialFunction(scalars), ufl.TestFunction(scalars)) * dx
         matrix = compat.assemble_matrix(compat.compile_form(mass))
@@ -279,7 +289,13 @@ def _stored(
 
 
 def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
-    """Return the number of the frame of a time, or of this number."""
+    """Return the number of the frame of a time, or of this number.
+
+    Args:
+        times: those of the frames [s].
+        t: the time that is asked for, or None.
+        frame: the number that is asked for, or None.
+    """
     told = ", ".join(f"{one:.9g}" for one in times[:12]) + (
         f", … {times[-1]:.9g}" if len(times) > 12 else ""
     )

@@ -42,7 +42,13 @@ Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 
 
 def check_actions(owner: str, loads: Any, gravity: Any) -> None:
-    """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
+    """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration.
+
+    Args:
+        owner: who asks.
+        loads: what was given.
+        gravity: what was given [m/s²].
+    """
     for load in as_tuple(loads):
         instance(owner, "loads", load, LOADS, "give the loads of fem.assemble")
     optional(array, owner, "gravity", gravity, (None,), unit="m/s²")
@@ -64,7 +70,8 @@ class NodalWork:
     ) -> None:
         space = space_of("NodalWork", problem.system)
         known_matrices("reactions and section forces", problem.system, "MCK")
-        self._problem, self.space = problem, space
+        self._problem = problem
+        self.space = space
         # known to the body
         self._loads: Any = [one for one in as_tuple(loads) if not isinstance(one, InitialStrain)]
         for facets in (getattr(load, "facets", None) for load in self._loads):
@@ -77,10 +84,8 @@ class NodalWork:
             raise InputError(
                 f"gravity has {self._gravity.size} components: give {space.dimension} numbers"
             )
-        self._r, self._inside = (
-            compat.function(space.V),
-            compat.function(compat.cell_space(space.mesh)),
-        )
+        self._r = compat.function(space.V)
+        self._inside = compat.function(compat.cell_space(space.mesh))
         self._forms = [
             space.compiled(space.forms.against(name, self._r, self._inside))
             if name != "C" or space.forms.damped
@@ -89,7 +94,9 @@ class NodalWork:
         ]
         self._initial = [] if space.forms.initial is None else [space.forms.initial]
         self._forms += [space.compiled(one.against(self._r, self._inside)) for one in self._initial]
-        g, mesh, h = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness
+        g = ufl.TestFunction(space.V)
+        mesh = space.mesh
+        h = space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             None
             if isinstance(load, LinearForm)
@@ -110,7 +117,8 @@ class NodalWork:
 
         Who forgets the weight measures reactions that do not carry it.
         """
-        system, space = self._problem.system, self.space
+        system = self._problem.system
+        space = self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
         if (
             theirs.any()
@@ -135,7 +143,8 @@ class NodalWork:
                 "section forces: the part of a LinearForm on the cells of a cut is unknown; give "
                 "these loads as Traction and BodyForce, or record Reactions"
             )
-        forms, ours = [*self._forms, *self._load_forms], self.space.forms
+        forms = [*self._forms, *self._load_forms]
+        ours = self.space.forms
         if not ours.densities and any(beyond for *_, beyond in parts):
             raise InputError(
                 "a section goes through elements, and with forms=… the mass of their parts is "
@@ -179,7 +188,9 @@ class NodalWork:
 
         It is a static one, or the start of a run.
         """
-        problem, space, t = self._problem, self.space, state.t
+        problem = self._problem
+        space = self.space
+        t = state.t
         motion = [
             space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))
         ]
@@ -195,8 +206,12 @@ class NodalWork:
         Loads, prescribed and ground motion are taken between the ends of the step where the balance
         has its u.
         """
-        problem, space, balance = self._problem, self.space, report.balance
-        late, t0, t1 = self._place(report), report.old.t, report.new.t
+        problem = self._problem
+        space = self.space
+        balance = report.balance
+        late = self._place(report)
+        t0 = report.old.t
+        t1 = report.new.t
 
         def between(value: Callable[[float], Any]) -> Any:
             return value(t1) if late == 1.0 else (1.0 - late) * value(t0) + late * value(t1)
@@ -214,7 +229,8 @@ class NodalWork:
 
     def _place(self, report: Report) -> float:
         """Return w of u = (1 - w) u_old + w u_new; the end where nothing moved."""
-        way, here = report.new.u - report.old.u, report.balance.u - report.old.u
+        way = report.new.u - report.old.u
+        here = report.balance.u - report.old.u
         both, square = self.space.comm.sum(np.array([here @ way, way @ way]))
         return float(min(max(both / square, 0.0), 1.0)) if square > 0.0 else 1.0
 
@@ -224,8 +240,14 @@ class NodalWork:
         """Return the numbers for nodal u, v, a (owned, d), less contact forces on held ones.
 
         ``at`` evaluates functions.
+
+        Args:
+            motion: nodal u, v, a (owned, d).
+            at: evaluates a function of time at that of the step.
+            contact: a state or balance with the contact forces.
         """
-        total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
+        total = np.zeros(self._count)
+        r_t = 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
         for matrix, x in zip(
@@ -238,7 +260,13 @@ class NodalWork:
         return self.space.comm.sum(total)
 
     def _of_load(self, k: int, load: Any, at: Callable[[Callable[[float], Any]], Any]) -> Array:
-        """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
+        """Return rᵀf on this rank, (count,); what does not change with time is evaluated once.
+
+        Args:
+            k: the number of the load.
+            load: the load.
+            at: evaluates a function of time at that of the step.
+        """
 
         def work(t: float) -> Array:
             if isinstance(load, LinearForm):
@@ -265,7 +293,8 @@ def rigid_motions(points: Array, centre: Array) -> Array:
 
     The rotations are about a centre of the points; on a line there are none.
     """
-    d, arms = points.shape[1], points - centre
+    d = points.shape[1]
+    arms = points - centre
     shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
     turns = [np.column_stack([-arms[:, 1], arms[:, 0]])] if d == 2 else []
     return np.array([*shifts, *turns, *(np.cross(axis, arms) for axis in np.eye(3) if d == 3)])

@@ -22,10 +22,8 @@ def cell_volumes(mesh: Any) -> Array:
 
 def longest_edge(mesh: Any, cells: Indices) -> float:
     """Return the longest edge of some local cells of this rank [m], 0 for none."""
-    corners, ends = (
-        mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]],
-        np.transpose(compat.sub_entities(mesh, 1)),
-    )
+    corners = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]]
+    ends = np.transpose(compat.sub_entities(mesh, 1))
     return float(
         np.max(np.linalg.norm(corners[:, ends[0]] - corners[:, ends[1]], axis=2), initial=0.0)
     )
@@ -55,8 +53,14 @@ def outline(
 
     They are those of the boundary, group "", and of each group of it; in space and on a line the
     edges of a box around each region of local cells. The same on any ranks.
+
+    Args:
+        space: the body's unknowns.
+        tags: groups by name.
+        regions: local cells of each region.
     """
-    mesh, d = space.mesh, space.dimension
+    mesh = space.mesh
+    d = space.dimension
     if d != 2:
         edges = [(i, i | 1 << c) for i in range(2**d) for c in range(d) if not i >> c & 1]
         points = [

@@ -49,8 +49,15 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
     The nodes on the cut and behind it move, and the cells before them hold them; the other way
     round where sides of cells lie on the cut behind it only, as at a foot.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the cut.
+        given: its ends or corners (d, d) [m].
+        group: the cells that it cuts, all when None.
     """
-    corners, mesh = np.asarray(given, dtype=float), space.mesh
+    corners = np.asarray(given, dtype=float)
+    mesh = space.mesh
     if len(corners) != space.dimension:
         raise InputError(
             f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of "
@@ -92,7 +99,8 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
             "to the other"
         )
     sign = 1.0 if left >= right else -1.0
-    away, at = level(space.points), (space.points - corners[0]) @ axes[1:].T
+    away = level(space.points)
+    at = (space.points - corners[0]) @ axes[1:].T
     nodes = (sign * away < 0.0) & (space.degree < 2) | (
         (away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1)
     )
@@ -124,9 +132,11 @@ class _Trace:
     """
 
     def __init__(self, s: Array, d: Array, size: Array, tol: float) -> None:
-        self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0
+        self.left = d.max(axis=1) > 0.0
+        self.right = d.min(axis=1) < 0.0
         faces = np.count_nonzero(d == 0.0, axis=1) > s.shape[2]
-        low, high = np.full(s.shape[::2], np.inf), np.full(s.shape[::2], -np.inf)
+        low = np.full(s.shape[::2], np.inf)
+        high = np.full(s.shape[::2], -np.inf)
         near = (self.left & self.right) | (d == 0.0).any(axis=1)
         s, below, above = s[near], d[near][:, :, None], d[near][:, None]  # of all pairs of vertices
         cuts = (below <= 0.0) & (above >= 0.0) & (above > below)
