@@ -323,7 +323,7 @@ def _is_name_of_runs(name: str) -> bool:
 
 
 @contextmanager
-def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
+def lock_folder(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
     """Refuse other runs that want the folder, or this part of it, while it lasts.
 
     They are refused on all their ranks. Collective.
