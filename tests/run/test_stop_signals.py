@@ -23,7 +23,7 @@ from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
 from vi_contact.run.files import folder as folder_lock
-from vi_contact.run.files.folder import locked
+from vi_contact.run.files.folder import lock_folder
 from vi_contact.run.recorders import Contact, Energy
 from vi_contact.run.stop_signals import SIGNALS, StopSignals
 
@@ -239,17 +239,17 @@ def test_a_lock_that_is_free_again(tmp_path: Path) -> None:
 
     def other() -> None:
         try:
-            with locked(SerialComm(), tmp_path):
+            with lock_folder(SerialComm(), tmp_path):
                 refused.append("no")
         except InputError as error:
             refused.append(str(error))
 
-    with locked(SerialComm(), tmp_path), locked(SerialComm(), tmp_path):
+    with lock_folder(SerialComm(), tmp_path), lock_folder(SerialComm(), tmp_path):
         thread = threading.Thread(target=other)
         thread.start()
         thread.join()
     assert "another run writes into" in refused[0] and list(tmp_path.iterdir()) == []
-    with pytest.raises(ZeroDivisionError), locked(SerialComm(), tmp_path):
+    with pytest.raises(ZeroDivisionError), lock_folder(SerialComm(), tmp_path):
         raise ZeroDivisionError
     other()
     assert refused[1] == "no"
@@ -278,12 +278,12 @@ def test_all_ranks_are_refused(comm: Any, shared_tmp: Path) -> None:
         folder_lock.fcntl.flock(holder, folder_lock.fcntl.LOCK_EX)
     with (
         pytest.raises(InputError, match="another run writes into"),
-        locked(MpiComm(comm), shared_tmp),
+        lock_folder(MpiComm(comm), shared_tmp),
     ):
         pass
     if holder is not None:
         holder.close()
-    with locked(MpiComm(comm), shared_tmp):
+    with lock_folder(MpiComm(comm), shared_tmp):
         pass
 
 

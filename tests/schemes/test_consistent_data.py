@@ -248,8 +248,9 @@ def test_restart_from_a_checkpoint(tmp_path: Path, mass: Any, scheme: Any) -> No
     assert any(state.active.any() for state in states[70:90])
     assert all(isinstance(array, np.ndarray) for array in states[80].memory.values())
     start, end = states[0].t, states[-1].t
-    of = {"run": identity(problem, scheme, 1 / 60, start=start, end=end), "span": (start, end)}
-    write_checkpoint(tmp_path, problem, RestartPoint(states[80], states[80].t, states[80].k), of=of)
+    run_of = {"run": identity(problem, scheme, 1 / 60, start=start, end=end), "span": (start, end)}
+    place = RestartPoint(states[80], states[80].t, states[80].k)
+    write_checkpoint(tmp_path, problem, place, run_of=run_of)
     state = read_checkpoint(tmp_path, problem, scheme=scheme, dt=1 / 60)[0].state
     again = [report.new for report in run(problem, scheme, dt=1 / 60, steps=39, state=state)]
     assert all(

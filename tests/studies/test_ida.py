@@ -31,7 +31,7 @@ from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, OutOfTime
 from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.plots.studies import DemandPanel, plot_ida
-from vi_contact.run.files.folder import locked
+from vi_contact.run.files.folder import lock_folder
 from vi_contact.run.solution import Solution
 from vi_contact.run.wall_time import WallTime
 from vi_contact.studies import IDA, read_case, run_ida
@@ -396,7 +396,7 @@ def test_a_wall_time_ends_a_study(
 
 def test_one_study_at_a_time_in_a_folder(study: Path) -> None:
     """The same part of one is refused while it runs, another part is not."""
-    with locked(SerialComm(), study), ThreadPoolExecutor(1) as other:
+    with lock_folder(SerialComm(), study), ThreadPoolExecutor(1) as other:
         assert other.submit(again, study, part=(2, 3)).exception() is None
         assert "another run writes into" in str(other.submit(again, study).exception())
 

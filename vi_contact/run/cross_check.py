@@ -53,9 +53,11 @@ class Disagreement:
 class CrossChecked:
     """Solve by one solver, whose answer counts, and ask others at every step too.
 
-    How far they are off is remembered.
-
-    ``found``: without attempts that ``HalvedAtImpact`` threw away.
+    Attributes:
+        primary: the solver whose answers count.
+        others: those that are compared with it.
+        found: how far each of the others is off so far, without attempts that ``HalvedAtImpact``
+            threw away.
     """
 
     primary: Solver
@@ -64,15 +66,16 @@ class CrossChecked:
 
     def __post_init__(self) -> None:
         check_solver("CrossChecked", self.primary, "the first solver")
-        for one in several("CrossChecked", "others", self.others, "give a list of solvers"):
-            check_solver("CrossChecked", one, "a solver")
+        for other in several("CrossChecked", "others", self.others, "give a list of solvers"):
+            check_solver("CrossChecked", other, "a solver")
         if not len(self.others):
             raise InputError(
                 "CrossChecked: others names no solver, so that nothing is compared; give one or "
                 "more, or the first solver alone"
             )
         self.found = [Disagreement() for _ in self.others]
-        self._earlier, self._last = self.found, (-1, 0.0)
+        self._earlier = self.found
+        self._last = (-1, 0.0)
 
     def begin(self, step: StepProblem) -> None:
         """Forget the attempt before when this one is of the same step but shorter.
@@ -82,7 +85,8 @@ class CrossChecked:
         k, t = self._last
         if step.k == k and step.t < t:
             self.found = self._earlier
-        self._earlier, self._last = deepcopy(self.found), (step.k, step.t)
+        self._earlier = deepcopy(self.found)
+        self._last = (step.k, step.t)
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError unless every solver can take the problem."""
@@ -92,7 +96,13 @@ class CrossChecked:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedCrossCheck":
-        """Return all solvers prepared on the same matrix."""
+        """Return all solvers prepared on the same matrix.
+
+        Args:
+            A: the effective matrix.
+            surface: the contact conditions.
+            scale: reactions of the steps are so many times newtons.
+        """
         solvers = [solver.prepare(A, surface, scale) for solver in (self.primary, *self.others)]
         return PreparedCrossCheck(self, solvers, surface)
 
@@ -102,17 +112,20 @@ class CrossChecked:
         The differences are in u, r_n and, with friction, r_t. This is what summary.json shows. A
         name that comes again gets a number.
         """
-        names = [one.method for one in self.found]
-        return {
-            name if names.count(name) == 1 else f"{name} #{rank}": one.relative
-            | {"iterations_per_step": one.iterations / max(one.steps, 1)}
-            for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
-        }
+        names = [disagreement.method for disagreement in self.found]
+        report = {}
+        for number, disagreement in enumerate(self.found, start=1):
+            name = disagreement.method
+            if names.count(name) > 1:
+                name = f"{name} #{number}"
+            iterations = disagreement.iterations / max(disagreement.steps, 1)
+            report[name] = disagreement.relative | {"iterations_per_step": iterations}
+        return report
 
     @property
     def worst(self) -> float:
         """Return the largest relative difference of any solver in u, r_n or r_t, step by step."""
-        return max((one.worst for one in self.found), default=0.0)
+        return max((disagreement.worst for disagreement in self.found), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -127,28 +140,34 @@ class PreparedCrossCheck:
         """Return the answer of the first solver; compare those of the others with it."""
         result = self.solvers[0].solve(step)
         self.settings.begin(step)
-        for solver, found in zip(self.solvers[1:], self.settings.found, strict=True):
-            self._compare(result, solver.solve(step), found)
+        for solver, disagreement in zip(self.solvers[1:], self.settings.found, strict=True):
+            self._compare(result, solver.solve(step), disagreement)
         return result
 
-    def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
+    def _compare(self, result: StepResult, other: StepResult, disagreement: Disagreement) -> None:
+        """Take the differences of two answers to a step into ``disagreement``. Collective.
+
+        Args:
+            result: of the primary solver.
+            other: of the solver that is compared with it.
+            disagreement: of this solver so far.
+        """
         pairs = {"u": (other.x, result.x), "r_n": (other.r_n, result.r_n)}
         if result.r_t is not None:
-            pairs["r_t"] = (
-                np.zeros_like(result.r_t) if other.r_t is None else other.r_t,
-                result.r_t,
-            )
-        sizes = np.array(
-            [[max_abs((its - own).ravel()), max_abs(own.ravel())] for its, own in pairs.values()]
-        )
-        for name, (off, size) in zip(pairs, self.surface.comm.max(sizes).tolist(), strict=True):
-            found.off[name], found.size[name] = (
-                max(found.off.get(name, 0.0), off),
-                max(found.size.get(name, 0.0), size),
-            )
-        found.method = other.method
-        found.iterations += other.iterations
-        found.steps += 1
+            other_r_t = np.zeros_like(result.r_t) if other.r_t is None else other.r_t
+            pairs["r_t"] = (other_r_t, result.r_t)
+
+        # The largest difference and the largest value of all ranks, in one message.
+        sizes = [
+            [max_abs((other_x - x).ravel()), max_abs(x.ravel())] for other_x, x in pairs.values()
+        ]
+        everywhere = self.surface.comm.max(np.array(sizes)).tolist()
+        for name, (off, size) in zip(pairs, everywhere, strict=True):
+            disagreement.off[name] = max(disagreement.off.get(name, 0.0), off)
+            disagreement.size[name] = max(disagreement.size.get(name, 0.0), size)
+        disagreement.method = other.method
+        disagreement.iterations += other.iterations
+        disagreement.steps += 1
 
 
 def cross_check(
@@ -162,14 +181,19 @@ def cross_check(
 ) -> CrossChecked:
     """March with the first solver and compare the others with it at every step.
 
-    ``report()`` of the result tells.
+    ``report()`` of the result tells how far they are off; its statistics are of all accepted steps.
 
-    ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted
-    ones.
+    Args:
+        problem: as of ``march``.
+        scheme: as of ``march``.
+        solvers: two or more.
+        dt: as of ``march`` [s].
+        steps: the number of base steps.
+        state: as of ``march``.
     """
-    given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
-    if len(given) < 2:
-        raise InputError(f"cross_check: {len(given)} solvers are given; give two or more")
+    count = len(several("cross_check", "solvers", solvers, "give a list of two or more solvers"))
+    if count < 2:
+        raise InputError(f"cross_check: {count} solvers are given; give two or more")
     checked = CrossChecked(solvers[0], tuple(solvers[1:]))
     for _ in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
         pass

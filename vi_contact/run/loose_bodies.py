@@ -27,9 +27,12 @@ SAME = 1e-9  # of the size of the bodies: nodes that are nearer lie at one place
 
 @dataclass(frozen=True)
 class LooseBody:
-    """Hold the middle [m] of a loose body and its number of nodes.
+    """Hold where a loose body is.
 
-    How many of them lie at nodes of other bodies is held too.
+    Attributes:
+        middle: of its box (d,) [m].
+        nodes: how many it has.
+        coinciding: how many of them lie at nodes of other bodies.
     """
 
     middle: Array
@@ -45,7 +48,7 @@ def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     # Nearly every body is touched: the rest, which gathers nodes, is for those that are not.
     system = problem.system
     rows = rows_of_bodies(system)
-    touched = _touched(problem, rows)
+    touched = _touched_by_contact(problem, rows)
     if touched.all():
         return []
     from scipy.spatial import cKDTree  # late: no other run needs it
@@ -58,7 +61,7 @@ def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     for number, free in enumerate(free_motions(system)):
         if not free.motions.shape[1] or touched[number]:
             continue
-        others = [one for other, one in enumerate(nodes) if other != number]
+        others = [nodes[other] for other in range(len(nodes)) if other != number]
         coinciding = 0
         if others:
             distance, _ = cKDTree(np.concatenate(others)).query(nodes[number])
@@ -73,10 +76,10 @@ def _distinct(parts: list[Array]) -> Array:
     return np.asarray(np.unique(np.concatenate(parts), axis=0))
 
 
-def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
-    """Return for every body whether its translation alone moves some condition. Collective.
+def _touched_by_contact(problem: ContactProblem, bodies: list[Indices]) -> Mask:
+    """Return for every body whether it is on a side of some contact condition. Collective.
 
-    The body is side 1 or 2 of this contact condition.
+    A translation of such a body alone moves the condition.
     """
     surface = problem.surface
     moved = np.zeros(len(bodies))

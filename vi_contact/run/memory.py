@@ -12,28 +12,29 @@ from ..core.problem import ContactProblem
 
 
 def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
-    """Return peak_bytes and the bytes of what tells them. Collective.
+    """Return peak_bytes, the largest resident memory of every rank so far, and bytes. Collective.
 
-    Here peak_bytes is the largest resident memory of every rank so far. The bytes are, of all ranks
-    together, those of what tells them: the matrices of all bases, A, its factor, the mesh.
+    The bytes are, by name and of all ranks together, those of what says how many it has: the
+    matrices of all bases, A, its factor, the mesh.
     """
-    comm, systems = problem.system.algebra.comm, (problem.system, problem.turned, problem.equations)
+    comm = problem.system.algebra.comm
+    systems = (problem.system, problem.turned, problem.equations)
     owners: dict[str, list[Any]] = {
-        name: [getattr(one, name) for one in systems] for name in ("K", "M", "C")
-    }
-    owners |= {
-        "A": [A and A.matrix],
-        "factor": [A.factor if A and A.factorised else None],
-        "mesh": [systems[0].space],
+        "K": [system.K for system in systems],
+        "M": [system.M for system in systems],
+        "C": [system.C for system in systems],
+        "A": [None if A is None else A.matrix],
+        "factor": [A.factor if A is not None and A.factorised else None],
+        "mesh": [problem.system.space],
     }
     known: dict[str, int] = {}
     for name, things in owners.items():
-        found = total(
-            comm, sum(getattr(one, "bytes", 0) for one in {id(one): one for one in things}.values())
-        )
-        if found:
-            known[name] = round(found)
-    return {"peak_bytes": from_each(comm, 1024 * getrusage(RUSAGE_SELF).ru_maxrss), "bytes": known}
+        distinct = {id(thing): thing for thing in things}  # bases may share a matrix
+        size = total(comm, sum(getattr(thing, "bytes", 0) for thing in distinct.values()))
+        if size:
+            known[name] = round(size)
+    peak = 1024 * getrusage(RUSAGE_SELF).ru_maxrss
+    return {"peak_bytes": from_each(comm, peak), "bytes": known}
 
 
 def in_words(memory: Mapping[str, Any]) -> str:

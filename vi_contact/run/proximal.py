@@ -46,7 +46,15 @@ STOPPED = 1e-9
 
 @dataclass(frozen=True)
 class _Motion:
-    """One step d of the iteration: P d, its size √(d·P d), B_n d, the contact set it ended in."""
+    """Hold one step of the iteration.
+
+    Attributes:
+        d: the increment (n,) [m].
+        pull: P d (n,) [N].
+        pace: √(d·P d), the size of the step.
+        closing: B_n d (m,) [m].
+        active: the contact set it ended in (m,).
+    """
 
     d: Array
     pull: Array
@@ -57,7 +65,15 @@ class _Motion:
 
 @dataclass
 class _Progress:
-    """The best answer so far; ``vain``: how many since then were no better."""
+    """Hold the best answer so far.
+
+    Attributes:
+        tolerance: of the certificate, relative.
+        best: the answer.
+        least: the smallest residual so far.
+        slowest: the smallest size of a step so far.
+        vain: how many answers since the best one were no better.
+    """
 
     tolerance: float
     best: StepResult | None = None
@@ -67,18 +83,27 @@ class _Progress:
 
     @property
     def certified(self) -> bool:
-        """Whether the best answer is below the tolerance."""
+        """Say whether the smallest residual is below the tolerance."""
         return self.least <= self.tolerance
 
     def take(self, result: StepResult, worst: float, pace: float) -> None:
-        """Take an answer that is better than the best so far.
+        """Take an answer if it is better than the best so far.
 
         It is better with a smaller residual or, near round-off, with the smallest step: the
         residual of a stiff body is there long before soft motions are.
+
+        Args:
+            result: the answer.
+            worst: its residual.
+            pace: the size of the step that led there.
         """
-        better = worst < self.least or (worst <= NEAR * self.tolerance and pace < self.slowest)
-        self.vain, self.best = (0, result) if better else (self.vain + 1, self.best)
-        self.least, self.slowest = min(worst, self.least), min(pace, self.slowest)
+        if worst < self.least or (worst <= NEAR * self.tolerance and pace < self.slowest):
+            self.best = result
+            self.vain = 0
+        else:
+            self.vain += 1
+        self.least = min(worst, self.least)
+        self.slowest = min(pace, self.slowest)
 
 
 class Proximal:
@@ -89,13 +114,19 @@ class Proximal:
     def __init__(
         self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float
     ) -> None:
+        """Prepare the solver on K and weak springs.
+
+        Args:
+            problem: whose bodies contact alone holds.
+            K: its stiffness, which is singular.
+            solver: of the steps.
+            tolerance: of the certificate, relative.
+        """
         solver.check(problem)
-        self._system, self._surface, self._K, self._solver = (
-            problem.static_load,
-            problem.surface,
-            K,
-            solver,
-        )
+        self._system = problem.static_load
+        self._surface = problem.surface
+        self._K = K
+        self._solver = solver
         self._bodies = RigidBodies(problem)
         self._weak = body_springs(problem)
         self._tolerance = tolerance
@@ -146,18 +177,24 @@ class Proximal:
         )
 
     def _iterate(self, answer: StepResult, progress: _Progress) -> None:
-        """From the answer; StepFailure of the solver, or when it has spent too many iterations."""
-        share, before, again, centre = 1.0, np.inf, False, answer.x
+        """Iterate from an answer, until the progress is in vain.
+
+        Raises:
+            StepFailure: of the solver, or when it has spent too many iterations.
+        """
+        share = 1.0  # of the reactions, which the next step may change
+        before = np.inf  # the residual of the step before
+        again = False  # whether this step repeats the one before, with a smaller share
+        centre = answer.x  # from where d counts
+        carried = np.zeros_like(centre)  # resultants that the step before left
         old: _Motion | None = None
-        carried = np.zeros_like(centre)
         for _ in range(ITERATIONS):
+            # One step: an ordinary problem for what the answer leaves over.
             inner = self._left_over(answer, share, centre, carried)
-            found = self._prepared.solve(inner)
-            result = added(self.step, answer, found, share)
-            worst, new = (
-                self.certificate(result).worst,
-                self._motion(result.x - centre, found.active),
-            )
+            increment = self._prepared.solve(inner)
+            result = added(self.step, answer, increment, share)
+            worst = self.certificate(result).worst
+            new = self._motion(result.x - centre, increment.active)
             progress.take(result, worst, new.pace)
             if progress.certified and progress.vain == 2:
                 return
@@ -165,30 +202,38 @@ class Proximal:
                 raise StepFailure(f"{result.method} took more than {INNER} iterations")
             if not progress.certified:
                 self._refuse_flight(new)
-            # settled reactions need a share of themselves to change; a larger one when the last did
-            # not help
-            helped = again or share == 1.0 or worst < 0.5 * before
-            last, share = share, share_of(worst) if helped else min(1.0, MARGIN * share)
-            before, answer, again = worst, result, share < last == 1.0
+
+            # Settled reactions need a share of themselves to change; a larger one when the last did
+            # not help.
+            last = share
+            helped = again or last == 1.0 or worst < 0.5 * before
+            share = share_of(worst) if helped else min(1.0, MARGIN * last)
+            again = share < last == 1.0
+            before = worst
+            answer = result
             if again:
                 continue  # the same step, which corrects its round-off
-            carried = self._missing(inner, found)
-            # once the tolerance is met steps are round-off: to go far along one would shift the
-            # body
-            ahead = 0.0 if old is None or progress.certified else self._ahead(old, new, result)
+            carried = self._missing(inner, increment)
+
+            # Steps that are parallel are summed up at once. Once the tolerance is met they are
+            # round-off: to go far along one would shift the body.
+            ahead = 0.0
+            if old is not None and not progress.certified:
+                ahead = self._ahead(old, new, result)
             old = new if ahead == 0.0 else None
             answer = replace(result, x=result.x + ahead * new.d)
             centre = answer.x
 
-    def _missing(self, inner: StepProblem, found: StepResult) -> Array:
-        """Return what a solver left of a step's resultants.
+    def _missing(self, inner: StepProblem, increment: StepResult) -> Array:
+        """Return what a solver left of a step's resultants (n,) [N].
 
         The next step carries it, or bodies would drift along what P holds.
         """
-        if found.aim == 0.0:
-            return np.zeros_like(found.x)
-        reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
-        return self._bodies.resultants(inner.b - self._springs @ found.x - reaction)
+        x = increment.x
+        if increment.aim == 0.0:
+            return np.zeros_like(x)
+        reaction = inner.surface.reaction_load(increment.r_n, len(x), increment.r_t)
+        return self._bodies.resultants(inner.b - self._springs @ x - reaction)
 
     def _left_over(
         self, answer: StepResult, share: float, centre: Array, carried: Array
@@ -196,8 +241,16 @@ class Proximal:
         """Return the next step, b with the forces' own resultants.
 
         K u has none, and its round-off would move the body.
+
+        Args:
+            answer: the best one so far, or the start.
+            share: of its reactions, which the step may change.
+            centre: from where the springs pull (n,) [m].
+            carried: resultants that the step before left (n,) [N].
         """
-        left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
+        left = left_over(self.step, answer, share)
+        x = answer.x
+        surface = self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
         b = (
@@ -209,22 +262,25 @@ class Proximal:
         return replace(left, A=self._A, b=b)
 
     def _motion(self, d: Array, active: Mask) -> _Motion:
+        """Return the step d (n,) [m] that ended with this contact set (m,). Collective."""
         pull = self._springs @ d
         pace = float(np.sqrt(max(self._system.algebra.dot(d, pull), 0.0)))
         return _Motion(d, pull, pace, self.step.surface.normal_values(d), active)
 
     def _closes(self, motion: _Motion) -> Mask:
-        """Contact points that come nearer to their obstacle."""
+        """Return the contact points (m,) that come nearer to their obstacle. Collective."""
         size = largest(self.step.surface.comm, max_abs(motion.d))
         return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
 
     def _refuse_flight(self, motion: _Motion) -> None:
-        """InputError for a driven rigid motion without end."""
-        system, energy = self._system, motion.pace**2
-        bending, work = (
-            2.0 * system.strain_energy(motion.d),
-            system.algebra.dot(self.step.b, motion.d),
-        )
+        """Raise InputError for a rigid motion without end that loads drive. Collective.
+
+        It bends nothing, dᵀKd = 0, the loads work on it, f·d > 0, and no contact stops it.
+        """
+        system = self._system
+        energy = motion.pace**2
+        bending = 2.0 * system.strain_energy(motion.d)
+        work = system.algebra.dot(self.step.b, motion.d)
         stopped = self.step.surface.some(self._closes(motion))
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
@@ -235,7 +291,7 @@ class Proximal:
         )
 
     def _way(self, d: Array) -> str:
-        """Where a motion goes: the direction of its momentum, if it has one."""
+        """Return in words where a motion d (n,) goes: along its momentum, if it has one."""
         momentum = self._system.M @ d
         sums = np.column_stack([self._system.influence * momentum[:, None], np.abs(momentum)])
         *push, total = self._system.algebra.comm.sum(sums.sum(axis=0))
@@ -252,16 +308,28 @@ class Proximal:
         or only as far as the next contact. It is 0 unless d_new and d_old are parallel, to the
         accuracy which that distance needs. Any start of the next step will do, so nothing but the
         speed depends on it.
+
+        Args:
+            old: the step before.
+            new: the step.
+            result: the answer that it led to.
         """
-        if 0.0 in (old.pace, new.pace) or self.step.surface.some(old.active != new.active):
+        surface = self.step.surface
+        if 0.0 in (old.pace, new.pace) or surface.some(old.active != new.active):
             return 0.0
-        surface, ratio = self.step.surface, new.pace / old.pace
+
+        # As far as the next contact: the least gap over its closing, of all ranks.
         rows = self._closes(new) & ~result.active
         gap = (self.step.bound - surface.normal_values(result.x))[rows]
-        stop = -largest(
-            surface.comm, np.max(-np.maximum(gap, 0.0) / new.closing[rows], initial=-np.inf)
-        )
-        ahead = min(stop, ratio / (1.0 - ratio) if ratio < UNBRAKED else np.inf)
-        off, force = new.d - ratio * old.d, new.pull - ratio * old.pull
+        nearest = np.max(-np.maximum(gap, 0.0) / new.closing[rows], initial=-np.inf)
+        stop = -largest(surface.comm, nearest)
+
+        # Or the sum of a geometric series, if the steps are parallel: what is aside of d_old in
+        # d_new, times the distance, must be less than half a step.
+        ratio = new.pace / old.pace
+        series = ratio / (1.0 - ratio) if ratio < UNBRAKED else np.inf
+        ahead = min(stop, series)
+        off = new.d - ratio * old.d
+        force = new.pull - ratio * old.pull
         aside = float(np.sqrt(max(self._system.algebra.dot(off, force), 0.0)))
         return ahead if np.isfinite(ahead) and ahead * aside <= 0.5 * new.pace else 0.0

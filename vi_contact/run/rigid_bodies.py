@@ -13,14 +13,16 @@ from ..core.algebra import Array, Matrix, total
 from ..core.problem import ContactProblem
 from ..laws.free_motions import bodies_in, free_motions
 
-WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs
+WEAK = 4e-6  # of a stiffness: see body_springs
+STRONG = 1e-4  # the same
 
 
 class RigidBodies:
     """Hold the bodies of a problem, and how forces balance on them. Collective."""
 
     def __init__(self, problem: ContactProblem) -> None:
-        self._coupling, self._comm = problem.surface.coupling, problem.surface.comm
+        self._coupling = problem.surface.coupling
+        self._comm = problem.surface.comm
         self._free = list(free_motions(problem.turned))
 
     def imbalance(self, load: Array, reaction: Array) -> float:
@@ -30,10 +32,12 @@ class RigidBodies:
         on the body, forces [N] on the unknowns of ``problem.static_load``. It is 0 when prescribed
         displacements hold every body.
         """
-        f, r = self._own(load), self._own(reaction)
+        f = self._on_bodies(load)
+        r = self._on_bodies(reaction)
         worst = 0.0
         for body in self._free:
-            own_f, own_r = f[body.rows], r[body.rows]
+            own_f = f[body.rows]
+            own_r = r[body.rows]
             total = np.abs(own_f).sum() + np.abs(own_r).sum()
             *missing, size = self._comm.sum(np.append(body.unit.T @ (own_f - own_r), total))
             worst = float(np.max(np.abs(missing) / (size or 1.0), initial=worst))  # NaN stays NaN
@@ -44,16 +48,18 @@ class RigidBodies:
 
         It is the part of a force on ``static_load``'s unknowns with its resultants.
         """
-        own, part = self._own(force), np.zeros_like(force)
+        on_bodies = self._on_bodies(force)
+        part = np.zeros_like(force)
         for body in self._free:
-            part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])
+            sums = self._comm.sum(body.motions.T @ on_bodies[body.rows])
+            part[body.rows] += body.momenta @ sums
         return part if self._coupling is None else self._coupling.transpose_apply(part)
 
-    def _own(self, force: Array) -> Array:
-        """Return forces on the bodies themselves: û = R ǔ, R⁻¹ = 2 - R."""
-        return (
-            force if self._coupling is None else 2.0 * force - self._coupling.transpose_apply(force)
-        )
+    def _on_bodies(self, force: Array) -> Array:
+        """Return forces (n,) [N] on the bodies themselves: û = R ǔ, R⁻¹ = 2 - R."""
+        if self._coupling is None:
+            return force
+        return 2.0 * force - self._coupling.transpose_apply(force)
 
 
 def body_springs(problem: ContactProblem) -> Matrix:
@@ -68,23 +74,31 @@ def body_springs(problem: ContactProblem) -> Matrix:
     take fewer steps to push a stiff body into a soft one, and cost digits: round-off of the first
     step is 1e-16 / WEAK² at worst.
     """
-    system, surface = problem.turned, problem.surface
-    algebra, numbers = system.algebra, np.asarray(system.space.bodies)
-    count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]
-    row_sums = np.sum(
-        system.influence * np.column_stack([system.M @ r for r in system.influence.T]), axis=1
-    )
+    system = problem.turned
+    surface = problem.surface
+    algebra = system.algebra
+    numbers = np.asarray(system.space.bodies)
+    count = bodies_in(algebra.comm, numbers)
+
+    # The mass of every body, rᵀMr along each axis, and its largest K_ii.
+    d = system.influence.shape[1]
+    inertia = np.column_stack([system.M @ r for r in system.influence.T])
+    row_sums = np.sum(system.influence * inertia, axis=1)
     mass = algebra.comm.sum(np.bincount(numbers, row_sums, minlength=count).astype(float)) / d
     stiffness = np.zeros(count)
     np.maximum.at(stiffness, numbers, np.abs(system.K.diagonal()))
     stiffness = algebra.comm.max(stiffness)
+
+    # The stiffness of each body's springs: STRONG of what is softest, at least WEAK of its own.
     soft = surface.compliance > 0.0
     bed = total(surface.comm, np.sum(1.0 / surface.compliance[soft])) or np.inf
     softest = min(bed, float(np.min(stiffness, where=stiffness > 0.0, initial=np.inf)))
-    wanted = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
+    strength = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
     # a mass alone: any strength will do
-    wanted[stiffness == 0.0] = STRONG * softest if np.isfinite(softest) else 1.0
-    root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))
-    every = np.arange(system.rows)
-    springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)
+    strength[stiffness == 0.0] = STRONG * softest if np.isfinite(softest) else 1.0
+
+    # P = S M S with S the root of strength over mass of the body of each unknown.
+    root = np.sqrt(np.divide(strength, mass, out=np.zeros(count), where=mass > 0.0))
+    rows = np.arange(system.rows)
+    springs = algebra.congruence(algebra.local(rows, rows, root[numbers], system.rows), system.M)
     return springs if surface.coupling is None else algebra.congruence(surface.coupling, springs)

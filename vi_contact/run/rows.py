@@ -27,8 +27,9 @@ class Each(dict[int, Any]):
         self._make = make
 
     def __missing__(self, row: int) -> Any:
-        self[row] = made = self._make(row)
-        return made
+        value = self._make(row)
+        self[row] = value
+        return value
 
 
 class RowReport(Report):
@@ -41,53 +42,76 @@ class RowReport(Report):
         parts: Mapping[str, Any] = self.__dict__.get("parts", {})
         if name not in parts:
             raise AttributeError(f"Report has no {name}")
-        self.__dict__[name] = made = parts[name][self.row]
-        return made
+        value = parts[name][self.row]
+        self.__dict__[name] = value
+        return value
 
 
-def joined(states: Sequence[State]) -> State:
-    """Return the state of all runs, read-only.
+def join_states(states: Sequence[State]) -> State:
+    """Return the states of all runs as rows of one, read-only.
 
-    Of a memory's arrays only the vectors differ from run to run.
+    Of a memory's arrays only the vectors differ from run to run. What some run has not is left out
+    of the memory; tangential reactions that some run has not are zero there.
     """
-    first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
-    u, v, r_n, active = (
-        np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active")
+    first = states[0]
+    memory = {}
+    for name, value in first.memory.items():
+        if not all(name in state.memory for state in states):
+            continue
+        if value.shape == first.u.shape:
+            value = frozen(np.stack([state.memory[name] for state in states]))
+        memory[name] = value
+    r_t = None
+    rubbing = [state.r_t for state in states if state.r_t is not None]
+    if rubbing:
+        zero = 0.0 * rubbing[0]
+        r_t = np.stack([zero if state.r_t is None else state.r_t for state in states])
+    return State(
+        first.t,
+        first.k,
+        frozen(np.stack([state.u for state in states])),
+        frozen(np.stack([state.v for state in states])),
+        np.stack([state.r_n for state in states]),
+        np.stack([state.active for state in states]),
+        memory,
+        r_t,
     )
-    memory = {
-        name: frozen(np.stack([one.memory[name] for one in states]))
-        if value.shape == first.u.shape
-        else value
-        for name, value in first.memory.items()
-        if all(name in one.memory for one in states)
-    }
-    r_t = (
-        None if rubs is None else np.stack([rubs if one.r_t is None else one.r_t for one in states])
-    )
-    return State(first.t, first.k, frozen(u), frozen(v), r_n, active, memory, r_t)
 
 
 def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
-    """Return the states of runs whose rows are those of ``problem``.
+    """Return the states of the runs, each made when somebody asks for it.
 
-    Their problems get to know the products of the rows.
+    Their problems get to know the products of the rows with M, K and C.
+
+    Args:
+        problem: of all runs, whose states are rows.
+        problems: of each run.
+        many: the states as rows.
     """
-    viscous = () if problem.equations.C is None else ("C",)
 
-    def made(row: int) -> State:
+    def own_state(row: int) -> State:
+        u, v = many.u[row], many.v[row]
+        products = [("M", v, many.v), ("K", u, many.u)]
+        if problem.equations.C is not None:
+            products.append(("C", u, many.u))
+        problems[row].equations.know_rows(problem.equations, row, *products)
         memory = {
             name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()
         }
-        r_t, u, v = None if many.r_t is None else many.r_t[row], many.u[row], many.v[row]
-        pairs = ("M", v, many.v), ("K", u, many.u), *((name, u, many.u) for name in viscous)
-        problems[row].equations.know_rows(problem.equations, row, *pairs)
+        r_t = None if many.r_t is None else many.r_t[row]
         return State(many.t, many.k, u, v, many.r_n[row], many.active[row], memory, r_t)
 
-    return Each(made)
+    return Each(own_state)
 
 
 def own_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
-    """Return the step of one run."""
+    """Return the step of one run.
+
+    Args:
+        problem: of the run, which has its law of friction.
+        many: the step of all, with rows.
+        row: of the run.
+    """
     slip0 = None if many.slip0 is None else many.slip0[row]
     return StepProblem(
         many.A,
@@ -119,25 +143,27 @@ class Loads(Load):
 def loads_of(problems: Sequence[ContactProblem]) -> Loads:
     """Return the loads of problems on one system.
 
-    They differ in what shakes them, by few vectors times histories.
+    They differ in what shakes them, by few vectors times histories: the load of the body, which all
+    share, plus factors (runs, vectors) times vectors (vectors, n).
     """
     body = problems[0].unshaken.load
-    shaken = [
-        (run, *pair)
-        for run, one in enumerate(problems)
-        for pair in one.equations.load.separable[len(body.separable) :]
-    ]
-    vectors = {force.tobytes(): force for _, force, _ in shaken}
-    order, forces = (
-        list(vectors),
-        np.array(list(vectors.values())).reshape(len(vectors), len(body.constant)),
-    )
-    places = [(run, order.index(force.tobytes()), history) for run, force, history in shaken]
+
+    # Vectors that are alike, such as -M r of one direction, are kept once: row, vector, history.
+    forces: list[Array] = []
+    numbers: dict[bytes, int] = {}
+    places: list[tuple[int, int, Any]] = []
+    for run, problem in enumerate(problems):
+        for force, history in problem.equations.load.separable[len(body.separable) :]:
+            number = numbers.setdefault(force.tobytes(), len(forces))
+            if number == len(forces):
+                forces.append(force)
+            places.append((run, number, history))
+    vectors = np.array(forces).reshape(len(forces), len(body.constant))
 
     def rows(t: float) -> Array:
-        factors = np.zeros((len(problems), len(forces)))
-        for run, place, history in places:
-            factors[run, place] += history_value(history, t)
-        return np.asarray(body(t) + factors @ forces)
+        factors = np.zeros((len(problems), len(vectors)))
+        for run, number, history in places:
+            factors[run, number] += history_value(history, t)
+        return np.asarray(body(t) + factors @ vectors)
 
     return Loads(body.constant, rows=rows)

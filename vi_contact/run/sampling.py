@@ -8,7 +8,7 @@ for pulses, by the sine that they are cut from, and for records and tables, by t
 samples.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,12 +40,14 @@ def sampling_warning(problem: ContactProblem, dt: float) -> str | None:
     This is an excitation, a load or a motion of the problem whose frequency, period or samples are
     known. It is None when it is not, or nothing is known.
     """
-    said = (one for source in _sources(problem) for one in _said(source, dt))
-    return next(said, None)
+    for source in _sources(problem):
+        for sentence in _sentences(source, dt):
+            return sentence
+    return None
 
 
 def _sources(problem: ContactProblem) -> Iterator[Any]:
-    """Return everything that acts as a function of the time.
+    """Yield everything that acts as a function of the time.
 
     First come excitations, then loads, prescribed and moving parts.
     """
@@ -60,14 +62,20 @@ def _sources(problem: ContactProblem) -> Iterator[Any]:
     yield from (surface.motion, surface.slide)
 
 
-def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
-    """Return the sentences about a source, or about the motions that it holds."""
+def _sentences(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
+    """Yield sentences about a source, or about the motions that it holds.
+
+    Args:
+        source: an excitation, a load, a motion, or what has one in it.
+        dt: the time step [s].
+        depth: how far is looked into it.
+    """
     if source is None or depth == 0:
         return
     name = type(source).__name__
     spacing = _spacing(source)
     if spacing is not None:
-        yield from _of_samples(spacing, dt)
+        yield from _judge_samples(spacing, dt)
     elif isinstance(source, Tabulated):
         spacing = float(np.median(np.diff(source.times)))
         if dt > spacing * (1.0 + ROUNDED):
@@ -77,12 +85,12 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
             )
     elif isinstance(source, HalfSine | FullSine | Rectangular):
         period = source.duration * {HalfSine: 2.0, FullSine: 1.0}.get(type(source), FEWEST)
-        yield from _of_period(f"{name} of {source.duration:g} s", period, dt)
+        yield from _judge_period(f"{name} of {source.duration:g} s", period, dt)
     elif (frequency := _frequency(source)) is not None:
-        yield from _of_period(f"{name} of {frequency:g} Hz", 1.0 / frequency, dt)
+        yield from _judge_period(f"{name} of {frequency:g} Hz", 1.0 / frequency, dt)
     else:
         for held in _held(source):
-            yield from _said(held, dt, depth - 1)
+            yield from _sentences(held, dt, depth - 1)
 
 
 def _spacing(source: Any) -> float | None:
@@ -99,27 +107,31 @@ def _frequency(source: Any) -> float | None:
 
 
 def _held(source: Any) -> Iterator[Any]:
-    """Return what a function or an object may have its motion from.
+    """Yield what a function or an object may have its motion from.
 
     It is its owner, a part of it, or what it closes over.
     """
     for name in PARTS:
-        found = getattr(source, name, None)
-        yield from found if isinstance(found, list | tuple) else (found,)
+        yield from _members(getattr(source, name, None))
     for cell in getattr(source, "__closure__", None) or ():
         try:
-            found = cell.cell_contents
+            content = cell.cell_contents
         except ValueError:  # not yet filled
             continue
-        for one in found if isinstance(found, list | tuple) else (found,):
-            if callable(getattr(one, "value", None)):  # of a load
-                yield one.value
-            elif callable(one) or hasattr(one, "acceleration"):
-                yield one
+        for member in _members(content):
+            if callable(getattr(member, "value", None)):  # of a load
+                yield member.value
+            elif callable(member) or hasattr(member, "acceleration"):
+                yield member
 
 
-def _of_samples(spacing: float, dt: float) -> Iterator[str]:
-    """Tell of a record with longer steps than its own."""
+def _members(value: Any) -> Sequence[Any]:
+    """Return the members of a list or tuple; anything else is its only one."""
+    return value if isinstance(value, list | tuple) else (value,)
+
+
+def _judge_samples(spacing: float, dt: float) -> Iterator[str]:
+    """Yield a sentence about a record whose samples [s] are nearer to each other than dt [s]."""
     if dt > spacing * (1.0 + ROUNDED):
         yield (
             f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose "
@@ -128,8 +140,14 @@ def _of_samples(spacing: float, dt: float) -> Iterator[str]:
         )
 
 
-def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
-    """Tell of a sine, or a part of one, with too few steps in its period."""
+def _judge_period(what: str, period: float, dt: float) -> Iterator[str]:
+    """Yield a sentence about a sine, or a part of one, with too few steps in its period.
+
+    Args:
+        what: it is, in words.
+        period: of the sine [s].
+        dt: the time step [s].
+    """
     if dt <= period / FEWEST * (1.0 + ROUNDED):
         return
     halves = 2.0 * dt / period

@@ -218,7 +218,7 @@ class Session:
 
         A signal to one rank asks for it, or the end of the time.
         """
-        number, late = signals.asked(self._comm, self.wall_time.over())
+        number, late = signals.ask_all(self._comm, self.wall_time.over())
         if not (number or late):
             return
         self._checkpoint(writer)

@@ -20,7 +20,7 @@ from ..core.state_checks import initial_state
 from ..core.step import Columns, Recorder, Report, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from .files.checkpoint import RestartPoint, read_checkpoint
-from .files.folder import HISTORY_H5, locked, run_folder
+from .files.folder import HISTORY_H5, lock_folder, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
@@ -157,7 +157,7 @@ def open_run(
     folder = None if request.out is None else run_folder(comm, request.out)
     source = _folder_to_continue(request.restart, folder)
     recorders = _all_recorders(request.record)
-    with locked(comm, folder):
+    with lock_folder(comm, folder):
         # The first state: that of the checkpoint, of an earlier stage, or at rest. The scheme adds
         # its memory of earlier steps, which depends on the length of the first one.
         place, checksum = _first_place(request, method, source)

@@ -17,7 +17,6 @@ would be wrong for points in motion wherever it jumps there.
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import accumulate, islice
 
 import numpy as np
 
@@ -47,14 +46,17 @@ def static_equilibrium(
     t: float = 0.0,
     tolerance: float = TOLERANCE,
 ) -> State:
-    """Return the gravity stage, without excitation.
-
-    It is K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active.
+    """Return the gravity stage, without excitation: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact.
 
     The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic
     stage starts. A body that no prescribed displacement holds is brought to rest on its contacts.
-    Free rigid motions that no load drives keep the mean position of u0 (see ``proximal``). If
-    ``solver`` is None, it is Automatic().
+    Free rigid motions that no load drives keep the mean position of u0 (see ``proximal``).
+
+    Args:
+        problem: what stands in equilibrium.
+        solver: Automatic() when None.
+        t: the time [s] at which loads and prescribed displacements are taken.
+        tolerance: of the certificate, relative.
 
     Raises:
         InputError: the loads drive a rigid motion that nothing stops, so that there is no
@@ -69,29 +71,28 @@ def static_equilibrium(
     equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
     with together(problem.surface.comm):
         start = initial_state(problem, t)
-    state = equilibria.after(start, t)
+    state = equilibria.solve(start, t)
     _warn_if_open(problem, state)
     return state
 
 
 def _warn_if_open(problem: ContactProblem, state: State) -> None:
-    """Warn, on rank 0, where much of a contact is open at rest. Collective.
+    """Warn, on rank 0, where much of a contact that touched at the start is open at rest.
 
-    It is a contact that touches at the start, and is pressed.
-
-    The place is that of the open point with the lowest number.
+    A contact without any pressure is let be. Collective.
     """
+    # Areas of what touched, and of what of it has opened, of all ranks.
     surface = problem.surface
     touching = surface.gap0 <= TOUCHING * largest(surface.comm, max_abs(surface.points))
-    opened = touching & ~state.active
-    pressed, area, lost = surface.comm.sum(
-        np.array([state.r_n.sum(), surface.weights[touching].sum(), surface.weights[opened].sum()])
-    )
+    lifted = touching & ~state.active
+    sums = [state.r_n.sum(), surface.weights[touching].sum(), surface.weights[lifted].sum()]
+    pressed, area, lost = surface.comm.sum(np.array(sums))
     if pressed <= 0.0 or lost <= OPEN * area:
         return
+
     # The open point with the lowest number: of all ranks one has it, and tells its place by a sum.
-    first = -largest(surface.comm, np.max(-surface.slots[opened].astype(float), initial=-np.inf))
-    own = opened & (surface.slots == first)
+    first = -largest(surface.comm, np.max(-surface.slots[lifted].astype(float), initial=-np.inf))
+    own = lifted & (surface.slots == first)
     place = surface.comm.sum(surface.points[own].sum(axis=0))
     if surface.comm.rank == 0:
         log.warning(
@@ -110,7 +111,15 @@ class Equilibria:
     def __init__(
         self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE
     ) -> None:
-        system, solver = problem.static_load, solver or Automatic()
+        """Factorise what the solver needs.
+
+        Args:
+            problem: what stands in equilibrium.
+            solver: Automatic() when None.
+            tolerance: of the certificates, relative.
+        """
+        solver = solver or Automatic()
+        system = problem.static_load
         self._problem = problem
         self._K = EffectiveMatrix(
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
@@ -123,11 +132,8 @@ class Equilibria:
             certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance, advice=ADVICE)
             self._solve = lambda step: certified.solve(step)[0]
 
-    def after(self, old: State, t: float) -> State:
-        """Return the equilibrium at time t of a body that rubs and slides, and its number.
-
-        It slides from where ``old`` was.
-        """
+    def solve(self, old: State, t: float) -> State:
+        """Return the equilibrium at time t [s]; points that rub slide from where ``old`` was."""
         problem = self._problem
         # loads, motions and laws of the user's may fail on one rank
         with together(problem.surface.comm):
@@ -147,9 +153,8 @@ class Equilibria:
             )
             refuse_nan(step, lambda: problem.static_load)
             result = self._solve(step)
-        return State(
-            t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t
-        )
+        rest = np.zeros_like(old.u)
+        return State(t, old.k, result.x, rest, result.r_n, result.active, r_t=result.r_t)
 
 
 def quasi_static(
@@ -202,16 +207,22 @@ def quasi_static(
             state = initial_state(problem)
     else:
         check_sizes("quasi_static", problem, state)
-    order = _checked(times, state.t)
+    stages = _increasing(times, state.t)
     equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
-    stages = accumulate(
-        order, lambda old, t: replace(equilibria.after(old, t), k=old.k + 1), initial=state
-    )
-    return islice(stages, 1, None)  # the first one is the start
+    return _each_after_the_other(equilibria, state, stages)
 
 
-def _checked(times: Iterable[float], start: float) -> list[float]:
-    """Return the times as a list."""
+def _each_after_the_other(
+    equilibria: Equilibria, state: State, times: Iterable[float]
+) -> Iterator[State]:
+    """Yield the equilibrium at each of the times [s], the first after ``state``."""
+    for t in times:
+        state = replace(equilibria.solve(state, t), k=state.k + 1)
+        yield state
+
+
+def _increasing(times: Iterable[float], start: float) -> list[float]:
+    """Return the times [s] as a list; InputError unless they increase from the start [s] on."""
     if not isinstance(times, Iterable) or isinstance(times, str | bytes):
         raise InputError(f"load steps at {shown(times)}: give times in seconds")
     order = [real(t) for t in times]

@@ -30,7 +30,9 @@ class StopSignals:
     """
 
     def __init__(self, *, lasting: bool = False) -> None:
-        self._found, self._lasting, self._late = 0, lasting, False
+        self._number = 0  # of the signal that nobody has acted on yet
+        self._lasting = lasting
+        self._late = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "StopSignals":
@@ -45,29 +47,29 @@ class StopSignals:
         return self
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        self._found = self._found or number
+        """Keep the number of the first signal; the second Ctrl-C is Python's own again."""
+        self._number = self._number or number
         if number == signal.SIGINT:
             signal.signal(number, signal.SIG_DFL)
 
-    def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
-        """Return the number of a signal that a rank has got, or 0. Collective.
+    def ask_all(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
+        """Return (number of a signal that some rank has got or 0, whether time is over for one).
 
-        Whether time is over for a rank is returned too.
+        Collective.
         """
         over = over or self._late
-        number, late = (
-            (self._found, over)
-            if comm.size == 1
-            else comm.max(np.array([self._found, over], dtype=float))
-        )
+        if comm.size == 1:
+            number, late = self._number, over
+        else:
+            number, late = comm.max(np.array([self._number, over], dtype=float))
         if self._lasting:
             self._late = bool(late)
         elif number:
-            self._found = 0
+            self._number = 0
         return int(number), bool(late)
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         for number, before in self._before.items():
             signal.signal(number, before)
-        if self._found and error is None:
-            os.kill(os.getpid(), self._found)
+        if self._number and error is None:
+            os.kill(os.getpid(), self._number)

@@ -24,7 +24,7 @@ from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
 from .method import Method
-from .rows import Each, RowReport, joined, loads_of, own_states, own_step
+from .rows import Each, RowReport, join_states, loads_of, own_states, own_step
 from .time_steps import StepPlan
 
 
@@ -34,6 +34,7 @@ class Together(March):
     def __init__(
         self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0
     ) -> None:
+        """Stand before the next step, as ``March`` does, and in no group yet."""
         super().__init__(method, step_plan, state, base, halved)
         self.group: Group | None = None
         self.waiting: deque[tuple[float, Report]] = deque()  # made, and not handed out yet
@@ -65,18 +66,25 @@ class Together(March):
 
 
 def group_runs(runs: Sequence[Together]) -> None:
-    """Put runs into groups that step together: all that can."""
+    """Put runs into groups that step together: all that can.
+
+    Runs of a group have one body (the first lends its matrices), scheme and solver, and are at the
+    same step. Those that several ranks share, that may be halved, that have motions marched beside
+    them or a scheme which steps no rows go alone.
+    """
     groups: list[list[Together]] = []
     for run in runs:
-        problem, plan = run.method.problem, run.step_plan
+        problem = run.method.problem
+        plan = run.step_plan
         alone = problem.surface.comm.size > 1 or plan.halvings or run.base >= plan.steps
         beside = problem.system.companions or problem.surface.companions
         if alone or beside or not getattr(run.method.scheme, "by_rows", False):
             continue
         for group in groups:
-            first, found = group[0], problem.beside(group[0].method.problem)
-            if found is not None and _ways(first) == _ways(run):
-                run.method = replace(run.method, problem=found)
+            first = group[0]
+            shared = problem.beside(first.method.problem)
+            if shared is not None and _place_and_method(first) == _place_and_method(run):
+                run.method = replace(run.method, problem=shared)
                 group.append(run)
                 break
         else:
@@ -85,8 +93,8 @@ def group_runs(runs: Sequence[Together]) -> None:
         Group(group)
 
 
-def _ways(run: Together) -> tuple[Any, ...]:
-    """Where a run is, and how it goes on."""
+def _place_and_method(run: Together) -> tuple[Any, ...]:
+    """Return where a run is, and how it goes on."""
     return (
         run.state.t,
         run.state.k,
@@ -98,56 +106,92 @@ def _ways(run: Together) -> tuple[Any, ...]:
 
 
 class Group:
-    """Hold runs of one system, surface, scheme and tolerance that are at the same step."""
+    """Hold runs of one system, surface, scheme and tolerance that are at the same step.
+
+    ``_problem`` is that of all runs, whose loads are rows; ``_problems`` are their own. The states
+    are there twice: ``_many`` as rows, ``_states`` one by one.
+    """
 
     def __init__(self, runs: Sequence[Together]) -> None:
         method = runs[0].method
-        self._scheme, self._tolerance = method.scheme, method.tolerance
-        self._base, self._dt = runs[0].base, float("nan")
+        self._scheme = method.scheme
+        self._tolerance = method.tolerance
+        self._base = runs[0].base
+        self._dt: float | None = None  # None before the first step
         self._A: Any = None
         self._solver: Any = None  # CertifiedSolver, once there is a step
-        self._chosen(list(runs), [run.state for run in runs])
+        self._go_on_with(list(runs), [run.state for run in runs])
 
-    def _chosen(self, runs: list[Together], states: list[State]) -> None:
-        """Go on with these runs, one alone not together."""
+    def _go_on_with(self, runs: list[Together], states: list[State]) -> None:
+        """Go on with these runs from these states; one run alone is no group."""
         self._runs = runs if len(runs) > 1 else []
         for run, state in zip(runs, states, strict=True):
-            run.group, run.state = (self if self._runs else None), state
+            run.group = self if self._runs else None
+            run.state = state
         if self._runs:
             self._problems = [run.method.problem for run in runs]
-            self._problem = replace(first := self._problems[0])
+            first = self._problems[0]
+            self._problem = replace(first)
             self._problem.__dict__["equations"] = first.unshaken.loaded(loads_of(self._problems))
-            self._many, self._states = joined(states), Each(states.__getitem__)
+            self._take_states(states)
+
+    def _take_states(self, states: list[State]) -> None:
+        """Hold the states of the runs as rows, and one by one."""
+        self._many = join_states(states)
+        self._states = Each(states.__getitem__)
 
     def without(self, leaving: Sequence[Together]) -> None:
         """Let these runs go on alone from where they are."""
         for row, run in enumerate(self._runs):
-            run.group, run.state = None, self._states[row]
+            run.group = None
+            run.state = self._states[row]
         left = [run for run in self._runs if run not in leaving]
-        self._chosen(left, [run.state for run in left])
-        if self._runs and self._dt == self._dt:
+        self._go_on_with(left, [run.state for run in left])
+        if self._runs and self._dt is not None:  # the problem is new, the factor of A is not
             self._A = self._scheme.effective_matrix(self._problem, self._dt).factorised_as(self._A)
 
     def advance(self) -> None:
         """Make the next step of all runs; those that cannot make it together leave."""
         while self._runs:
-            plans = [(run, run.step_plan) for run in self._runs]
-            dt, ended = (
-                plans[0][1].dt(self._base),
-                [run for run, plan in plans if plan.steps == self._base],
-            )
+            dt = self._runs[0].step_plan.dt(self._base)
             try:
-                leaving = (
-                    ended
-                    or [run for run, plan in plans if plan.dt(self._base) != dt]
-                    or self._step(dt)
-                )
+                # Those that have ended leave, then those with another time step, then those that
+                # cannot make the step together.
+                leaving: Sequence[Together] = [
+                    run for run in self._runs if run.step_plan.steps == self._base
+                ]
+                if not leaving:
+                    leaving = [run for run in self._runs if run.step_plan.dt(self._base) != dt]
+                if not leaving:
+                    leaving = self._step(dt)
             except ViContactError:  # of one of them, which meets it again alone
                 leaving = self._runs
             if not leaving:
                 self._base += 1
                 return
             self.without(leaving)
+
+    def _begin(self, dt: float) -> None:
+        """Let the scheme begin anew with steps of dt [s]: the first, or one of another length."""
+        states = []
+        for row, problem in enumerate(self._problems):
+            states.append(self._scheme.start(problem, self._states[row], dt))
+        self._take_states(states)
+        self._dt = dt
+        self._A = self._scheme.effective_matrix(self._problem, dt)
+        self._solver = None
+
+    def _solve(self, many: StepProblem, steps: Each) -> Any:
+        """Return the answers of the first solver to all rows, None if it cannot take them so."""
+        if self._solver is None:
+            solvers = self._runs[0].method.solvers
+            self._solver = CertifiedSolver(
+                self._problem, self._A, many.scale, solvers, self._tolerance
+            )
+        first = self._solver.first
+        if not hasattr(first, "solve_many"):
+            return None
+        return first.solve_many(many, steps.__getitem__)
 
     def _step(self, dt: float) -> list[Together]:
         """Make a step and hand out its reports, or the runs that cannot make it.
@@ -156,81 +200,96 @@ class Group:
         """
         runs, scheme, problem = self._runs, self._scheme, self._problem
         if dt != self._dt:
-            states = [
-                scheme.start(one, self._states[row], dt) for row, one in enumerate(self._problems)
-            ]
-            self._many, self._states = joined(states), Each(states.__getitem__)
-            self._dt, self._A, self._solver = dt, scheme.effective_matrix(problem, dt), None
+            self._begin(dt)
+
+        # The right-hand sides b of all runs as rows; who has no numbers there, or is driven into
+        # its obstacle, meets the error again alone, where it is told.
         many = scheme.step(problem, self._many, self._A, dt)
-        if not np.isfinite(many.b.sum()) and len(
-            wrong := np.flatnonzero(~np.isfinite(many.b).all(axis=-1))
-        ):
-            return [runs[row] for row in wrong]
+        if not np.isfinite(many.b.sum()):
+            wrong = np.flatnonzero(~np.isfinite(many.b).all(axis=-1))
+            if len(wrong):
+                return [runs[row] for row in wrong]
         try:
             problem.surface.refuse_driven(many.t)
         except InputError:
-            return list(runs)  # each says so alone
-        if self._solver is None:
-            method = runs[0].method
-            self._solver = CertifiedSolver(
-                problem, self._A, many.scale, method.solvers, self._tolerance
-            )
-        problems, together = self._problems, self._solver.first
+            return list(runs)
+
+        # The solver answers all rows at once, if it can.
+        problems = self._problems
         steps = Each(lambda row: own_step(problems[row], many, row))
-        answers = (
-            together.solve_many(many, steps.__getitem__)
-            if hasattr(together, "solve_many")
-            else None
-        )
+        answers = self._solve(many, steps)
         if answers is None:
             return list(runs)
-        for run in () if dt in runs[0].prepared else runs:
-            run.prepared = {dt: (self._A, self._solver)}
-        parts, leaving = {"step": steps, "result": Each(answers.own)}, list(answers.failed)
+        if dt not in runs[0].prepared:  # for the steps that a run makes alone
+            for run in runs:
+                run.prepared = {dt: (self._A, self._solver)}
+
+        # Each answer gets its certificate, then states and reports are made.
+        parts = {"step": steps, "result": Each(answers.own)}
+        leaving = list(answers.failed)
         if not leaving:
-            result, leaving = self._judged(many, answers.rows, parts)
+            result, leaving = self._judge(many, answers.rows, parts)
         if not leaving:
-            self._finish(many, result, parts)
+            self._finish(many, result, parts, dt)
         return [runs[row] for row in leaving]
 
-    def _judged(
+    def _judge(
         self, many: StepProblem, rows: StepResult, parts: dict[str, Any]
     ) -> tuple[StepResult, list[int]]:
         """Return the answers as rows, and the rows of runs that have to escalate, or fail.
 
         Answers that are not good at once are found alone.
+
+        Args:
+            many: the step of all runs.
+            rows: its answers.
+            parts: of the reports, steps and results by row; the certificates are added to them.
         """
-        steps, results, leaving = parts["step"], parts["result"], []
+        steps, results = parts["step"], parts["result"]
         certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [
-            row for row, one in enumerate(certificates) if not one.worst <= NEAR * self._tolerance
+            row
+            for row, certificate in enumerate(certificates)
+            if not certificate.worst <= NEAR * self._tolerance
         ]
+        leaving = []
         for row in doubtful:
             escalated = True
             with suppress(ViContactError):
                 results[row], certificates[row], escalated = self._solver.solve(steps[row])
-            leaving += [row] if escalated else []
+            if escalated:
+                leaving.append(row)
         if doubtful and not leaving:
-            names = ("x", "r_n", "active") if rows.r_t is None else ("x", "r_n", "active", "r_t")
-            each = [results[row] for row in range(len(certificates))]
+            own = [results[row] for row in range(len(certificates))]
             rows = replace(
-                rows, **{name: np.stack([getattr(one, name) for one in each]) for name in names}
+                rows,
+                x=np.stack([result.x for result in own]),
+                r_n=np.stack([result.r_n for result in own]),
+                active=np.stack([result.active for result in own]),
+                r_t=None if rows.r_t is None else np.stack([result.r_t for result in own]),
             )
         parts["certificate"] = certificates
         return rows, leaving
 
-    def _finish(self, many: StepProblem, result: StepResult, parts: dict[str, Any]) -> None:
-        """States, impacts and reports at the end of a step."""
-        problems, scheme, dt, old = self._problems, self._scheme, self._dt, self._states
+    def _finish(
+        self, many: StepProblem, result: StepResult, parts: dict[str, Any], dt: float
+    ) -> None:
+        """Make states, impacts and reports at the end of a step.
+
+        Args:
+            many: the step of all runs.
+            result: its certified answers, as rows.
+            parts: of the reports, by row, to which the rest is added.
+            dt: the length of the step [s].
+        """
+        problems, scheme, old = self._problems, self._scheme, self._states
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             frozen(vector)  # what is known of them stays true
         free = own_states(self._problem, problems, rows)
-        self._many, self._states = self._struck(rows, free)
-        system, loads = (
-            self._problem.equations,
-            [("load", t, t) for t in self._problem.equations.times],
-        )
+        self._many, self._states = self._apply_impact(rows, free, dt)
+        system = self._problem.equations
+        loads = [("load", t, t) for t in system.times]
 
         def averages(row: int) -> Callable[[], Balance]:
             problems[row].equations.know_rows(system, row, *loads)
@@ -247,30 +306,40 @@ class Group:
         for row, run in enumerate(self._runs):
             run.waiting.append((dt, RowReport(parts=parts, row=row)))
 
-    def _struck(self, rows: State, free: Each) -> tuple[State, Each]:
+    def _apply_impact(self, rows: State, free: Each, dt: float) -> tuple[State, Each]:
         """Return the states after the impact law, as rows and one by one.
 
         They are as they were where nothing was struck.
+
+        Args:
+            rows: the states after the step, as rows.
+            free: the same one by one.
+            dt: the length of the step [s].
         """
-        problem, scheme, old, dt = self._problem, self._scheme, self._states, self._dt
+        problem, scheme, old = self._problem, self._scheme, self._states
         closed = rows.active & problem.surface.rigid
         if problem.impact is None or not closed.any():
             return rows, free
         if getattr(problem.impact, "by_rows", False) and not rows.memory:
+            # The law takes rows: of all runs at once.
             new = after_impact(problem, scheme, self._many, rows, dt)
-            struck, problems = (frozen(new.v) != rows.v).any(axis=1), self._problems
+            struck = (frozen(new.v) != rows.v).any(axis=1)
+            problems = self._problems
 
-            def moved(row: int) -> State:
+            def own_state(row: int) -> State:
                 if not struck[row]:
                     return free[row]
-                problems[row].equations.know_rows(
-                    problem.equations, row, ("M", v := new.v[row], new.v)
-                )
+                v = new.v[row]
+                problems[row].equations.know_rows(problem.equations, row, ("M", v, new.v))
                 return free[row].with_velocity(v)
 
-            return new, Each(moved)
-        own = [
-            after_impact(one, scheme, old[row], free[row], dt) if closed[row].any() else free[row]
-            for row, one in enumerate(self._problems)
-        ]
-        return replace(joined(own), u=rows.u), Each(own.__getitem__)
+            return new, Each(own_state)
+
+        # Else run by run, where a point is closed.
+        states = []
+        for row, own_problem in enumerate(self._problems):
+            state = free[row]
+            if closed[row].any():
+                state = after_impact(own_problem, scheme, old[row], state, dt)
+            states.append(state)
+        return replace(join_states(states), u=rows.u), Each(states.__getitem__)

@@ -29,9 +29,9 @@ _IMPORTED = time.monotonic()
 def seconds_of(wall_time: object) -> float:
     """Return the seconds of a text that Slurm reads as --time; InputError for any other."""
     text = wall_time if isinstance(wall_time, str) else ""
-    found = re.fullmatch(r"(?:(\d+)(-))?(\d+(?::\d+){0,2})", text, re.ASCII)
-    if found:
-        days, dash, rest = found.groups("")
+    match = re.fullmatch(r"(?:(\d+)(-))?(\d+(?::\d+){0,2})", text, re.ASCII)
+    if match:
+        days, dash, rest = match.groups("")
         parts = [int(part) for part in rest.split(":")]
         units = _UNITS[dash][len(parts) - 1]
         seconds = 86400 * int(days or 0) + sum(a * b for a, b in zip(units, parts, strict=True))
@@ -50,6 +50,7 @@ def age() -> float:
 
 @cache
 def _born() -> float:
+    """Return when this process began, on the clock of ``time.monotonic`` [s]."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
         age = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
@@ -59,15 +60,19 @@ def _born() -> float:
 
 
 class WallTime:
-    """Keep what base steps take, and checkpoints of so many ``runs``, against the wall time.
+    """Keep what base steps and checkpoints take against the wall time of the process.
 
-    None: there is no end.
+    A wall time of None has no end. ``runs``: how many take turns in this process, all of which
+    write a checkpoint before the end.
     """
 
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
-        self.text, self._runs = wall_time, runs
+        self.text = wall_time
+        self._runs = runs
         self._end = math.inf if wall_time is None else seconds_of(wall_time)
-        self._last, self._step, self._saving = 0.0, 0.0, math.nan
+        self._last = 0.0  # age of the process at the end of the last step [s]
+        self._step = 0.0  # the longest step so far [s]
+        self._saving = math.nan  # the longest checkpoint so far [s]
 
     @property
     def left(self) -> float:
@@ -82,7 +87,12 @@ class WallTime:
     @property
     def unsure(self) -> bool:
         """Say whether nobody knows yet how long a checkpoint takes, although it matters."""
-        return math.isnan(self._saving) and self._end < math.inf
+        return self._never_saved and self._end < math.inf
+
+    @property
+    def _never_saved(self) -> bool:
+        """Say whether there has been no checkpoint yet."""
+        return math.isnan(self._saving)
 
     def begin(self) -> None:
         """Note that the first step begins now."""
@@ -93,12 +103,14 @@ class WallTime:
         """Take the time of a checkpoint."""
         begin = age()
         yield
-        self._saving = max(age() - begin, self._saving) if self._saving >= 0.0 else age() - begin
+        seconds = age() - begin
+        self._saving = seconds if self._never_saved else max(seconds, self._saving)
 
     def over(self) -> bool:
         """Say, at the end of a base step, whether another one might not end in time."""
         if self.text is None:
             return False
         now = age()
-        self._step, self._last = max(self._step, now - self._last), now
+        self._step = max(self._step, now - self._last)
+        self._last = now
         return bool(self._end - now <= SAFETY * (self._step + 2.0 * self._runs * self._saving))

@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
 MEMORY = "memory_"
 CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
-SAID = 200  # characters of a foreign reason
+LONGEST = 200  # characters of a foreign reason
 DAMAGE = (
     OSError,
     ValueError,
@@ -65,8 +65,13 @@ DAMAGE = (
 class RestartPoint:
     """Hold the end of a base step, where a run can be left and continued.
 
-    t_start, k_start: of the state the whole run began with; ``steps`` and ``t_end`` of a restart
-    count from there. base: base steps done since then; halved: attempts thrown away since then.
+    Attributes:
+        state: at this end.
+        t_start: the time [s] of the state the whole run began with; ``steps`` and ``t_end`` of a
+            restart count from there.
+        k_start: the number of this state.
+        base: base steps done since then.
+        halved: attempts thrown away since then.
     """
 
     state: State
@@ -86,15 +91,22 @@ def write_checkpoint(
     problem: ContactProblem,
     place: RestartPoint,
     *,
-    of: Mapping[str, Any],
+    run_of: Mapping[str, Any],
     rows: str = "",
     safe: bool = True,
 ) -> None:
-    """Replace the checkpoint in the folder.
+    """Replace the checkpoint in the folder. Collective.
 
-    ``of``: the "run", as ``identity`` sees it over a "span" of times [s]; ``rows``: checksum of the
-    histories up to here; ``safe``: whether these are on the medium, and the checkpoint shall be.
-    Collective; ViContactError on all ranks when the disk refuses it.
+    Args:
+        folder: of the run.
+        problem: what is marched.
+        place: where it is left.
+        run_of: the "run", as ``identity`` sees it over a "span" of times [s].
+        rows: checksum of the histories up to here.
+        safe: whether these are on the medium, and the checkpoint shall be.
+
+    Raises:
+        ViContactError: on all ranks, when the disk refuses it.
     """
     state = place.state
     vectors, same = _split(problem, state)
@@ -103,7 +115,7 @@ def write_checkpoint(
     about = json.dumps(
         {
             "format": FORMAT,
-            **of,
+            **run_of,
             "rows": rows,
             "vectors": sorted(vectors),
             "t": state.t,
@@ -116,11 +128,13 @@ def write_checkpoint(
     )
 
     def write() -> None:
+        # Vectors of all ranks, in the order of the numbers of their unknowns: another number of
+        # ranks finds its own there.
         parts = gathered or []
         order = np.argsort(np.concatenate([ids for ids, _ in parts]))
-        arrays = {
-            name: np.concatenate([found[name] for _, found in parts])[order] for name in vectors
-        } | same
+        arrays = dict(same)
+        for name in vectors:
+            arrays[name] = np.concatenate([own[name] for _, own in parts])[order]
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
         np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
@@ -131,26 +145,26 @@ def write_checkpoint(
 
 def checksum(arrays: Mapping[str, Any]) -> str:
     """Return the checksum of names, types, shapes and values."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for name, values in sorted(arrays.items()):
         array = np.asarray(values)
-        found.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def state_checksum(folder: Path) -> str:
     """Return the checksum of the state that the checkpoint in a folder holds."""
-    return checksum(_unpacked(folder / CHECKPOINT)[1])
+    return checksum(_unpack(folder / CHECKPOINT)[1])
 
 
 def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
-    """(arrays of owned unknowns, arrays that are the same on every rank, or on rank 0 only)."""
+    """Return (arrays of the unknowns of this rank, arrays that are whole on rank 0). Collective."""
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
-    contact: Arrays = {"r_n": state.r_n, "active": state.active} | (
-        {} if state.r_t is None else {"r_t": state.r_t}
-    )
+    contact: Arrays = {"r_n": state.r_n, "active": state.active}
+    if state.r_t is not None:
+        contact["r_t"] = state.r_t
     same = {name: problem.surface.on_first(array) for name, array in contact.items()}
     for name in sorted(state.memory):
         array = np.asarray(state.memory[name])
@@ -166,20 +180,31 @@ def read_checkpoint(
 
     The state is that on the ranks of this run.
 
-    InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem,
-    dt (or plan of them) or scheme; unless ``changed`` allows the latter: another dt counts steps
-    anew, schemes begin without memory.
+    Args:
+        folder: of the run that is continued.
+        problem: of this run.
+        scheme: of this run.
+        dt: time steps of this run [s].
+        changed: whether problem, dt and scheme may be others: another dt counts steps anew, and
+            schemes begin without memory.
+
+    Raises:
+        InputError: the checkpoint is missing, damaged, of an unknown format, or of another problem,
+            dt (or plan of them) or scheme.
     """
-    file, comm = folder / CHECKPOINT, problem.system.algebra.comm
-    whole = on_root(comm, lambda: _read(file, problem))
-    about = comm.bcast(whole and whole[0])
+    file = folder / CHECKPOINT
+    comm = problem.system.algebra.comm
+    about_and_arrays = on_root(comm, lambda: _read(file, problem))
+    about = comm.bcast(None if about_and_arrays is None else about_and_arrays[0])
+    whole = None if about_and_arrays is None else about_and_arrays[1]
     other = _compare(file, problem, scheme, dt, about, changed)
-    arrays: Arrays = {"r_t": None} | _own(problem, about["vectors"], whole and whole[1])
-    # what a scheme keeps in mind was made of the old problem's matrices and loads
-    known = {} if other else arrays
-    memory = {
-        name.removeprefix(MEMORY): array for name, array in known.items() if name.startswith(MEMORY)
-    }
+    arrays: Arrays = {"r_t": None} | _own_rows(problem, about["vectors"], whole)
+
+    # What a scheme keeps in mind was made of the matrices and loads of its own problem.
+    memory = {}
+    for name, values in arrays.items():
+        if name.startswith(MEMORY) and not other:
+            memory[name.removeprefix(MEMORY)] = values
     state = State(
         about["t"],
         about["k"],
@@ -192,20 +217,28 @@ def read_checkpoint(
     return place, about["rows"]
 
 
-def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
+def _own_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
     """Return this rank's rows of arrays that rank 0 has as a whole; they are sent rank by rank.
 
     Collective.
+
+    Args:
+        problem: whose unknowns and conditions the ranks have.
+        vectors: names of arrays with a row for each unknown.
+        whole: all arrays, on rank 0 only; those of CONTACT have a row for each condition, and each
+            rank gets the others as they are.
     """
-    comm, own = problem.system.algebra.comm, dict[str, Any]()
+    comm = problem.system.algebra.comm
     parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [((), ())] * comm.size
-    every = np.sort(np.concatenate([ids for ids, _ in parts]))
+    all_ids = np.sort(np.concatenate([ids for ids, _ in parts]))
+    own: Arrays = {}
     for rank, (ids, slots) in enumerate(parts):
-        rows = dict.fromkeys(vectors, np.searchsorted(every, ids)) | dict.fromkeys(CONTACT, slots)
-        found = comm.bcast(
-            {name: values[rows.get(name, ...)] for name, values in (whole or {}).items()}
-        )
-        own = found if rank == comm.rank else own
+        rows = dict.fromkeys(vectors, np.searchsorted(all_ids, ids))
+        rows |= dict.fromkeys(CONTACT, slots)
+        message = {name: values[rows.get(name, ...)] for name, values in (whole or {}).items()}
+        message = comm.bcast(message)
+        if rank == comm.rank:
+            own = message
     return own
 
 
@@ -217,31 +250,39 @@ def _compare(
     about: Mapping[str, Any],
     changed: bool,
 ) -> list[str]:
-    """Return the names of what is another problem's.
+    """Return the names of what the checkpoint has otherwise than this run. Collective.
 
-    InputError is raised unless that was allowed, or can be.
+    Args:
+        file: the checkpoint.
+        problem: of this run.
+        scheme: of this run.
+        dt: time steps of this run [s].
+        about: the description in the checkpoint.
+        changed: whether differences are allowed.
 
-    Collective.
+    Raises:
+        InputError: there are differences that are not allowed, or that cannot be.
     """
     start, end = about["span"]
-    found = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
-    for name, how in found.items():
+    changes = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
+    for name, how in changes.items():
         if name in FIXED or not changed:
-            remedy = "or start a new one" + (
-                "" if name in FIXED else ", or allow it by name (changed=True)"
-            )
+            remedy = "or start a new one"
+            if name not in FIXED:
+                remedy = f"{remedy}, or allow it by name (changed=True)"
             raise InputError(
                 f"the checkpoint '{file}' is of a run with {how}: restart the same run, {remedy}"
             )
-    if found and problem.system.algebra.comm.rank == 0:
+    if changes and problem.system.algebra.comm.rank == 0:
         log.warning(
-            "the checkpoint '%s' is continued as another problem: %s", file, ", ".join(found)
+            "the checkpoint '%s' is continued as another problem: %s", file, ", ".join(changes)
         )
-    return list(found)
+    return list(changes)
 
 
-def _damaged(file: Path, why: Any) -> InputError:
-    reason = " ".join(str(why).split())[:SAID]  # zipfile puts half the file into its words
+def _error_of_damage(file: Path, why: Any) -> InputError:
+    """Return the error about a checkpoint that cannot be read, with a reason on one line."""
+    reason = " ".join(str(why).split())[:LONGEST]  # zipfile puts half the file into its words
     return InputError(f"the checkpoint '{file}' is damaged ({reason}): start a new run")
 
 
@@ -252,84 +293,88 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
             f"there is no checkpoint '{file}' to restart from: give the folder of a run"
         )
     try:
-        about, arrays = _unpacked(file)
+        about, arrays = _unpack(file)
     except DAMAGE as error:
         if of_machine(error):
             raise
-        raise _damaged(file, str(error) or type(error).__name__) from error
+        raise _error_of_damage(file, str(error) or type(error).__name__) from error
     check_format(file, about.get("format"))
     try:
         _check_sizes(problem, about, arrays)
-    except (InputError, KeyError, TypeError) as error:
-        raise _damaged(
-            file, f"{error} is missing" if isinstance(error, KeyError) else error
-        ) from error
+    except KeyError as error:
+        raise _error_of_damage(file, f"{error} is missing") from error
+    except (InputError, TypeError) as error:
+        raise _error_of_damage(file, error) from error
     return about, arrays
 
 
-def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
-    """ValueError and others when it is not what was written."""
-    with open_to_read(file) as opened:
-        size = os.fstat(opened.fileno()).st_size
-        with zipfile.ZipFile(opened) as archive:
-            for one in archive.infolist():
-                if one.compress_type != zipfile.ZIP_STORED or one.file_size > size:
-                    raise ValueError(f"{one.filename} is compressed, or larger than the file")
-                _check_header(archive, one)
-        opened.seek(0)
-        with np.load(opened, allow_pickle=False) as stored:
+def _unpack(file: Path) -> tuple[dict[str, Any], Arrays]:
+    """Return description and arrays of a checkpoint; ValueError and others when it is damaged."""
+    with open_to_read(file) as data:
+        # Sizes first: what is damaged must not take all memory.
+        size = os.fstat(data.fileno()).st_size
+        with zipfile.ZipFile(data) as archive:
+            for member in archive.infolist():
+                if member.compress_type != zipfile.ZIP_STORED or member.file_size > size:
+                    raise ValueError(f"{member.filename} is compressed, or larger than the file")
+                _check_header(archive, member)
+        data.seek(0)
+        with np.load(data, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    wanted = arrays.pop("checksum", None)
+    announced = arrays.pop("checksum", None)
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
         raise ValueError("the description of the run is missing")
-    if str(wanted) != checksum(arrays):
+    if str(announced) != checksum(arrays):
         raise ValueError("its checksum is wrong")
     del arrays["about"]
     return about, arrays
 
 
-def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
+def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
     """Raise ValueError for an array that announces more numbers than the archive holds of it.
 
     This is done before memory is taken.
     """
-    with archive.open(one) as file:
+    with archive.open(member) as file:
         version = npy.read_magic(file)
         read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(version)
         if read is None:
-            raise ValueError(f"{one.filename} has a header of an unknown version")
+            raise ValueError(f"{member.filename} has a header of an unknown version")
         shape, _, kind = read(file)
-    if math.prod(shape) * kind.itemsize > one.file_size:
-        raise ValueError(f"{one.filename} announces more numbers than it holds")
+    if math.prod(shape) * kind.itemsize > member.file_size:
+        raise ValueError(f"{member.filename} announces more numbers than it holds")
 
 
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
     """Raise InputError or KeyError for missing, misshapen or senseless values.
 
     Of another problem nothing need fit.
+
+    Args:
+        problem: of this run.
+        about: the description in the checkpoint, whose numbers become floats and ints.
+        arrays: of the checkpoint.
     """
-    n, m, d = (
-        problem.system.space.unknowns,
-        problem.surface.total,
-        problem.surface.tangents.shape[1],
-    )
-    about |= {name: number("it", name, about[name]) for name in ("t", "t_start")}
-    about |= {
-        name: whole("it", name, about[name], most=2**53)
-        for name in ("k", "k_start", "base", "halved")
-    }
+    for name in ("t", "t_start"):
+        about[name] = number("it", name, about[name])
+    for name in ("k", "k_start", "base", "halved"):
+        about[name] = whole("it", name, about[name], most=2**53)
     array("it", "span", about["span"], (2,))
     if not isinstance(about["rows"], str) or not {"u", "v"} <= set(about["vectors"]):
         raise InputError("the description of the run is empty")
-    theirs = about["run"]
-    if theirs.get("unknowns") != n or theirs.get("contact points") != m:
-        return  # told as another problem's
+    n = problem.system.space.unknowns
+    m = problem.surface.total
+    run = about["run"]
+    if run.get("unknowns") != n or run.get("contact points") != m:
+        return  # _compare refuses it as another problem's
     shapes = dict.fromkeys(about["vectors"], (n,)) | {"r_n": (m,), "active": (m,)}
     for name, values in arrays.items():
-        wanted = shapes.pop(name, values.shape) if name != "r_t" else (m, d)
+        shape = shapes.pop(name, values.shape)
+        if name == "r_t":
+            shape = (m, problem.surface.tangents.shape[1])
         kind = np.dtype(bool if name == "active" else float)
-        if values.dtype != kind or values.shape != wanted or not np.all(np.isfinite(values)):
-            raise InputError(f"{shown(name)} is no {wanted} array of finite {kind} numbers")
+        if values.dtype != kind or values.shape != shape or not np.all(np.isfinite(values)):
+            raise InputError(f"{shown(name)} is no {shape} array of finite {kind} numbers")
     if shapes:
         raise KeyError(next(iter(shapes)))

@@ -100,9 +100,10 @@ _held: dict[Path, int] = {}  # locks that this process has -> the thread that to
 def run_folder(comm: Comm, path: str | Path) -> Path:
     """Make the folder, with parents, and try to write into it, before any work is done.
 
-    Where that fails there is an InputError.
+    Collective.
 
-    InputError also when files of others have names that a run replaces.
+    Raises:
+        InputError: that fails, or files of others have names that a run replaces.
     """
     folder = Path(path)
     if find_spec("h5py") is None:
@@ -185,27 +186,28 @@ def _is_model(path: Path) -> bool:
     if not is_own(path):
         return False
     try:
-        found = json.loads(read_text(path))
+        content = json.loads(read_text(path))
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(found, dict) and {"title", "dimension", "unknowns"} <= set(found)
+    return isinstance(content, dict) and {"title", "dimension", "unknowns"} <= set(content)
 
 
 def _frames(fields: Path) -> list[Path]:
     """Return the files in the folder of fields that have names of ours."""
-    known = sorted(os.listdir(fields)) if fields.is_dir() else []
-    return [
-        fields / name
-        for name in known
-        if name == MESH or FRAME.fullmatch(name) or FRAMES.fullmatch(name)
-    ]
+    names_there = sorted(os.listdir(fields)) if fields.is_dir() else []
+    return [fields / name for name in names_there if _is_frame(name)]
 
 
-def check_format(file: Path, found: Any) -> None:
-    """Raise InputError for a file of a format that this version does not know."""
-    if found != FORMAT or isinstance(found, bool):
+def _is_frame(name: str) -> bool:
+    """Say whether this is the name of a mesh or of frames in the folder of fields."""
+    return bool(name == MESH or FRAME.fullmatch(name) or FRAMES.fullmatch(name))
+
+
+def check_format(file: Path, number: Any) -> None:
+    """Raise InputError for a file of a format, by its number, that this version does not know."""
+    if number != FORMAT or isinstance(number, bool):
         raise InputError(
-            f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: "
+            f"'{file}' has format {shown(number)} and this version of vi_contact reads {FORMAT}: "
             "read it with the version that wrote it"
         )
 
@@ -218,7 +220,7 @@ def check_folder_format(folder: Path) -> None:
     if not is_own(folder / ABOUT):
         return
     try:
-        found = json.loads(read_text(folder / ABOUT))["format"]
+        number = json.loads(read_text(folder / ABOUT))["format"]
     except OSError as error:
         raise InputError(sentence(error)) from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
@@ -226,15 +228,14 @@ def check_folder_format(folder: Path) -> None:
         raise InputError(
             f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it"
         ) from error
-    check_format(folder, found)
+    check_format(folder, number)
 
 
 def clear(folder: Path) -> None:
-    """Remove what an earlier run left in the folder and a new one could be mistaken for.
+    """Remove what an earlier run left in the folder, for which a new one could be mistaken.
 
-    Histories are overwritten.
-
-    The mark of runs stays. Nothing is removed from a folder without it.
+    Histories are overwritten. The mark of runs stays, and nothing is removed from a folder without
+    it.
     """
     if not is_marked(folder):
         return
@@ -251,8 +252,9 @@ def remove_run(folder: Path) -> None:
     """
     if not is_marked(folder):
         return
-    fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
-    for stage in _inside(stages):
+    fields = inner_folder(folder, FIELDS)
+    stages = inner_folder(folder, STAGES)
+    for stage in _folders_inside(stages):
         remove_run(stage)
     for frame in _frames(fields):
         remove(frame)
@@ -261,8 +263,8 @@ def remove_run(folder: Path) -> None:
         if name != ABOUT:
             remove(folder / name)
     remove(folder / ABOUT)  # last: what an interruption leaves is still known as a run's
-    for one in (fields, stages, folder):
-        remove_if_empty(one)
+    for place in (fields, stages, folder):
+        remove_if_empty(place)
 
 
 def move_run(folder: Path, target: Path) -> None:
@@ -270,23 +272,26 @@ def move_run(folder: Path, target: Path) -> None:
 
     Files of others stay.
     """
-    fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
-    for stage in filter(is_marked, _inside(stages)):
+    fields = inner_folder(folder, FIELDS)
+    stages = inner_folder(folder, STAGES)
+    for stage in filter(is_marked, _folders_inside(stages)):
         os.replace(stage, make_inner_folder(target, STAGES) / stage.name)
     for frame in _frames(fields):
         os.replace(frame, make_inner_folder(target, FIELDS) / frame.name)
-    names = [name for name in (*FILES, *_OF_CASES, *_OF_REPORTS) if name != ABOUT]
-    for name in (*names, ABOUT):  # last: what an interruption leaves is still known as a run's
+    others = [name for name in (*FILES, *_OF_CASES, *_OF_REPORTS) if name != ABOUT]
+    for name in (*others, ABOUT):  # last: what an interruption leaves is still known as a run's
         if os.path.lexists(folder / name):
             os.replace(folder / name, target / name)
-    for one in (fields, stages):
-        remove_if_empty(one)
+    for place in (fields, stages):
+        remove_if_empty(place)
 
 
-def _inside(folder: Path) -> list[Path]:
+def _folders_inside(folder: Path) -> list[Path]:
     """Return the folders inside a folder; no links."""
-    found = [folder / name for name in sorted(os.listdir(folder))] if folder.is_dir() else []
-    return [one for one in found if one.is_dir() and not one.is_symlink()]
+    if not folder.is_dir():
+        return []
+    paths = [folder / name for name in sorted(os.listdir(folder))]
+    return [path for path in paths if path.is_dir() and not path.is_symlink()]
 
 
 def remove_if_empty(folder: Path) -> None:
@@ -316,21 +321,26 @@ def _is_temporary(name: str) -> bool:
 
 
 def _is_name_of_runs(name: str) -> bool:
-    known = (*FILES, *_OF_CASES, *_OF_REPORTS, MESH)
-    return bool(
-        name in known or FRAME.fullmatch(name) or FRAMES.fullmatch(name) or _TRIAL.fullmatch(name)
-    )
+    """Say whether runs, cases and reports write files of this name, or try whether they can."""
+    if name in (*FILES, *_OF_CASES, *_OF_REPORTS):
+        return True
+    return _is_frame(name) or bool(_TRIAL.fullmatch(name))
 
 
 @contextmanager
-def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
-    """Refuse other runs that want the folder, or this part of it, while it lasts.
+def lock_folder(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
+    """Refuse other runs that want the folder, or this part of it, until the block ends.
 
     They are refused on all their ranks. Collective.
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody
     up. Within the same thread it may be taken again. On a file system that knows no locks there is
     none, which is logged.
+
+    Args:
+        comm: of the ranks that share the run.
+        folder: None for a run without one, which needs no lock.
+        name: of the file, which may stand for a part of the folder.
     """
     mine = None if folder is None else on_root(comm, lambda: _take(folder, name))
     try:
@@ -344,7 +354,10 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
 
 
 def _take(folder: Path, name: str) -> Any:
-    """Return the open, locked file; None when this thread has the lock already."""
+    """Return the open file with the lock; None when this thread has the lock already.
+
+    A file that was removed between opening and locking it holds nobody off: it is tried again.
+    """
     if _held.get(folder.resolve() / name) == threading.get_ident():
         return None
     while True:
@@ -375,7 +388,7 @@ def _take(folder: Path, name: str) -> Any:
 
 
 def _owner(file: Any) -> str:
-    """Who holds it, as it wrote into the file; closes the file."""
+    """Return who holds the lock, as it wrote into the file, and close the file."""
     with file:
         file.seek(0)
         return " ".join(file.read(200).decode(errors="replace").split()) or "it has only begun"

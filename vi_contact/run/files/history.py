@@ -40,8 +40,8 @@ from .table import Block, Table
 
 # of contact points, units
 GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}
-# seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
-PUSH, SAVE = (1.0, 10.0)
+PUSH = 1.0  # seconds after which rows are pushed onto the medium again
+SAVE = 10.0  # seconds after which history.h5 is rewritten again
 # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 GROWTH = 1.25
 
@@ -50,9 +50,6 @@ class HistoryFiles:
     """Keep the files of a table (rank 0 only) and the GEOMETRY of contact points.
 
     Every method may raise OSError.
-
-    ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are
-    dropped) or another.
     """
 
     def __init__(
@@ -62,15 +59,29 @@ class HistoryFiles:
         geometry: Mapping[str, Array],
         stored: StoredRows | None = None,
     ) -> None:
-        self._folder, self._table, self._geometry = folder, table, geometry
-        self._rows = self._saved = self._tail = self._last = 0
-        self._hash = hashlib.sha256()
+        """Make the files, or go on with those of an earlier run.
+
+        Args:
+            folder: of the run, with its lock.
+            table: the rows.
+            geometry: name -> values of all contact points, as GEOMETRY names them.
+            stored: the rows of an earlier run that this one continues, in this folder (later ones
+                are dropped) or another.
+        """
+        self._folder = folder
+        self._table = table
+        self._geometry = geometry
+        self._rows = 0  # in history.csv
+        self._last = 0  # step of the last of them
+        self._saved = 0  # rows in history.h5
+        self._tail = 0  # byte of history.csv where the rows begin that history.h5 has not
+        self._hash = hashlib.sha256()  # of all rows
         self._journal: Any = None
-        self._pushed = self._made = time.monotonic()
-        columns = {
-            name: {"unit": unit, "meaning": meaning}
-            for name, (unit, meaning) in table.columns.items()
-        }
+        self._time_of_push = time.monotonic()
+        self._time_of_save = time.monotonic()
+        columns = {}
+        for name, (unit, meaning) in table.columns.items():
+            columns[name] = {"unit": unit, "meaning": meaning}
         write_atomically(folder / COLUMNS, (to_json(columns) + "\n").encode())
         if stored is None:
             self._csv = open_new(folder / HISTORY_CSV)
@@ -82,9 +93,12 @@ class HistoryFiles:
             self._continue(stored)
 
     def _continue(self, stored: StoredRows) -> None:
+        """Take over the rows of an earlier run, up to the step of its checkpoint."""
         self._rows = self._table.count
         self._replace(stored.blocks())
-        self._hash, self._last, csv = stored.hash.copy(), stored.k, self._folder / HISTORY_CSV
+        self._hash = stored.hash.copy()
+        self._last = stored.k
+        csv = self._folder / HISTORY_CSV
         if stored.folder.resolve() != self._folder.resolve():
             copy_start(stored.folder / HISTORY_CSV, csv, stored.length)
         self._csv = open_to_append(csv)
@@ -94,6 +108,7 @@ class HistoryFiles:
         self._open_journal()
 
     def _open_journal(self) -> None:
+        """Begin a journal for the arrays of later rows, if the run records any."""
         if self._journal is not None:
             self._journal.close()
         if self._table.arrays:
@@ -101,14 +116,16 @@ class HistoryFiles:
 
     def append(self, *rows: Row) -> None:
         """Write rows onto the disk; those that it has no room for are taken back, all of them."""
-        lines, names = lines_of(self._table, rows), ("k", *self._table.arrays)
-        records = records_of(
-            self._table, {name: np.array([row[name] for row in rows]) for name in names}
-        )
+        lines = lines_of(self._table, rows)
+        block = {}
+        for name in ("k", *self._table.arrays):
+            block[name] = np.array([row[name] for row in rows])
+        records = records_of(self._table, block)
         _append((self._journal, b"".join(records)), (self._csv, b"".join(lines)))
         for line, record in zip(lines, records, strict=True):
             self._hash.update(line + record)
-        self._rows, self._last = self._rows + len(rows), int(rows[-1]["k"])
+        self._rows += len(rows)
+        self._last = int(rows[-1]["k"])
 
     def checksum(self, k: int) -> str:
         """Return the checksum of the rows up to step k.
@@ -129,14 +146,14 @@ class HistoryFiles:
         on them even when the power fails.
         """
         now = time.monotonic()
-        if now - self._pushed < PUSH:
+        if now - self._time_of_push < PUSH:
             return False
         for file in filter(None, (self._csv, self._journal)):
             os.fsync(file.fileno())
-        if now - self._made >= SAVE and self._rows >= GROWTH * self._saved:
+        if now - self._time_of_save >= SAVE and self._rows >= GROWTH * self._saved:
             self.save()
-            self._made = time.monotonic()
-        self._pushed = time.monotonic()
+            self._time_of_save = time.monotonic()
+        self._time_of_push = time.monotonic()
         return True
 
     def save(self) -> None:
@@ -144,12 +161,13 @@ class HistoryFiles:
 
         The journal starts anew.
         """
-        if self._rows == self._table.count and (known := self._table.remembered()) is not None:
-            self._replace(
-                iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved
-            )
+        rows = self._table.rows_in_memory() if self._rows == self._table.count else None
+        if rows is not None:
+            since_then = {name: values[self._saved :] for name, values in rows.items()}
+            self._replace(iter([since_then]), self._saved)
         else:
-            path, stored = self._folder / HISTORY_CSV, StoredArrays(self._folder, self._table)
+            path = self._folder / HISTORY_CSV
+            stored = StoredArrays(self._folder, self._table)
             with open_to_read(path) as csv, closing(stored) as arrays:
                 csv.seek(self._tail)
                 since = read_blocks(csv, self._table, arrays, first=self._saved)
@@ -157,29 +175,39 @@ class HistoryFiles:
         self._tail = self._csv.tell()
         self._open_journal()
 
-    def _replace(self, blocks: Iterator[Block], kept: int = 0) -> None:
-        """history.h5 with so many rows of the old one, and these."""
-        hdf5_atomically(self._folder / HISTORY_H5, lambda file: self._fill(file, blocks, kept))
+    def _replace(self, blocks: Iterator[Block], old_rows: int = 0) -> None:
+        """Write history.h5 with so many rows of the old one, and these."""
+        hdf5_atomically(self._folder / HISTORY_H5, lambda file: self._fill(file, blocks, old_rows))
         self._saved = self._rows
 
-    def _fill(self, file: Any, blocks: Iterator[Block], kept: int) -> None:
+    def _fill(self, file: Any, blocks: Iterator[Block], old_rows: int) -> None:
+        """Fill a new history.h5.
+
+        Args:
+            file: the open file, empty.
+            blocks: the rows after those of the old one.
+            old_rows: how many rows the old one gives.
+        """
         file.attrs["format"] = FORMAT
-        found = {}
+        datasets = {}
         for name, (unit, meaning) in self._table.columns.items():
             sample = self._table.arrays.get(name, np.zeros(()))
             dataset = file.create_dataset(name, (self._rows, *sample.shape), sample.dtype)
             dataset.attrs.update(unit=unit, meaning=meaning)
-            found[name] = dataset, sample.nbytes
-        if kept:
+            datasets[name] = (dataset, sample.nbytes)
+        if old_rows:  # a stride at a time: they may be larger than the memory
             with open_hdf5(self._folder / HISTORY_H5) as old:
-                for name, (dataset, size) in found.items():
-                    step = max(1, STRIDE // max(size, 1))
-                    for i in range(0, kept, step):
-                        dataset[i : min(i + step, kept)] = old[name][i : min(i + step, kept)]
+                for name, (dataset, size) in datasets.items():
+                    stride = max(1, STRIDE // max(size, 1))
+                    for first in range(0, old_rows, stride):
+                        rows = slice(first, min(first + stride, old_rows))
+                        dataset[rows] = old[name][rows]
+        first = old_rows
         for block in blocks:
-            for name, (dataset, _) in found.items():
-                dataset[kept : kept + len(block["k"])] = block[name]
-            kept += len(block["k"])
+            rows = slice(first, first + len(block["k"]))
+            for name, (dataset, _) in datasets.items():
+                dataset[rows] = block[name]
+            first = rows.stop
         for name, unit in GEOMETRY.items():
             file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
 
@@ -210,8 +238,8 @@ def _append(*pairs: tuple[Any, bytes]) -> None:
                 begun.append((file, file.tell()))
                 write_all(file, data)
     except OSError as error:
-        for one, start in begun:
+        for other, start in begun:
             with suppress(OSError):
-                one.truncate(start)
-                one.seek(start)
+                other.truncate(start)
+                other.seek(start)
         raise OSError(error.errno, error.strerror, str(file.name)) from error

@@ -49,18 +49,28 @@ def identity(
 ) -> Identity:
     """Return name -> number, text or numbers with sizes, of all ranks. Collective.
 
-    Histories are those from ``start`` to ``end`` [s].
+    Args:
+        problem: what is marched.
+        scheme: by which.
+        dt: its time steps [s].
+        start: the time [s] from which histories count.
+        end: the time [s] up to which they count.
     """
     system, surface = problem.system, problem.surface
-    probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
-    pairs = [(w, w) for w in probes] + (
-        [] if system.algebra.symmetric else [(probes[0], probes[1])]
-    )
+
+    # Vectors w made of the numbers of the unknowns, through which matrices and loads are seen.
+    probes = [probe(np.asarray(system.space.ids), number) for number in range(PROBES)]
+    pairs = [(w, w) for w in probes]
+    if not system.algebra.symmetric:  # wᵀCw does not see the skew part of C
+        pairs.append((probes[0], probes[1]))
+
+    # Times: of loads that may have to be marched to in the first steps only, of histories all over
+    # the run, one in each SAMPLES-th of it, at unequal distances.
     first = min(end - start, STEPS * min(pieces_of(dt))[0])
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
-    times = (
-        start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
-    )
+    places = np.arange(SAMPLES)
+    times = start + (end - start) * (places + probe(places, 0) + 0.5) / SAMPLES
+    friction = with_values(problem.friction, surface, partial(_of_all_points, surface))
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
@@ -68,9 +78,7 @@ def identity(
         "scheme": text_of(scheme),
         "mass": text_of(problem.mass),
         "impact law": text_of(problem.impact),
-        "friction law": text_of(
-            with_values(problem.friction, surface, partial(_of_all_points, surface))
-        ),
+        "friction law": text_of(friction),
         "stiffness": [_dot(system, w, system.K @ x) for w, x in pairs],
         "mass matrix": [_dot(system, w, system.M @ x) for w, x in pairs],
         "damping": [] if system.C is None else [_dot(system, w, system.C @ x) for w, x in pairs],
@@ -92,37 +100,36 @@ def text_of(value: Any) -> str:
 
 def differences(ours: Identity, theirs: Mapping[str, Any]) -> dict[str, str]:
     """Return name -> how, of the facts of theirs that are others in ours."""
-    found: dict[str, str] = {}
-    for name, own in ours.items():
-        other = theirs.get(name)
-        if isinstance(own, list):
-            found |= {} if _same_numbers(own, other) else {name: f"another {name}"}
-        elif not _same_text(str(own), str(other)):
-            found[name] = f"{name} = {str(other)[:SHOWN]} but this one has {str(own)[:SHOWN]}"
-    return found
+    changes: dict[str, str] = {}
+    for name, our in ours.items():
+        their = theirs.get(name)
+        if isinstance(our, list):
+            if not _same_numbers(our, their):
+                changes[name] = f"another {name}"
+        elif not _same_text(str(our), str(their)):
+            changes[name] = f"{name} = {str(their)[:SHOWN]} but this one has {str(our)[:SHOWN]}"
+    return changes
 
 
-def _same_numbers(own: Numbers, other: Any) -> bool:
+def _same_numbers(ours: Numbers, theirs: Any) -> bool:
+    """Say whether values differ by at most SAME of their sizes."""
     try:
-        one, two = (
-            np.array(own, dtype=float).reshape(-1, 2),
-            np.array(other, dtype=float).reshape(-1, 2),
-        )
+        our = np.array(ours, dtype=float).reshape(-1, 2)
+        their = np.array(theirs, dtype=float).reshape(-1, 2)
     except (TypeError, ValueError):
         return False
-    if one.shape != two.shape:
+    if our.shape != their.shape:
         return False
-    return bool(
-        np.all(np.abs(one - two) <= SAME * np.maximum(np.abs(one[:, 1:]), np.abs(two[:, 1:])))
-    )
+    size = np.maximum(np.abs(our[:, 1:]), np.abs(their[:, 1:]))
+    return bool(np.all(np.abs(our - their) <= SAME * size))
 
 
-def _same_text(own: str, other: str) -> bool:
+def _same_text(ours: str, theirs: str) -> bool:
     """Say whether words are the same, and numbers between them to SAME."""
-    one, two = _NUMBER.split(own), _NUMBER.split(other)
-    if len(one) != len(two) or one[::2] != two[::2]:
+    our, their = _NUMBER.split(ours), _NUMBER.split(theirs)  # words and numbers in turn
+    if len(our) != len(their) or our[::2] != their[::2]:
         return False
-    numbers = zip(one[1::2], two[1::2], strict=True)
+    numbers = zip(our[1::2], their[1::2], strict=True)
     try:
         return all(a == b or isclose(float(a), float(b), rel_tol=SAME) for a, b in numbers)
     except ValueError:
@@ -130,7 +137,7 @@ def _same_text(own: str, other: str) -> bool:
 
 
 def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
-    """w·x and the size of it."""
+    """Return w·x of vectors (n,) and |w| |x|, the size of it. Collective."""
     dot = system.algebra.dot
     return dot(w, x), float(np.sqrt(dot(w, w) * dot(x, x)))
 
@@ -138,39 +145,46 @@ def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
 def _loads(
     system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array
 ) -> Numbers:
-    """Return the load in the first steps and the histories of its separable parts.
+    """Return the load in the first steps, and the histories of its separable parts. Collective.
 
-    The histories are those through the run.
+    Args:
+        system: whose load it is.
+        probes: vectors w (n,).
+        early: times [s] in the first steps.
+        times: [s] all over the run (SAMPLES,).
     """
     forces = [system.load(t) for t in early]
     size = max(float(np.sqrt(system.algebra.dot(f, f))) for f in forces)
     length = float(np.sqrt(system.algebra.dot(probes[0], probes[0])))
-    found = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
+    numbers = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
     for vector, history in system.load.separable:
         values = np.array([float(history_value(history, t)) for t in times])
-        found += [_dot(system, probes[0], vector), *_sampled(values)]
-    return found
+        numbers += [_dot(system, probes[0], vector), *_sums_of_row(values)]
+    return numbers
 
 
-def _sampled(values: Array) -> Numbers:
+def _sums_of_row(values: Array) -> Numbers:
     """Return sums of a row of numbers, with weights that see each of them."""
     *sums, size = _sums(values, np.arange(len(values)))
     return [(value, size) for value in sums]
 
 
 def _sums(values: Array, places: Indices) -> list[float]:
-    """Three sums of numbers with weights of their places, and that of their sizes."""
+    """Return three sums of numbers with weights of their places, and that of their sizes."""
     values = np.ascontiguousarray(values, dtype=float)
-    weights = np.ones(len(values)), probe(places, 1), probe(places, 2)
+    weights = (np.ones(len(values)), probe(places, 1), probe(places, 2))
     return [*(float(w @ values) for w in weights), float(np.abs(values).sum())]
 
 
 def _excitation(problem: ContactProblem, times: Array) -> Numbers:
+    """Return the ground's accelerations at the times, and all numbers of the excitations."""
     if not problem.excitations:
         return []
     ground = np.array([problem.ground_acceleration(float(t)) for t in times])
-    columns = [*ground.T, *(np.array(list(_numbers_in(one))) for one in problem.excitations)]
-    return [pair for column in columns for pair in _sampled(column)]
+    columns = list(ground.T)
+    for excitation in problem.excitations:
+        columns.append(np.array(list(_numbers_in(excitation))))
+    return [pair for column in columns for pair in _sums_of_row(column)]
 
 
 def _numbers_in(value: Any) -> Iterator[float]:
@@ -179,17 +193,18 @@ def _numbers_in(value: Any) -> Iterator[float]:
     These are every sample of a record, also those between the times that are looked at.
     """
     if is_dataclass(value):
-        for one in fields(value):
-            yield from _numbers_in(getattr(value, one.name))
+        for field in fields(value):
+            yield from _numbers_in(getattr(value, field.name))
     elif isinstance(value, np.ndarray | tuple | list):
-        found = np.asarray(value)
-        yield from found[np.isfinite(found)].tolist() if found.dtype.kind in "if" else ()
+        array = np.asarray(value)
+        if array.dtype.kind in "if":
+            yield from array[np.isfinite(array)].tolist()
     elif isinstance(value, int | float) and np.isfinite(value):
         yield float(value)
 
 
 def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
-    """Where the contact points are, and what they may touch, at rest and as it moves."""
+    """Return where contact points are, and what they may touch, at rest and as it moves."""
     arrays = [
         *surface.points.T,
         *surface.normals.T,
@@ -198,18 +213,21 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
         surface.compliance,
         surface.bilateral.astype(float),
     ]
-    arrays += [] if surface.motion is None else [surface.gap(t) for t in early]
-    arrays += (
-        [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
-    )
-    found, d = _columns(surface, arrays), surface.points.shape[1]
-    # of points, which gaps are differences of
-    round_off = ROUND_OFF * max(size for _, size in found[: 3 * d])
+    if surface.motion is not None:
+        arrays += [surface.gap(t) for t in early]
+    if surface.slide is not None:
+        arrays += [column for t in early for column in surface.slide(t).T]
+    numbers = _columns(surface, arrays)
+
+    # Gaps are differences of points, whose round-off they have: their size is at least that. They
+    # are the gap at rest, and all that moves; each array gives three numbers.
+    d = surface.points.shape[1]
+    round_off = ROUND_OFF * max(size for _, size in numbers[: 3 * d])
     gaps = {2 * d + 1, *range(2 * d + 4, len(arrays))}
-    return [
-        (value, max(size, round_off) if i // 3 in gaps else size)
-        for i, (value, size) in enumerate(found)
-    ]
+    sized = []
+    for i, (value, size) in enumerate(numbers):
+        sized.append((value, max(size, round_off) if i // 3 in gaps else size))
+    return sized
 
 
 def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:

@@ -20,7 +20,8 @@ from ...core.version import __version__
 
 LOGGER = logging.getLogger("vi_contact")
 log = logging.getLogger(__name__)
-SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or this often
+SHARE = 0.1  # of the run: a line in the log for each such part of it,
+SECONDS = 30.0  # or this often
 
 
 class _LogFile(logging.Handler):
@@ -66,13 +67,13 @@ class RunLog:
     def __init__(self, path: Path, *, append: bool) -> None:
         if not RunLog._open:
             RunLog._before = LOGGER.level, LOGGER.propagate
-        own = RunLog.turn
+        turn = RunLog.turn
         self._file = _LogFile(path, append=append)
         self._terminal = logging.StreamHandler()
         self._terminal.setLevel(logging.WARNING)
         self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
         for handler in (self._file, self._terminal):
-            handler.addFilter(lambda record: RunLog.turn is own)
+            handler.addFilter(lambda record: RunLog.turn is turn)
             LOGGER.addHandler(handler)
         RunLog._open += 1
         LOGGER.setLevel(logging.INFO)
@@ -123,15 +124,16 @@ def versions(*needed: str) -> dict[str, str]:
 
 
 class Progress:
-    """Show the progress.
+    """Show progress by tqdm on a terminal, and by lines in the log.
 
-    It is shown by tqdm on a terminal, and by a line in the log every tenth of the run or every 30
-    s.
+    There is a line for every tenth of the run, or every 30 s.
     """
 
     def __init__(self, total: int, *, shown: bool) -> None:
-        self._total, self._done = total, 0
-        self._begin = self._told = time.monotonic()
+        self._total = total
+        self._done = 0
+        self._begin = time.monotonic()
+        self._time_of_line = self._begin
         self._next = SHARE * total
         self._bar: Any = None
         if shown and sys.stderr is not None and sys.stderr.isatty():
@@ -145,7 +147,14 @@ class Progress:
             self._bar.close()
 
     def step(self, k: int, t: float, *, iterations: int, worst: float) -> None:
-        """Count one more step as done."""
+        """Count one more step as done.
+
+        Args:
+            k: its number.
+            t: the time at its end [s].
+            iterations: of the solver.
+            worst: the worst certificate of the run so far.
+        """
         self._done += 1
         if self._bar is not None:
             self._bar.set_postfix_str(
@@ -153,8 +162,9 @@ class Progress:
             )
             self._bar.update()
         now = time.monotonic()
-        if self._done >= self._next or now - self._told >= SECONDS:
-            self._told, self._next = now, self._done + SHARE * self._total
+        if self._done >= self._next or now - self._time_of_line >= SECONDS:
+            self._time_of_line = now
+            self._next = self._done + SHARE * self._total
             left = (now - self._begin) / self._done * (self._total - self._done)
             log.info(
                 "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s "

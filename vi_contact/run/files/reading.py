@@ -81,25 +81,26 @@ class RunFolder:
 def read_run(folder: str | Path) -> RunFolder:
     """Read a run folder of ``simulate``.
 
-    For a run that is still going on or was killed, return what is there.
+    For a run that is still going on or was killed, return what is there. Numbers come from
+    history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it
+    does once the run has ended).
 
-    Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has
-    all steps too (it does once the run has ended). InputError when there is no history, or a file
-    is damaged.
+    Raises:
+        InputError: there is no history, or a file is damaged.
     """
     folder = Path(folder)
     if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
     check_folder_format(folder)
     history = _numbers(folder / HISTORY_CSV)
-    columns = _of(folder / COLUMNS, lambda path: _columns(read_object(path), history))
-    facts = _of(folder / SUMMARY, lambda path: _facts(read_object(path)) if is_own(path) else {})
+    columns = _read_file(folder / COLUMNS, lambda path: _columns(read_object(path), history))
+    facts = _read_file(folder / SUMMARY, _summary)
     _check_rows(folder, history, facts)
-    arrays, contact = _of(folder / HISTORY_H5, lambda path: _arrays(path, history))
+    arrays, contact = _read_file(folder / HISTORY_H5, lambda path: _arrays(path, history))
     return RunFolder(folder, history | arrays, columns, facts, contact)
 
 
-def _of(path: Path, read: Callable[[Path], T]) -> T:
+def _read_file(path: Path, read: Callable[[Path], T]) -> T:
     """Return what is read from a file of a run.
 
     Raises:
@@ -134,24 +135,29 @@ def read_object(path: Path) -> dict[str, Any]:
     if len(data) > BYTES:
         raise ValueError(f"{path.name} is larger than {BYTES:.0e} bytes")
     try:
-        found = json.loads(data.decode("utf-8"), parse_constant=lambda word: [])
+        content = json.loads(data.decode("utf-8"), parse_constant=lambda word: [])
     except RecursionError:
         raise ValueError(f"{path.name} is nested too deep") from None
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise ValueError(f"{path.name} does not hold an object")
-    json.dumps(found, ensure_ascii=False).encode()  # lone surrogates
-    return found
+    json.dumps(content, ensure_ascii=False).encode()  # lone surrogates
+    return content
 
 
-def _columns(described: dict[str, Any], history: Mapping[str, Array]) -> dict[str, tuple[str, str]]:
-    """Column -> (unit, meaning)."""
-    columns = {name: (one["unit"], one["meaning"]) for name, one in described.items()}
+def _columns(content: dict[str, Any], history: Mapping[str, Array]) -> dict[str, tuple[str, str]]:
+    """Return column -> (unit, meaning) of the content of columns.json, which knows all columns."""
+    columns = {name: (about["unit"], about["meaning"]) for name, about in content.items()}
     if not all(isinstance(text, str) for pair in columns.values() for text in pair):
         raise ValueError(f"{COLUMNS}: units and meanings are texts")
     for name in history:
         if name not in columns:
             raise ValueError(f"{COLUMNS} does not know the column {shown(name)}")
     return columns
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    """Return the content of summary.json; nothing when there is none yet."""
+    return _facts(read_object(path)) if is_own(path) else {}
 
 
 def _facts(facts: dict[str, Any]) -> dict[str, Any]:
@@ -167,14 +173,14 @@ def _facts(facts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
-    """Whether a value is of one of these kinds, a number no larger than those of the machine."""
+    """Say whether a value is of these kinds, a number no larger than those of the machine."""
     if not isinstance(value, kinds) or isinstance(value, bool):
         return False
     return not isinstance(value, int | float) or abs(value) < 1e300
 
 
 def _numbers(path: Path) -> dict[str, Array]:
-    """Columns of history.csv; a last line that a crash cut short is left out."""
+    """Return the columns of history.csv; a last line that a crash cut short is left out."""
     try:
         header, *lines = [
             line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")
@@ -202,8 +208,14 @@ def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, 
     """Raise InputError when history.csv has lost rows.
 
     Numbers of steps follow each other, up to the one of the summary.
+
+    Args:
+        folder: of the run.
+        history: its numbers.
+        facts: its summary; empty while it goes on.
     """
-    rows, steps = len(history["t"]), facts.get("steps")
+    rows = len(history["t"])
+    steps = facts.get("steps")
     gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
     if len(gaps):
         raise InputError(
@@ -221,14 +233,19 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
     """Raise InputError when history.csv and history.h5 differ in a row that both have.
 
     They hold the same numbers.
+
+    Args:
+        path: of history.h5.
+        file: the same, open.
+        history: the numbers of history.csv.
     """
-    for name, own in history.items():
+    for name, numbers in history.items():
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
-        other = file[name][: len(own)]
-        differ = np.flatnonzero(
-            ~((other == own[: len(other)]) | (np.isnan(other) & np.isnan(own[: len(other)])))
-        )
+        other = file[name][: len(numbers)]
+        own = numbers[: len(other)]
+        same = (other == own) | (np.isnan(other) & np.isnan(own))
+        differ = np.flatnonzero(~same)
         if len(differ):
             csv = path.with_name(HISTORY_CSV)
             raise InputError(
@@ -241,7 +258,7 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
 def _arrays(
     path: Path, history: Mapping[str, Array]
 ) -> tuple[dict[str, Array], ContactGeometry | None]:
-    """(array columns when they have all rows, geometry of the contact points)."""
+    """Return (array columns when they have all rows, geometry of the contact points)."""
     rows = len(history["t"])
     if not is_own(path):
         return {}, None
@@ -249,24 +266,27 @@ def _arrays(
         _compare(path, file, history)
         group = file["contact"]
         geometry = ContactGeometry(
-            *(group[name][()] for name in ContactGeometry.__dataclass_fields__)
+            points=group["points"][()],
+            normals=group["normals"][()],
+            weights=group["weights"][()],
+            gap0=group["gap0"][()],
+            bilateral=group["bilateral"][()],
         )
+
+        # What is damaged may have any shapes: one number, or one vector, for each point.
         count = len(geometry.weights)
-        shapes = {np.shape(getattr(geometry, name)) for name in ("weights", "gap0", "bilateral")}
-        points = np.shape(geometry.points)
-        if (
-            shapes != {(count,)}
-            or len(points) != 2
-            or points[0] != count
-            or np.shape(geometry.normals) != points
-        ):
+        numbers = (geometry.weights, geometry.gap0, geometry.bilateral)
+        vectors = np.shape(geometry.points)
+        fit = all(np.shape(values) == (count,) for values in numbers)
+        fit = fit and len(vectors) == 2 and vectors[0] == count
+        if not fit or np.shape(geometry.normals) != vectors:
             raise ValueError(f"{HISTORY_H5}: the contact points do not fit each other")
-        whole = [
-            name
-            for name in file
-            if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows
-        ]
-        arrays = {name: file[name][()] for name in whole}
+
+        # Arrays have a row for each step and point; numbers come from history.csv.
+        arrays = {}
+        for name in file:
+            if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows:
+                arrays[name] = file[name][()]
         if any(values.shape[1] != count for values in arrays.values()):
             raise ValueError(f"{HISTORY_H5}: arrays are not those of {count} contact points")
     return arrays, geometry if count else None

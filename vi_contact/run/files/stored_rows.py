@@ -30,11 +30,13 @@ def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
 
     Whole numbers stay whole, all others are floats that read back to the last bit.
     """
-    values = [
-        [v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)]
-        for row in rows
-    ]
-    return [line + b"\n" for line in repr(values).replace(" ", "").encode()[2:-2].split(b"],[")]
+    values = []
+    for row in rows:
+        numbers = [row[name] for name in table.numbers]
+        values.append([x if type(x) is int else float(x) for x in numbers])
+    # One repr of all rows, [[…],[…]] without blanks, is much faster than one of each number.
+    text = repr(values).replace(" ", "").encode()
+    return [line + b"\n" for line in text[2:-2].split(b"],[")]
 
 
 def records_of(table: Table, block: Block) -> list[bytes]:
@@ -50,25 +52,40 @@ def records_of(table: Table, block: Block) -> list[bytes]:
 
 
 class StoredRows:
-    """Read rows up to step k in a folder.
+    """Read the rows of an earlier run up to a step.
 
-    ``checksum``: what they must have, as of the checkpoint; "" for one without.
-
-    After ``blocks`` has come to its end: ``length`` in bytes of their part of history.csv, ``hash``
-    of what was read.
+    Attributes, the last two after ``blocks`` has come to its end:
+        folder: where they are.
+        k: the step.
+        length: bytes of their part of history.csv.
+        hash: of what was read.
     """
 
     def __init__(self, folder: Path, table: Table, k: int, checksum: str = "") -> None:
-        self.folder, self.k, self._table, self._checksum = folder, k, table, checksum
-        self.length, self.hash = 0, hashlib.sha256()
+        """Say which rows are read.
+
+        Args:
+            folder: where they are.
+            table: whose columns they must have.
+            k: the step up to which they are read.
+            checksum: what they must have, as of the checkpoint; "" for one without.
+        """
+        self.folder = folder
+        self.k = k
+        self.length = 0
+        self.hash = hashlib.sha256()
+        self._table = table
+        self._checksum = checksum
 
     def blocks(self) -> Iterator[Block]:
-        """Return the rows, in order.
+        """Yield the rows, in order.
 
-        InputError, one sentence, for what is missing, damaged or of other columns.
+        Raises:
+            InputError: something is missing, damaged or of other columns.
         """
         check_folder_format(self.folder)
-        path, names = self.folder / HISTORY_CSV, self._table.numbers
+        path = self.folder / HISTORY_CSV
+        names = self._table.numbers
         if not is_own(path):
             raise InputError(
                 f"'{path}' is missing, so the histories cannot be continued: start a new run"
@@ -97,9 +114,17 @@ class StoredRows:
 def read_blocks(
     csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
 ) -> Iterator[tuple[list[bytes], Block]]:
-    """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end.
+    """Yield (lines, rows) from where history.csv is open; a line that is cut short is left out.
 
-    No line is cut short.
+    Args:
+        csv: the open history.csv.
+        table: of its columns.
+        arrays: from which the arrays of its rows are read.
+        first: the row at which it is.
+        k: the step to which is read; to the end of the file when None.
+
+    Raises:
+        InputError: steps are missing, or something is damaged.
     """
     done = first
     while True:
@@ -113,8 +138,8 @@ def read_blocks(
             )
         n = len(steps) if k is None else int(np.searchsorted(steps, k, side="right"))
         if n:
-            found = dict(zip(table.numbers, numbers[:n].T, strict=True))
-            yield lines[:n], found | arrays.rows(done, steps[:n])
+            block = dict(zip(table.numbers, numbers[:n].T, strict=True))
+            yield lines[:n], block | arrays.rows(done, steps[:n])
         done += n
         if k is not None and n and steps[n - 1] == k:
             return
@@ -129,6 +154,12 @@ def read_blocks(
 
 def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
     """Return the numbers of lines (rows, width).
+
+    Args:
+        path: of the file, for the sentence.
+        lines: of it.
+        width: how many numbers each must have.
+        before: how many rows are before them in the file.
 
     Raises:
         InputError: names the first line that holds something else.
@@ -149,12 +180,13 @@ class StoredArrays:
     """Read the arrays of a table in history.h5 (the first rows) and in the journal (later ones)."""
 
     def __init__(self, folder: Path, table: Table) -> None:
-        self._path, self._samples = folder / HISTORY_H5, table.arrays
+        self._path = folder / HISTORY_H5
+        self._samples = table.arrays
         self._file: Any = None
         self._journal: Array
         if table.arrays:
-            path, width = folder / JOURNAL, 1 + sum(one.size for one in table.arrays.values())
-            self._journal = _journal_rows(path, width)
+            width = 1 + sum(sample.size for sample in table.arrays.values())  # k, then the arrays
+            self._journal = _journal_rows(folder / JOURNAL, width)
             try:
                 self._file = open_hdf5(self._path)
             except OSError as error:  # missing or damaged: the journal may still have all
@@ -174,22 +206,21 @@ class StoredArrays:
         """
         if not self._samples:
             return {}
-        n = self._in_hdf5(first, steps)
-        found = [self._from_hdf5(first, n)] if n else []
+        n = self._count_in_hdf5(first, steps)
+        parts = [self._from_hdf5(first, n)] if n else []
         if n < len(steps):
-            found.append(self._from_journal(steps[n:]))
-        return {name: np.concatenate([part[name] for part in found]) for name in self._samples}
+            parts.append(self._from_journal(steps[n:]))
+        return {name: np.concatenate([part[name] for part in parts]) for name in self._samples}
 
-    def _in_hdf5(self, first: int, steps: Array) -> int:
-        """How many of them history.h5 has, all of the right shape."""
+    def _count_in_hdf5(self, first: int, steps: Array) -> int:
+        """Return how many of the rows history.h5 has, all of the right shape."""
         try:
-            held = self._file["k"]
-            fit = all(
-                self._file[name].shape == (*held.shape, *one.shape)
-                for name, one in self._samples.items()
-            )
-            n = min(max(held.shape[0] - first, 0), len(steps))
-            return n if fit and np.array_equal(held[first : first + n], steps[:n]) else 0
+            stored = self._file["k"]
+            for name, sample in self._samples.items():
+                if self._file[name].shape != (*stored.shape, *sample.shape):
+                    return 0
+            n = min(max(stored.shape[0] - first, 0), len(steps))
+            return n if np.array_equal(stored[first : first + n], steps[:n]) else 0
         except InputError:
             raise
         except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError) as error:
@@ -199,11 +230,13 @@ class StoredArrays:
             return 0
 
     def _from_hdf5(self, first: int, n: int) -> Block:
+        """Return the arrays of n rows from the first on."""
         try:
-            return {
-                name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
-                for name, one in self._samples.items()
-            }
+            block = {}
+            for name, sample in self._samples.items():
+                values = np.asarray(self._file[name][first : first + n])
+                block[name] = values.astype(sample.dtype)
+            return block
         except (TypeError, ValueError, OSError, RuntimeError) as error:
             # h5py's, of a file that is damaged
             if of_machine(error):
@@ -213,21 +246,26 @@ class StoredArrays:
             ) from error
 
     def _from_journal(self, steps: Array) -> Block:
-        held = self._journal
-        start = int(steps[0] - held[0, 0]) if len(held) and np.isfinite(held[0, 0]) else -1
-        part = held[start : start + len(steps)] if start >= 0 else held[:0]
+        """Return the arrays of these steps; InputError when they are not there."""
+        journal = self._journal
+        start = -1
+        if len(journal) and np.isfinite(journal[0, 0]):
+            start = int(steps[0] - journal[0, 0])
+        part = journal[start : start + len(steps)] if start >= 0 else journal[:0]
         if not np.array_equal(part[:, 0], steps):
             missing = int(steps[len(part)] if len(part) < len(steps) else steps[0])
             raise InputError(
                 f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: "
                 "restore it or start a new run"
             )
-        ends = np.cumsum([one.size for one in self._samples.values()])[:-1]
+
+        # The arrays stand side by side in a row of the journal, after k.
+        ends = np.cumsum([sample.size for sample in self._samples.values()])[:-1]
         columns = np.split(np.array(part[:, 1:]), ends, axis=1)
-        return {
-            name: column.reshape(len(part), *one.shape).astype(one.dtype)
-            for (name, one), column in zip(self._samples.items(), columns, strict=True)
-        }
+        block = {}
+        for (name, sample), column in zip(self._samples.items(), columns, strict=True):
+            block[name] = column.reshape(len(part), *sample.shape).astype(sample.dtype)
+        return block
 
 
 def _journal_rows(path: Path, width: int) -> Array:
@@ -236,19 +274,17 @@ def _journal_rows(path: Path, width: int) -> Array:
         return np.zeros((0, width))
     with open_to_read(path) as file:
         rows = os.fstat(file.fileno()).st_size // (8 * width)
-        return (
-            np.memmap(file, dtype=float, mode="r", shape=(rows, width))
-            if rows
-            else np.zeros((0, width))
-        )
+        if not rows:
+            return np.zeros((0, width))
+        return np.memmap(file, dtype=float, mode="r", shape=(rows, width))
 
 
 def times_of(folder: Path, steps: Container[int]) -> dict[int, float]:
-    """Step -> time of some rows of history.csv, whose first columns these are."""
-    found: dict[int, float] = {}
+    """Return step -> time [s] of some rows of history.csv, whose first columns these are."""
+    times: dict[int, float] = {}
     with open_to_read(folder / HISTORY_CSV) as file:
         for line in islice(file, 1, None):
             t, k, *_ = line.split(b",", 2)
             if int(k) in steps:
-                found[int(k)] = float(t)
-    return found
+                times[int(k)] = float(t)
+    return times

@@ -42,6 +42,8 @@ Block = dict[str, Array]
 class Table:
     """Hold columns and rows of a run: numbers on every rank, arrays on rank 0.
 
+    Rows are gathered in blocks, which are columns: less memory, and what the files want.
+
     Attributes:
         columns: column -> (unit, meaning).
         first: the row it was made with.
@@ -56,24 +58,30 @@ class Table:
     def __init__(
         self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None
     ) -> None:
-        self.columns, self.first, self.file, self.count, self._comm = (
-            columns,
-            first,
-            file,
-            0,
-            comm or SerialComm(),
-        )
+        """Begin with the row of the first state.
+
+        Args:
+            columns: column -> (unit, meaning).
+            first: the row.
+            file: the history.h5 of a run with a folder.
+            comm: of the ranks that share the run; this rank alone when None.
+        """
+        self.columns = columns
+        self.first = first
+        self.file = file
+        self.count = 0
+        self._comm = comm or SerialComm()
         self._types: set[type] = set()
         self.check(first)
         self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
         arrays = [] if self._comm.rank else [name for name in columns if name not in self.numbers]
         self.arrays = {name: np.array(first[name]) for name in arrays}
-        self.block = max(
-            1, min(BLOCK, BYTES // max(sum(one.nbytes for one in self.arrays.values()), 1))
-        )
-        self._open: list[Row] = []
+        bytes_of_row = max(sum(sample.nbytes for sample in self.arrays.values()), 1)
+        self.block = max(1, min(BLOCK, BYTES // bytes_of_row))
+        self._open: list[Row] = []  # rows that are not yet a block
         self._blocks: list[Block] = []
-        self._size, self._kept = 0, True
+        self._size = 0  # bytes of all blocks so far
+        self._complete = True  # whether the memory has all of them
         self._tally = Tally()
         self.append(first)
 
@@ -90,9 +98,8 @@ class Table:
                 "only: let all three name the same columns"
             )
         for name, value in row.items():
-            if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(
-                value, np.str_
-            ):
+            numeric = isinstance(value, int | float | np.generic | np.ndarray)
+            if not numeric or isinstance(value, np.str_):
                 raise InputError(
                     f"column '{name}' is {shown(value)}: let its recorder return a number or an "
                     "array"
@@ -107,8 +114,10 @@ class Table:
             self._gather()
 
     def _gather(self) -> None:
+        """Turn the rows that wait into a block."""
         if self._open:
-            rows, self._open = self._open, []
+            rows = self._open
+            self._open = []
             self._store(self._columns(rows))
 
     def restore(self, block: Block) -> None:
@@ -117,34 +126,42 @@ class Table:
         They are those before the one that the table was made with.
         """
         if self.count == 1 and self._open:
-            self._open, self.count = [], 0
+            self._open = []
+            self.count = 0
         self.count += len(block["k"])
         self._store(block)
 
     def _columns(self, rows: list[Row]) -> Block:
-        found: Block = {
-            name: np.array([row[name] for row in rows], dtype=float) for name in self.numbers
-        }
-        return found | {name: np.array([row[name] for row in rows]) for name in self.arrays}
+        """Return rows as columns: numbers as float64, arrays as their recorder gives them."""
+        block: Block = {}
+        for name in self.numbers:
+            block[name] = np.array([row[name] for row in rows], dtype=float)
+        for name in self.arrays:
+            block[name] = np.array([row[name] for row in rows])
+        return block
 
     def _store(self, block: Block) -> None:
+        """Tally a block and hold it, unless the file has it and the memory is full."""
         self._tally.add(block)
         self._size += sum(values.nbytes for values in block.values())
         if self.file is not None and self._size > KEPT:
-            self._kept, self._blocks = False, []
-        if self._kept:
+            self._complete = False
+            self._blocks = []
+        if self._complete:
             self._blocks.append(block)
 
-    def remembered(self) -> Block | None:
+    def rows_in_memory(self) -> Block | None:
         """Return all rows, column -> values, arrays on rank 0 only.
 
         It is None when the memory has let some go.
         """
         self._gather()
-        names = [*self.numbers, *self.arrays] if self._kept else []
-        return {
-            name: np.concatenate([block[name] for block in self._blocks]) for name in names
-        } or None
+        if not self._complete:
+            return None
+        rows: Block = {}
+        for name in [*self.numbers, *self.arrays]:
+            rows[name] = np.concatenate([block[name] for block in self._blocks])
+        return rows
 
     def facts(self) -> dict[str, Any]:
         """Return what the rows say about the run, for its summary."""
@@ -159,39 +176,50 @@ class Table:
         They are (rows,) float64, or (rows, *shape of the arrays); of too many rows for the memory,
         or points for every rank, as they are in the file.
         """
-        kept = self.remembered() or {}
-        shared = [
-            name
-            for name in self.arrays
-            if name in kept and self.arrays[name].shape[:1] <= (SHARED,)
-        ]
-        pieces = self._comm.bcast({name: 1 + kept[name].nbytes // BYTES for name in shared})
-        # messages of MPI hold 2 GB at most
-        for name, count in pieces.items() if self._comm.size > 1 else ():
-            parts: list[Any] = (
-                [None] * count if self._comm.rank else np.array_split(kept[name], count)
-            )
-            kept[name] = np.concatenate([self._comm.bcast(part) for part in parts])
-        return (
-            kept
-            if len(kept) == len(self.columns)
-            else StoredHistory(self.file, kept, list(self.columns))
-        )
+        rows = self.rows_in_memory() or {}
+
+        # Rank 0 hands arrays of few points to all ranks, in pieces: a message of MPI holds 2 GB at
+        # most.
+        pieces: dict[str, int] = {}
+        for name, sample in self.arrays.items():
+            if name in rows and sample.shape[:1] <= (SHARED,):
+                pieces[name] = 1 + rows[name].nbytes // BYTES
+        pieces = self._comm.bcast(pieces)
+        if self._comm.size > 1:
+            for name, count in pieces.items():
+                parts: list[Any] = [None] * count
+                if self._comm.rank == 0:
+                    parts = np.array_split(rows[name], count)
+                rows[name] = np.concatenate([self._comm.bcast(part) for part in parts])
+        if len(rows) == len(self.columns):
+            return rows
+        return StoredHistory(self.file, rows, list(self.columns))
 
 
 class StoredHistory(Mapping[str, Array]):
     """Hold histories that are read column by column from history.h5 when somebody asks.
 
-    Those that are kept are not read.
+    Those that are in memory are not read.
 
-    ViContactError when there is no file, or not any more, or it no longer holds these rows.
+    Raises:
+        ViContactError: there is no file, or not any more, or it no longer holds these rows.
     """
 
-    def __init__(self, file: Path | None, kept: Block, names: list[str]) -> None:
-        self._file, self._kept, self._names = file, kept, names
-        self._stamp = self._now()
+    def __init__(self, file: Path | None, in_memory: Block, names: list[str]) -> None:
+        """Note which state of the file has the rows.
 
-    def _now(self) -> tuple[int, int] | None:
+        Args:
+            file: the history.h5, None for a run without a folder.
+            in_memory: columns that need not be read.
+            names: of all columns.
+        """
+        self._file = file
+        self._in_memory = in_memory
+        self._names = names
+        self._stamp = self._stamp_now()
+
+    def _stamp_now(self) -> tuple[int, int] | None:
+        """Return time and size of the file, None where there is none."""
         try:
             status = os.lstat(self._file or "")
         except OSError:
@@ -201,14 +229,14 @@ class StoredHistory(Mapping[str, Array]):
     def __getitem__(self, name: str) -> Array:
         if name not in self._names:
             raise KeyError(name)
-        if name in self._kept:
-            return self._kept[name]
+        if name in self._in_memory:
+            return self._in_memory[name]
         if self._file is None:
             raise ViContactError(
                 f"'{name}' of more than {SHARED} points is on rank 0 only: give the run an output "
                 "folder (out=), from which every rank reads it"
             )
-        if self._stamp is None or self._now() != self._stamp:
+        if self._stamp is None or self._stamp_now() != self._stamp:
             raise ViContactError(
                 f"'{self._file}', which holds the histories of this run, was replaced or is not on "
                 "this machine: give every run a folder of its own on a shared disk"
@@ -224,9 +252,9 @@ class StoredHistory(Mapping[str, Array]):
 
 
 class Tally:
-    """Step, iterations, worst certificate, contact and energy ledger of a run.
+    """Tally steps, iterations, worst certificate, contact and energy ledger of a run.
 
-    Row 0 is the initial state.
+    Row 0 is the initial state, which is no step.
     """
 
     def __init__(self) -> None:
@@ -240,7 +268,8 @@ class Tally:
         """Add rows, in order: column -> values."""
         ends = [name for name in ("t", *LEDGER) if name in rows]
         self._last = {name: float(rows[name][-1]) for name in ends}
-        self._first = self._first or {name: float(rows[name][0]) for name in ends}
+        if not self._first:
+            self._first = {name: float(rows[name][0]) for name in ends}
         steps = slice(0 if self._rows else 1, None)
         self._rows += len(rows["t"])
         self._add("iterations", rows["iterations"][steps])
@@ -255,23 +284,29 @@ class Tally:
             self._raise("energy", rows["energy_kinetic"] + rows["energy_strain"])
             self._raise("work", np.abs(rows["work_input"]))
             self._raise("defect", np.abs(rows["energy_defect"]))
-            self._raise(
-                "created",
-                -np.asarray(sum(rows[name] for name in LEDGER if name.startswith("loss_"))),
-            )
+            losses = sum(rows[name] for name in LEDGER if name.startswith("loss_"))
+            self._raise("created", -np.asarray(losses))
 
     def _add(self, name: str, values: Array) -> None:
+        """Add values to a sum."""
         self._sums[name] = self._sums.get(name, 0.0) + float(np.sum(values))
 
     def _raise(self, name: str, values: Array, larger: np.ufunc = np.maximum) -> None:
-        """Take the largest so far; NaN stays NaN, but is left out with ``np.fmax``."""
+        """Take the largest so far.
+
+        Args:
+            name: of what is largest.
+            values: of some rows (rows,).
+            larger: NaN stays NaN with ``np.maximum``, and is left out with ``np.fmax``.
+        """
         if len(values):
-            found = float(larger.reduce(values))
-            self._most[name] = float(larger(self._most.get(name, found), found))
+            largest = float(larger.reduce(values))
+            self._most[name] = float(larger(self._most.get(name, largest), largest))
 
     def facts(self) -> dict[str, Any]:
         """Return the numbers for summary.json."""
-        steps, most = self._rows - 1, self._most
+        steps = self._rows - 1
+        most = self._most
         mean = self._sums["iterations"] / steps if steps else 0.0
         iterations = {"mean": mean, "max": int(most.get("iterations", 0))}
         facts: dict[str, Any] = {
@@ -288,7 +323,9 @@ class Tally:
                 "smallest_gap": -most["depth"],
                 "steps_in_contact": int(self._sums["contact"]),
             }
-        return facts | (self._energy() if "defect" in most else {})
+        if "defect" in most:
+            facts |= self._energy()
+        return facts
 
     def _energy(self) -> dict[str, Any]:
         """Return the ledger at the end [J], and its largest defect.

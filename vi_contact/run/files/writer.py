@@ -25,39 +25,44 @@ from .stored_rows import StoredRows, times_of
 from .table import Table
 
 log = logging.getLogger(__name__)
-LATEST = (
-    0.5  # seconds that a row may wait, the next step included, if that takes as long as this one
-)
+# Seconds that a row may wait, the next step included, if that takes as long as this one.
+LATEST = 0.5
 
 
 class OpenFields(Protocol):
     """Write frames of fields; collective."""
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
-        """Write a frame of the state."""
+        """Write a frame of the state.
+
+        Args:
+            state: at the end of a base step.
+            acceleration: of the equation of motion of its last step (n,) [m/s²].
+            report: of this step, None for the first state.
+        """
 
 
 class FieldWriter(Protocol):
-    """Write field output (fem.XDMF).
-
-    ``open`` is collective; ``kept``: step -> time of the frames that are there.
-    """
+    """Write field output: ``fem.XDMF`` is one."""
 
     @property
     def every(self) -> int:
         """Return how many steps lie between two frames."""
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> OpenFields:
-        """Return the open files of fields in the folder."""
+        """Return the open files of fields in the folder. Collective.
+
+        Args:
+            problem: whose fields they are.
+            folder: of the run.
+            kept: step -> time [s] of the frames that are there and stay.
+        """
 
 
 class Writer:
     """Write into the folder of a run, or into none: then nothing is written.
 
     Every method but ``rescue`` is collective.
-
-    ``stored``: the rows of an earlier run that this one continues. Unless they are in this folder,
-    ``open`` clears it.
     """
 
     def __init__(
@@ -68,7 +73,20 @@ class Writer:
         table: Table,
         stored: StoredRows | None = None,
     ) -> None:
-        self._problem, self.folder, self._table, self._stored = problem, folder, table, stored
+        """Hold what is written; no file is touched before ``open``.
+
+        Args:
+            problem: what is marched.
+            folder: of the run, None to write nothing.
+            fields: writes frames for ParaView, if it is given.
+            table: the rows.
+            stored: the rows of an earlier run that this one continues. Unless they are in this
+                folder, ``open`` clears it.
+        """
+        self._problem = problem
+        self.folder = folder
+        self._table = table
+        self._stored = stored
         self._continued = (
             stored is not None
             and folder is not None
@@ -79,9 +97,10 @@ class Writer:
         self._fields: OpenFields | None = None
         self._files: HistoryFiles | None = None
         self._log: RunLog | None = None
-        self._saved = -1
+        self._step_of_checkpoint = -1
         self._waiting: list[Row] = []
-        self._taken = self._written = time.monotonic()
+        self._time_of_row = time.monotonic()
+        self._time_of_flush = self._time_of_row
 
     @property
     def rest(self) -> str:
@@ -99,18 +118,15 @@ class Writer:
         geometry = {name: surface.on_first(getattr(surface, name)) for name in GEOMETRY}
         on_root(self._comm, partial(self._make, folder, geometry))
         if self._settings is not None:
-            kept = (
-                on_root(
-                    self._comm,
-                    lambda: times_of(folder, frames_of(folder)) if self._continued else {},
-                )
-                or {}
-            )
+            kept: Mapping[int, float] = {}
+            if self._continued:
+                kept = on_root(self._comm, lambda: times_of(folder, frames_of(folder))) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))
 
     def _make(self, folder: Path, geometry: Mapping[str, Array]) -> None:
+        """Make log and histories, on rank 0."""
         take(folder)
         remove_litter(folder)
         if not self._continued:
@@ -127,8 +143,11 @@ class Writer:
             self._table.append(row)
             return
         self._waiting.append(row)
-        before, self._taken = self._taken, time.monotonic()
-        if largest(self._comm, 2.0 * self._taken - before - self._written > LATEST):
+        # The next row comes after as long as this one came after the row before.
+        before = self._time_of_row
+        self._time_of_row = time.monotonic()
+        next_row = 2.0 * self._time_of_row - before
+        if largest(self._comm, next_row - self._time_of_flush > LATEST):
             self.flush()
 
     def flush(self, *, alone: bool = False) -> None:
@@ -140,38 +159,40 @@ class Writer:
             on_root(SerialComm() if alone else self._comm, self._flush)
             for row in self._waiting:
                 self._table.append(row)
-            self._waiting, self._written = [], time.monotonic()
+            self._waiting = []
+            self._time_of_flush = time.monotonic()
 
     def _flush(self) -> None:
+        """Write rows that wait into the files, on rank 0."""
         if self._log is not None and self._files is not None:
             self._log.check()
             self._files.append(*self._waiting)
 
     def frame(self, report: Report, number: int) -> None:
         """Write a frame of the fields at the end of a base step, when one is due by its number."""
-        if (
-            self._fields is not None
-            and self._settings is not None
-            and number % self._settings.every == 0
-        ):
+        if self._fields is None or self._settings is None:
+            return
+        if number % self._settings.every == 0:
             self._fields.write(report.new, report.balance.a, report)
 
-    def checkpoint(self, place: RestartPoint, of: Callable[[], Mapping[str, Any]]) -> None:
+    def checkpoint(self, place: RestartPoint, run_of: Callable[[], Mapping[str, Any]]) -> None:
         """Write a checkpoint of this place, unless there is one already.
 
-        ``of``: what problem it is.
+        ``run_of`` says what run it is of, when that is needed: see ``write_checkpoint``.
         """
         k = place.state.k
         self.flush()
-        if self.folder is None or self._saved == k:
+        if self.folder is None or self._step_of_checkpoint == k:
             return
         files = self._files
-        told = on_root(
+        rows = on_root(
             self._comm, lambda: (files.checksum(k), files.sync()) if files else ("", True)
         )
-        checksum, safe = self._comm.bcast(told)
-        write_checkpoint(self.folder, self._problem, place, of=of(), rows=checksum, safe=safe)
-        self._saved = k
+        checksum, safe = self._comm.bcast(rows)
+        write_checkpoint(
+            self.folder, self._problem, place, run_of=run_of(), rows=checksum, safe=safe
+        )
+        self._step_of_checkpoint = k
         if self._comm.rank == 0:
             log.info("checkpoint of step %d", k)
 
@@ -184,11 +205,12 @@ class Writer:
 
         It is not collective, as others might not come; no error hides the first.
         """
-        # of any kind: the first error is told, and this one comes of it or after it
+        # of any kind: the first error is raised again, and this one comes of it or after it
         with suppress(Exception):
             self._close(facts)
 
     def _close(self, facts: Mapping[str, Any]) -> None:
+        """Write the summary and close the files, on rank 0, each even if others fail."""
         if self.folder is None or self._comm.rank != 0:
             return
         try:

@@ -39,7 +39,7 @@ from ...laws.materials import LinearElastic
 from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
-from ...run.files.folder import locked, refuse_files_of_others, run_folder
+from ...run.files.folder import lock_folder, refuse_files_of_others, run_folder
 from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy
@@ -264,7 +264,7 @@ class Case:
             first = solver.primary if isinstance(solver, CrossChecked) else solver
             state = static_equilibrium(problem, solver=first)
         ranks = problem.system.algebra.comm
-        with locked(ranks, None if folder is None else run_folder(ranks, folder)):
+        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
             if folder is not None:
                 keep_copy(self.path, self.settings, folder, ranks)
             yield own | {

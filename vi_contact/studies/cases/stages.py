@@ -33,7 +33,7 @@ from ...run.files.folder import (
     STAGES,
     clear,
     is_marked,
-    locked,
+    lock_folder,
     remove_run,
     run_folder,
     take,
@@ -94,7 +94,7 @@ def run_stages(
         Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)
     ] + [Path()]
     source, before = out if restart is True else Path(restart) if restart else None, ""
-    with locked(ranks, None if out is None else run_folder(ranks, out)):
+    with lock_folder(ranks, None if out is None else run_folder(ranks, out)):
         if (place := source or out) is not None:
             on_root(ranks, partial(_tidy, place, inner, keep=source is not None))
         for stage, folder in list(zip(stages, inner, strict=True))[reached.number :]:

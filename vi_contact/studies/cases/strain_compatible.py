@@ -21,7 +21,7 @@ from ...core.errors import InputError, ViContactError
 from ...core.files import on_root, to_json, write_atomically
 from ...core.own_files import inner_folder, make_inner_folder
 from ...fem.mesh.communicators import MpiComm
-from ...run.files.folder import locked, move_run, remove_if_empty, remove_run, run_folder
+from ...run.files.folder import lock_folder, move_run, remove_if_empty, remove_run, run_folder
 from ...run.recorders import Contact, Energy
 from ...run.simulate import Solution
 from ...soil.strain_compatible import strain_compatible
@@ -86,7 +86,7 @@ def iterate(
 
     material = build(given.arguments.get("material", ()), {"tags": tags})
     asked = build(case.nodes["strain_compatible"], {"tags": tags})
-    with locked(ranks, None if folder is None else run_folder(ranks, folder)):
+    with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
         try:
             found = strain_compatible(mesh, material, run=run, **asked)
         except ViContactError:  # DIR shall not look like the run that was asked for

@@ -28,7 +28,7 @@ from ...core.files import to_json, write_atomically, write_csv
 from ...core.own_files import inner_folder, is_own
 from ...fem.mesh.tagged_mesh import alone
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
-from ...run.files.folder import LOCK, locked
+from ...run.files.folder import LOCK, lock_folder
 from ...run.files.reading import read_run
 from ...run.wall_time import WallTime
 from ..cases.case import Case, read_case
@@ -189,7 +189,7 @@ def run_ida(
         )
     out, end = Path(out), WallTime(wall_time)
     _claim(study, out)
-    with locked(SerialComm(), out, LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"):
+    with lock_folder(SerialComm(), out, LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"):
         every = study.runs(out)
         mine = every[part[0] - 1 :: part[1]]
         left = [run for run in mine if run.done() is None]
