@@ -29,10 +29,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import exprel, lambertw
 
-from demos.boundary_layer.layer import Layer, sized
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import instance, number
-from vi_contact.core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import instance, number
+from ..core.errors import InputError
+from .layer import Layer, sized
 
 LEAST = 1e-9  # least restitution that is asked for
 

@@ -18,7 +18,7 @@ the boundary are unchanged.
 
 from enum import Enum
 
-from demos.boundary_layer.layer import Layer
+from .layer import Layer
 
 
 class Metric(Enum):

@@ -19,15 +19,15 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from demos.boundary_layer.contact_law import ContactLayer
-from vi_contact.core.algebra import Array, EffectiveMatrix, max_abs
-from vi_contact.core.checks import instance
-from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.problem import ContactProblem
-from vi_contact.core.sizes import refuse_dense
-from vi_contact.core.step import State, StepProblem, StepResult
-from vi_contact.schemes.midpoint import Midpoint
-from vi_contact.solvers.condensed import Condensed
+from ..core.algebra import Array, EffectiveMatrix, max_abs
+from ..core.checks import instance
+from ..core.errors import InputError, StepFailure
+from ..core.problem import ContactProblem
+from ..core.sizes import refuse_dense
+from ..core.step import State, StepProblem, StepResult
+from ..schemes.midpoint import Midpoint
+from ..solvers.condensed import Condensed
+from .contact_law import ContactLayer
 
 NEWTON_STEPS, HALVINGS = 60, 30
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]

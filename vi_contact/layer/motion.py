@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from demos.boundary_layer.layer import sized
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, function, number
-from vi_contact.core.errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import array, function, number
+from ..core.errors import InputError, StepFailure
+from .layer import sized
 
 EVALUATIONS = 100_000  # of the acceleration in one motion
 DIFFERENCE_STEP = (

@@ -22,15 +22,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from demos.boundary_layer.motion import (
+from ..core.algebra import Array
+from ..core.checks import array, instance, several, shown
+from ..core.errors import InputError, StepFailure
+from .motion import (
     ConstrainedSystem,
     Evaluations,
     check_tolerance,
     one_sentence,
 )
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, instance, several, shown
-from vi_contact.core.errors import InputError, StepFailure
 
 
 @dataclass(frozen=True)

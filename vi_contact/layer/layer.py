@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import number, optional
-from vi_contact.core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import number, optional
+from ..core.errors import InputError
 
 # of lengths, speeds and masses; of k and c: products of their squares are finite
 LARGEST, LARGEST_FORCE = (1e60, 1e150)

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.motion import (
+from ..core.algebra import Array
+from ..core.checks import array, instance, number, optional, whole
+from ..core.errors import InputError, StepFailure
+from .layer import Layer
+from .metric import Metric
+from .motion import (
     ConstrainedSystem,
     Evaluations,
     check_tolerance,
     one_sentence,
 )
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, instance, number, optional, whole
-from vi_contact.core.errors import InputError, StepFailure
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def layer_motion(
         "system",
         system,
         ConstrainedSystem,
-        "give one, as demos/boundary_layer/rigid_body.py does",
+        "give one, as vi_contact/layer/rigid_body.py does",
     )
     instance(owner, "layer", layer, Layer, "give a Layer")
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")

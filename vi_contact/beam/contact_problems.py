@@ -28,20 +28,20 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from demos.beam.elements import Elements, beam_matrices, rod_matrices
-from demos.beam.values import Rod, Start, TimoshenkoBeam
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, function, instance, number, optional, provides, whole
-from vi_contact.core.errors import InputError
-from vi_contact.core.problem import ContactProblem
-from vi_contact.core.protocols import FrictionLaw, Frictionless
-from vi_contact.core.step import Scheme
-from vi_contact.core.system import Load
-from vi_contact.fem.contact.points import contact_points
-from vi_contact.fem.own_matrices import system_from_arrays
-from vi_contact.laws.mass import ConsistentMass
-from vi_contact.run.march import march
-from vi_contact.schemes.midpoint import Midpoint
+from ..core.algebra import Array
+from ..core.checks import array, function, instance, number, optional, provides, whole
+from ..core.errors import InputError
+from ..core.problem import ContactProblem
+from ..core.protocols import FrictionLaw, Frictionless
+from ..core.step import Scheme
+from ..core.system import Load
+from ..fem.contact.points import contact_points
+from ..fem.own_matrices import system_from_arrays
+from ..laws.mass import ConsistentMass
+from ..run.march import march
+from ..schemes.midpoint import Midpoint
+from .elements import Elements, beam_matrices, rod_matrices
+from .values import Rod, Start, TimoshenkoBeam
 
 History = Callable[[float], float]
 

@@ -16,9 +16,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.errors import StepFailure
-from vi_contact.core.quantities import Positive, Unit
+from ..core.arguments import check_fields
+from ..core.errors import StepFailure
+from ..core.quantities import Positive, Unit
 
 
 @dataclass(frozen=True)

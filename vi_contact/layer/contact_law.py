@@ -32,14 +32,14 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from demos.boundary_layer.layer import Layer, sized
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.particle import damping_ratio
-from demos.boundary_layer.trajectory import passage
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import instance, number, shown
-from vi_contact.core.errors import InputError
-from vi_contact.core.surfaces import ContactSurface
+from ..core.algebra import Array
+from ..core.checks import instance, number, shown
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface
+from .layer import Layer, sized
+from .metric import Metric
+from .particle import damping_ratio
+from .trajectory import passage
 
 LEAST_RESTITUTION = 1e-3  # below it the search takes minutes
 DOUBLINGS = 60  # of the damping ratio in search of a rebound

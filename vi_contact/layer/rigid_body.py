@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from demos.boundary_layer.layer import sized
-from demos.boundary_layer.motion import ConstrainedSystem, check_positive
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, number, shape_of
-from vi_contact.core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import array, number, shape_of
+from ..core.errors import InputError
+from .layer import sized
+from .motion import ConstrainedSystem, check_positive
 
 
 @dataclass(frozen=True)

@@ -30,12 +30,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vi_contact.core import checks
-from vi_contact.core.algebra import Array, SerialFactor, SerialMatrix
-from vi_contact.core.checks import counted, function, instance, number, optional, provides, whole
-from vi_contact.core.errors import StepFailure
-from vi_contact.core.files import write_csv
-
+from ..core import checks
+from ..core.algebra import Array, SerialFactor, SerialMatrix
+from ..core.checks import counted, function, instance, number, optional, provides, whole
+from ..core.errors import StepFailure
+from ..core.files import write_csv
 from .elements import Elements, beam_matrices
 from .tip import ExactFriction, TipFriction
 from .values import Start, TimoshenkoBeam

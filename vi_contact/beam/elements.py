@@ -25,12 +25,11 @@ from typing import Annotated, Any
 import numpy as np
 import scipy.sparse as sp
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import counted, number
-from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Between
-
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.checks import counted, number
+from ..core.errors import InputError
+from ..core.quantities import Between
 from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements

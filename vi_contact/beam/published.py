@@ -14,10 +14,10 @@ initial data are lost: "moves downward".
 
 from collections.abc import Callable
 
-from demos.beam.elements import Elements
-from demos.beam.tip import RegularisedFriction
-from demos.beam.values import Start
-from vi_contact.core.checks import number
+from ..core.checks import number
+from .elements import Elements
+from .tip import RegularisedFriction
+from .values import Start
 
 Force = Callable[[float], float]
 FORCE = 1.0e5  # |r_N(0)| [N]

@@ -9,10 +9,10 @@ from typing import Annotated
 
 import numpy as np
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import array, function, optional, shape_of
-from vi_contact.core.quantities import NotNegative, Positive, Unit
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.checks import array, function, optional, shape_of
+from ..core.quantities import NotNegative, Positive, Unit
 
 Profile = Callable[[Array], Array]
 
