@@ -44,12 +44,17 @@ class LayeredStep(StepProblem):
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryLayer(Midpoint):
-    """Step without friction, on rigid supports at rest.
+    """Step by the midpoint rule with the law of a boundary layer at the contact points.
 
-    There is mass at the contact nodes; the equations are the module's.
+    The equations are those at the head of this file. There is no friction, supports are rigid and
+    at rest, and there is mass at the contact nodes. Reactions push away from the obstacle. The
+    gap that the surface has is that to the obstacle, so that a body at rest begins at the edge of
+    the layer after ``ContactLayer.set_back``.
 
-    InputError for anything else, and a start outside the admissible set; StepFailure where Newton's
-    method fails.
+    Raises:
+        InputError: the law is none, or, when a run begins, the problem has friction, an impact law
+            or other supports, or a gap that is not positive.
+        StepFailure: Newton's method for the gaps of a step fails.
     """
 
     law: ContactLayer
