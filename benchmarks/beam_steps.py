@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vi_contact as vc  # noqa: E402
 from demos import beam  # noqa: E402
-from demos.beam.contract import beam_problem  # noqa: E402
-from demos.problems import published_beam as source  # noqa: E402
+from vi_contact.beam import published as source  # noqa: E402
+from vi_contact.beam.contact_problems import beam_problem  # noqa: E402
 
 STEPS = 1000
 DT = 0.002

@@ -27,15 +27,15 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.boundary_layer.contact_law import contact_layer
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.scheme import BoundaryLayer
 from demos.exact.bar import ThrownBar
 from demos.exact.bouncing_bar import BouncingBar
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
 from demos.problems import wall
 from demos.problems.bar import Bar, build
 from vi_contact.cli import status_of
+from vi_contact.layer.contact_law import contact_layer
+from vi_contact.layer.metric import Metric
+from vi_contact.layer.scheme import BoundaryLayer
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

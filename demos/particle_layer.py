@@ -23,13 +23,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.motion import ConstrainedSystem
-from demos.boundary_layer.particle import ParticleImpact, layer_for
-from demos.boundary_layer.trajectory import layer_motion
 from demos.pictures.layer import plot_cut_off, plot_parameters, plot_particle
 from vi_contact.cli import status_of
+from vi_contact.layer.layer import Layer
+from vi_contact.layer.metric import Metric
+from vi_contact.layer.motion import ConstrainedSystem
+from vi_contact.layer.particle import ParticleImpact, layer_for
+from vi_contact.layer.trajectory import layer_motion
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

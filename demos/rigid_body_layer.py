@@ -23,12 +23,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.particle import layer_for
-from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody
-from demos.boundary_layer.trajectory import layer_motion
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
 from vi_contact.cli import status_of
+from vi_contact.layer.layer import Layer
+from vi_contact.layer.particle import layer_for
+from vi_contact.layer.rigid_body import Ellipsoid, RigidBody
+from vi_contact.layer.trajectory import layer_motion
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

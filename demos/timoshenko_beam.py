@@ -26,8 +26,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 import vi_contact as vc
-from demos import beam
-from demos.beam.contract import beam_problem, rubbing_problem
 from demos.pictures.beam import (
     plot_beam_energies,
     plot_regularisation,
@@ -35,7 +33,9 @@ from demos.pictures.beam import (
     plot_shapes,
     plot_tips,
 )
-from demos.problems.published_beam import (
+from vi_contact import beam
+from vi_contact.beam.contact_problems import beam_problem, rubbing_problem
+from vi_contact.beam.published import (
     published_elements,
     published_mu,
     published_start,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from demos.beam import BeamRun
+from vi_contact.beam import BeamRun
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import History, canvas, panels, save
 

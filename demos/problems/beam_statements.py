@@ -14,12 +14,8 @@ Statement 2 is asked of the whole force.
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from demos.beam.algorithm import BeamRun, BeamStepper, run_beam
-from demos.beam.tip import RegularisedFriction
-from demos.beam.values import TimoshenkoBeam
-from vi_contact.core.algebra import Array
-
-from .published_beam import (
+from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
+from vi_contact.beam.published import (
     DT,
     STEPS,
     Force,
@@ -28,6 +24,9 @@ from .published_beam import (
     published_start,
     readings,
 )
+from vi_contact.beam.tip import RegularisedFriction
+from vi_contact.beam.values import TimoshenkoBeam
+from vi_contact.core.algebra import Array
 
 EPS = 0.002  # of the friction, and the least swing that counts [m]
 FACTORS = (0.01, 0.1, 1.0, 10.0)  # of the normal force of a reading

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from demos.beam.algorithm import BeamRun, BeamStepper, run_beam
-from demos.beam.elements import Elements
-from demos.beam.tip import ExactFriction, RegularisedFriction
-from demos.beam.values import Rod, Start, TimoshenkoBeam
-from demos.problems import published_beam as source
+from vi_contact.beam import published as source
+from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
+from vi_contact.beam.elements import Elements
+from vi_contact.beam.tip import ExactFriction, RegularisedFriction
+from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial

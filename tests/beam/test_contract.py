@@ -11,13 +11,13 @@ import pytest
 from energy_checks import rounded
 
 import vi_contact as vc
-from demos.beam.algorithm import BeamRun, BeamStepper, run_beam
-from demos.beam.contract import beam_problem, rod_forces, rod_problem, rubbing_problem
-from demos.beam.elements import Elements
-from demos.beam.tip import ExactFriction, RegularisedFriction
-from demos.beam.values import Rod, Start, TimoshenkoBeam
 from demos.exact.bar import PeriodicBar
-from demos.problems.published_beam import published_mu, published_start
+from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
+from vi_contact.beam.contact_problems import beam_problem, rod_forces, rod_problem, rubbing_problem
+from vi_contact.beam.elements import Elements
+from vi_contact.beam.published import published_mu, published_start
+from vi_contact.beam.tip import ExactFriction, RegularisedFriction
+from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 

@@ -9,9 +9,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh, spsolve
 
-from demos.beam.elements import Elements, beam_matrices, rod_matrices
-from demos.beam.values import Rod, TimoshenkoBeam
-from demos.problems.published_beam import published_elements
+from vi_contact.beam.elements import Elements, beam_matrices, rod_matrices
+from vi_contact.beam.published import published_elements
+from vi_contact.beam.values import Rod, TimoshenkoBeam
 from vi_contact.core.algebra import Array
 
 pytestmark = pytest.mark.serial

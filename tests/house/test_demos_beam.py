@@ -9,9 +9,9 @@ from demo_runs import demo
 from kept_figures import keep_figures
 from pictures import is_drawn
 
-from demos import beam
 from demos.pictures import beam as plotting_beam
-from demos.problems.published_beam import published_start
+from vi_contact import beam
+from vi_contact.beam.published import published_start
 
 pytestmark = pytest.mark.serial
 

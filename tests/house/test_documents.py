@@ -169,6 +169,8 @@ ROOMS = [
     "engineering",
     "ground_motion",
     "bem",
+    "beam",
+    "layer",
     "studies",
     "plots",
 ]
@@ -189,6 +191,7 @@ def test_names_are_public(document: Path) -> None:
             "md",
             "py",
             "csv",
+            "toml",
         }
         unknown |= {
             f"{room}.{name}"

@@ -28,16 +28,6 @@ from misuses_core import (
 )
 
 import vi_contact as vc
-from demos import beam
-from demos.beam.contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
-from demos.boundary_layer.bilateral import bilateral_motion
-from demos.boundary_layer.contact_law import ContactLayer, contact_layer
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.motion import ConstrainedSystem
-from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
-from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody
-from demos.boundary_layer.scheme import BoundaryLayer
-from demos.boundary_layer.trajectory import layer_motion
 from demos.problems.boundary_elements import (
     disk_contact,
     disk_problem,
@@ -47,9 +37,24 @@ from demos.problems.boundary_elements import (
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
 from demos.problems.loose_segments import from_segments
-from demos.problems.published_beam import readings
 from demos.problems.square import Square
-from vi_contact import bem
+from vi_contact import beam, bem
+from vi_contact.beam.contact_problems import (
+    StepForces,
+    beam_problem,
+    rod_forces,
+    rod_problem,
+    rubbing_problem,
+)
+from vi_contact.beam.published import readings
+from vi_contact.layer.bilateral import bilateral_motion
+from vi_contact.layer.contact_law import ContactLayer, contact_layer
+from vi_contact.layer.layer import Layer
+from vi_contact.layer.motion import ConstrainedSystem
+from vi_contact.layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
+from vi_contact.layer.rigid_body import Ellipsoid, RigidBody
+from vi_contact.layer.scheme import BoundaryLayer
+from vi_contact.layer.trajectory import layer_motion
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 EIGHT = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]

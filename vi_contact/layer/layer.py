@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import number, optional
-from vi_contact.core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import number, optional
+from ..core.errors import InputError
 
 # of lengths, speeds and masses; of k and c: products of their squares are finite
 LARGEST, LARGEST_FORCE = (1e60, 1e150)
@@ -27,11 +27,12 @@ LARGEST, LARGEST_FORCE = (1e60, 1e150)
 
 @dataclass(frozen=True)
 class Layer:
-    """Describe the law by its parameters.
+    """Describe the law f̂_1 of (25) by its parameters.
 
-    The distance x is in metres here (k, c have other units for other rho).
+    The distance x is in metres here (k, c have other units for other rho); the force is positive
+    away from the obstacle.
 
-    Attributes:
+    Args:
         width: b [m], where the layer begins.
         k: [N/m] >= 0, spring-like: k x is what is left of it in the normal equation divided by
             (b/x)².
@@ -40,7 +41,11 @@ class Layer:
             source.
         start: a [m], 0 < a <= b, where the force is complete; None: a = b, no transition.
 
-    Raises InputError for a parameter outside its range, and when k and c are both zero.
+    Raises:
+        InputError: a parameter is outside its range, or k and c are both zero.
+
+    Source: ENOC 2017, A solution of the general single contact frictionless problem using tools of
+    b-geometry.
     """
 
     width: float
@@ -88,7 +93,11 @@ class Layer:
 
     @property
     def v(self) -> float:
-        """Return V [m/s]; InputError while it is not known."""
+        """Return V [m/s].
+
+        Raises:
+            InputError: it is not known.
+        """
         if self.speed is None:
             raise InputError(
                 "the layer's speed V is not given: give speed, or enter the layer first"
@@ -100,7 +109,10 @@ class Layer:
         return self if self.speed is not None else replace(self, speed=speed)
 
     def cut_off(self, x: Array | float) -> Array:
-        """Return delta(x; a, b): 1 up to a, 0 from b on, infinitely smooth between."""
+        """Return delta(x; a, b) [-] at distances x [m], of the shape of x.
+
+        It is 1 up to a, 0 from b on, and infinitely smooth between.
+        """
         x = np.asarray(x, dtype=float)
         a = self.a
         b = self.width
@@ -110,7 +122,10 @@ class Layer:
         return np.where(between, expit(1.0 / z - 1.0 / (1.0 - z)), np.where(x <= a, 1.0, 0.0))
 
     def force(self, x: Array | float, rate: Array | float) -> Array:
-        """Return f̂_1 of (25) [N] at distance x > 0 and rate ẋ."""
+        """Return f̂_1 of (25) [N], positive away from the obstacle, of the shape of x.
+
+        It is the force at distances x > 0 [m] and rates ẋ [m/s], which are negative on the way in.
+        """
         x = np.asarray(x, dtype=float)
         return np.asarray(
             self.width**2 * (self.k - self.c / self.v * rate / x) / x * self.cut_off(x)

@@ -14,10 +14,10 @@ initial data are lost: "moves downward".
 
 from collections.abc import Callable
 
-from demos.beam.elements import Elements
-from demos.beam.tip import RegularisedFriction
-from demos.beam.values import Start
-from vi_contact.core.checks import number
+from ..core.checks import number
+from .elements import Elements
+from .tip import RegularisedFriction
+from .values import Start
 
 Force = Callable[[float], float]
 FORCE = 1.0e5  # |r_N(0)| [N]
@@ -26,17 +26,23 @@ STEPS = 1000
 
 
 def published_mu(t: float, rate: float) -> float:
-    """Return mu = |slip rate|/100 [-], rate in m/s."""
+    """Return the coefficient mu = |slip rate|/100 [-] of Ahn (2012), section 8.
+
+    t [s] is not used, the rate is in m/s.
+    """
     return abs(rate) / 100.0
 
 
 def published_start() -> Start:
-    """Return the start u = -x/200, v = -x; theta = omega = 0, which the source does not state."""
+    """Return the start u = -x/200 [m], v = -x [m/s] of Ahn (2012), section 8.
+
+    theta = omega = 0 is CHOSEN, as the source does not state them.
+    """
     return Start(u=lambda x: -x / 200.0, v=lambda x: -x)
 
 
 def published_elements(count: int = 1000) -> Elements:
-    """Return m = 1000 elements.
+    """Return the elements of Ahn (2012), section 8, which are 1000.
 
     They have linear functions, exact integration and the cubic last rotation function.
     """
@@ -44,14 +50,20 @@ def published_elements(count: int = 1000) -> Elements:
 
 
 def published_friction(eps: float = 0.002) -> RegularisedFriction:
-    """Return friction with eps = 0.002 m, Newton's method without safeguard until |F| <= 1e-10."""
+    """Return the friction of Ahn (2012), section 8, regularised with eps [m].
+
+    Newton's method goes without safeguard until |F| <= 1e-10 N m.
+    """
     return RegularisedFriction(eps, absolute=1e-10, safeguard=False)
 
 
 def readings(dt: float = DT) -> dict[str, Force]:
-    """Return the readings of |r_N|(t) [N] by their letters.
+    """Return the readings of |r_N|(t) [N] of Ahn (2012), section 8, by their letters.
 
     There is also "none", a free tip; dt > 0 [s] is the step of reading C.
+
+    Raises:
+        InputError: dt is not positive.
     """
     number("readings", "dt", dt, positive=True, unit="s")
     return {

@@ -9,24 +9,28 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.motion import (
+from ..core.algebra import Array
+from ..core.checks import array, instance, number, optional, whole
+from ..core.errors import InputError, StepFailure
+from .layer import Layer
+from .metric import Metric
+from .motion import (
     ConstrainedSystem,
     Evaluations,
     check_tolerance,
     one_sentence,
 )
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, instance, number, optional, whole
-from vi_contact.core.errors import InputError, StepFailure
 
 
 @dataclass(frozen=True)
 class LayerContact:
     """Describe a passage through the layer.
 
-    It has times [s], normal rates [m/s], the least distance [m] and its time [s].
+    Args:
+        start, end: times of entry and exit [s].
+        rate_in, rate_out: ρ̇ there [m/s], negative on the way in.
+        deepest: the least distance [m].
+        turned: its time [s].
     """
 
     start: float
@@ -43,15 +47,20 @@ class LayerContact:
 
     @property
     def restitution(self) -> float:
-        """Return -ρ̇⁺/ρ̇⁻, Newton's coefficient (37)."""
+        """Return -ρ̇⁺/ρ̇⁻ [-], Newton's coefficient (37)."""
         return -self.rate_out / self.rate_in
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Hold times (m,), coordinates (m, n_q), velocities (m, n).
+    """Hold a motion through a layer.
 
-    With them come distances, reactions (m,) [N] and completed contacts.
+    Args:
+        t: times (m,) [s].
+        q, v: coordinates (m, n_q) and velocities (m, n), in the units of the system.
+        rho: distances (m,) [m].
+        reaction: lambda (m,) [N], positive away from the obstacle.
+        contacts: the passages that are completed.
     """
 
     t: Array
@@ -74,11 +83,24 @@ def layer_motion(
     rtol: float = 1e-11,
     refine: int = 1,
 ) -> Trajectory:
-    """Compute the motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
+    """Integrate a motion with one contact, M v̇ = f - Γ(v, v) + Aᵀ lambda, from t = 0.
 
-    ``metric``: the reading of the law. ``rtol``: relative tolerance of the integration by Dormand
-    and Prince's method of order 8; ``refine``: rows of the trajectory for each of its steps, which
-    are large, by its own interpolation.
+    lambda [N] is that of the layer, positive away from the obstacle, and zero outside it.
+
+    Args:
+        system: masses, forces and the distance to the obstacle.
+        layer: the law.
+        q0: coordinates (n_q,) at t = 0, with rho(q0) > 0.
+        v0: velocities (n,) at t = 0.
+        t_end: end of the motion [s].
+        metric: the reading of the law.
+        contacts: end after so many passages, if they come before t_end; None: do not.
+        rtol: relative tolerance of the integration by Dormand and Prince's method of order 8.
+        refine: rows of the trajectory for each of its steps, which are large, by its own
+            interpolation.
+
+    Returns:
+        The motion and its contacts.
 
     Raises:
         InputError: the start is not inside the admissible set (rho > 0), or in the layer while V is
@@ -91,7 +113,7 @@ def layer_motion(
         "system",
         system,
         ConstrainedSystem,
-        "give one, as demos/boundary_layer/rigid_body.py does",
+        "give ConstrainedSystem(...), or RigidBody(...).system()",
     )
     instance(owner, "layer", layer, Layer, "give a Layer")
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")

@@ -20,19 +20,22 @@ from typing import Any
 
 import numpy as np
 
-from demos.boundary_layer.layer import sized
-from demos.boundary_layer.motion import ConstrainedSystem, check_positive
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, number, shape_of
-from vi_contact.core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import array, number, shape_of
+from ..core.errors import InputError
+from .layer import sized
+from .motion import ConstrainedSystem, check_positive
 
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """Find the point of an ellipsoid next to a plane.
+    """Find the point of an ellipsoid next to a plane, for ``point`` of ``RigidBody``.
 
     It has semi-axes ``axes`` [m] (along the body axes, about the mass centre): l = -D² nu/|D nu|, D
     = diag(axes), nu the plane's normal in the body frame.
+
+    Raises:
+        InputError: a semi-axis is not positive.
     """
 
     axes: tuple[float, float, float]
@@ -51,15 +54,21 @@ class Ellipsoid:
 class RigidBody:
     """Describe a rigid body before a plane.
 
-    Attributes:
-        mass: [kg]. inertia: (3, 3) or its diagonal (3,), about the mass centre in the body frame
-            [kg m²].
+    Coordinates, velocities and equations are those at the head of this file.
+
+    Args:
+        mass: [kg].
+        inertia: (3, 3) or its diagonal (3,), about the mass centre in the body frame [kg m²].
         point: l_P (3,) [m], or a function of the plane's normal in the body frame that returns it
             (``Ellipsoid``).
-        normal: n, of the plane, towards the body. offset: d [m].
+        normal: n, of the plane, towards the body.
+        offset: d [m], of the plane n·x = d.
         gravity: acceleration of free fall in space (3,) [m/s²].
 
-    InputError for a mass or an inertia that is not positive, or a normal of length zero.
+    Raises:
+        InputError: mass or inertia is not positive, or the normal has length zero.
+
+    Source: ENOC 2017, Spatial collision, equations 39 to 53.
     """
 
     mass: float
@@ -110,7 +119,7 @@ class RigidBody:
         return np.asarray(self.point(nu) if callable(self.point) else self.point, dtype=float), nu
 
     def rho(self, q: Array) -> float:
-        """Return the distance of P from the plane [m] (44)."""
+        """Return the distance of P from the plane [m] (44), q as of ``after_impact``."""
         l_P, nu = self.nearest(q)
         return float(self.n @ q[:3] + nu @ l_P) - self.offset
 
@@ -133,7 +142,16 @@ class RigidBody:
         return float(1.0 / (A @ np.linalg.solve(self.matrix, A)))
 
     def after_impact(self, q: Array, v: Array, e: float) -> Array:
-        """Return v⁺ (6,) of the impact map."""
+        """Return the velocity v⁺ (6,) after an impact, by the impact map.
+
+        Args:
+            q: mass centre [m] and unit quaternion (7,).
+            v: velocity of the mass centre [m/s] and spin in the body [rad/s] before it (6,).
+            e: restitution [-].
+
+        Raises:
+            InputError: another shape, or a negative e.
+        """
         owner = "RigidBody.after_impact"
         q, v = array(owner, "q", q, (7,)), array(owner, "v", v, (6,))
         number(owner, "e", e, not_negative=True)

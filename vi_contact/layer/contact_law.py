@@ -32,14 +32,14 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from demos.boundary_layer.layer import Layer, sized
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.particle import damping_ratio
-from demos.boundary_layer.trajectory import passage
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import instance, number, shown
-from vi_contact.core.errors import InputError
-from vi_contact.core.surfaces import ContactSurface
+from ..core.algebra import Array
+from ..core.checks import instance, number, shown
+from ..core.errors import InputError
+from ..core.surfaces import ContactSurface
+from .layer import Layer, sized
+from .metric import Metric
+from .particle import damping_ratio
+from .trajectory import passage
 
 LEAST_RESTITUTION = 1e-3  # below it the search takes minutes
 DOUBLINGS = 60  # of the damping ratio in search of a rebound
@@ -52,14 +52,18 @@ SHORT_STEP = (
 class ContactLayer:
     """Describe the law of a contact boundary: pressure as a function of the gap and its rate.
 
-    Attributes:
+    The equations are those at the head of this file; pressures push the body away from the
+    obstacle.
+
+    Args:
         layer: width b, start a < b [m]; k [N/m per m²], c [N per m²]; its speed V [m/s] must be
             given.
         mass: gamma >= 0 [kg/m²] of the metric's terms: for a stiff body its mass over its contact
             area; 0: without them, a potential and a damper, which never give energy.
 
-    InputError for values outside their range, a layer without V or without a transition from a to
-    b.
+    Raises:
+        InputError: a value is outside its range, or the layer has no V or no transition from a to
+            b.
     """
 
     layer: Layer
@@ -112,9 +116,13 @@ class ContactLayer:
         )
 
     def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
-        """Return (p̄ [Pa], d p̄/d rho_1) of a step.
+        """Return the mean pressure p̄ (m,) [Pa] of a step and its derivative d p̄/d rho_1 [Pa/m].
 
-        The step goes from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays are (m,).
+        Args:
+            rho: gaps at the end of the step (m,) [m], positive.
+            old: gaps at its beginning (m,) [m], positive.
+            rate: w_0 = d ln(rho)/dt at its beginning (m,) [1/s].
+            dt: time step [s].
         """
         layer, gamma = self.layer, self.mass
         squared = layer.width**2
@@ -135,9 +143,13 @@ class ContactLayer:
         return quotient * bracket, slope * bracket - quotient * squared * damper / rho
 
     def rebound(self, mass: float, speed: float) -> float:
-        """Return e of a rigid body that enters with this speed, by one equation in time.
+        """Return the restitution e [-] of a rigid body that enters, by one equation in time.
 
-        mass: of the body [kg/m²]; a law with metric knows one, its own, and InputError for another.
+        The body has this mass [kg/m²] and enters with this speed [m/s].
+
+        Raises:
+            InputError: a value is outside its range, or a law with metric, which knows its own mass
+                alone, is asked for another.
         """
         sized("ContactLayer.rebound", "mass", mass, "kg/m²")
         sized("ContactLayer.rebound", "speed", speed, "m/s")
@@ -158,13 +170,25 @@ def contact_layer(
     strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
-    """Find the law that returns a rigid body of ``mass`` [kg/m²] at e times its ``speed`` [m/s].
+    """Find the law of a contact boundary that returns a rigid body with a wanted restitution.
 
-    There 0.001 <= e <= 1.
+    k follows from the strength, and c by a search, in which the impact is integrated in time.
 
-    strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when
-    None. metric: BLENDED, gamma = mass, or FLAT, gamma = 0. InputError for another and for values
-    outside their range.
+    Args:
+        e: speed after over speed before the impact [-], from 0.001 to 1.
+        mass: of the body over its contact area [kg/m²].
+        speed: V, with which the body enters the layer [m/s].
+        width: b, of the layer [m].
+        start: a, where the force is complete [m]; None: half the width.
+        strength: k b²/(mass V²) [-], how soon the body is turned back.
+        metric: BLENDED, gamma = mass, or FLAT, gamma = 0.
+
+    Returns:
+        The law, for ``BoundaryLayer``.
+
+    Raises:
+        InputError: a value is outside its range, the metric is another, or no layer returns so
+            little of the speed.
     """
     for name, value, unit in (
         ("mass per area", mass, "kg/m²"),

@@ -29,20 +29,29 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import exprel, lambertw
 
-from demos.boundary_layer.layer import Layer, sized
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import instance, number
-from vi_contact.core.errors import InputError
+from ..core.algebra import Array
+from ..core.checks import instance, number
+from ..core.errors import InputError
+from .layer import Layer, sized
 
 LEAST = 1e-9  # least restitution that is asked for
 
 
 @dataclass(frozen=True)
 class ParticleImpact:
-    """Describe a particle of ``mass`` m [kg] that reaches x = a of the layer with ``speed`` [m/s].
+    """Solve the impact of a particle that reaches x = a of the layer, in closed form.
 
-    k must be positive: without it no particle leaves the layer. InputError for values outside their
-    range.
+    The equations are those at the head of this file; x is the distance from the obstacle.
+
+    Args:
+        layer: the law; k must be positive, as without it no particle leaves the layer.
+        mass: m [kg].
+        speed: V [m/s], of the particle at x = a, positive towards the obstacle.
+
+    Raises:
+        InputError: a value is outside its range.
+
+    Source: ENOC 2017, equations 35 to 38.
     """
 
     layer: Layer
@@ -60,7 +69,7 @@ class ParticleImpact:
 
     @property
     def damping_ratio(self) -> float:
-        """Return s = c/(a k), times the particle's speed over the law's."""
+        """Return s = c/(a k) [-], times the particle's speed over the law's."""
         layer = self.layer.at(self.speed)
         return layer.c / (layer.a * layer.k) * (self.speed / layer.v)
 
@@ -75,7 +84,7 @@ class ParticleImpact:
 
     @property
     def restitution(self) -> float:
-        """Return e_v = V'/V, Newton's coefficient (37)."""
+        """Return e_v = V'/V [-], Newton's coefficient (37)."""
         return restitution(self.damping_ratio)
 
     @property
@@ -94,13 +103,13 @@ class ParticleImpact:
         return float(self.layer.a * np.exp(-self._kappa * _h(self.damping_ratio)))
 
     def position(self, t: Array | float) -> Array:
-        """Return x [m] at times 0 <= t <= t_f."""
+        """Return x [m] at times 0 <= t <= t_f [s], of the shape of t."""
         T = np.asarray(t, dtype=float) / self._time
         s = self.damping_ratio
         return np.asarray(self.layer.a * np.exp(self._kappa * ((1.0 + s) * T**2 * _phi(s * T) - T)))
 
     def velocity(self, t: Array | float) -> Array:
-        """Return ẋ [m/s] at times 0 <= t <= t_f."""
+        """Return ẋ [m/s] at times 0 <= t <= t_f [s], of the shape of t, negative on the way in."""
         T = np.asarray(t, dtype=float) / self._time
         s = self.damping_ratio
         return np.asarray(
@@ -108,14 +117,14 @@ class ParticleImpact:
         )
 
     def boundary_force(self, t: Array | float) -> Array:
-        """Return f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
+        """Return f̂_1 of (25) [N] at times t [s], without cut-off: x does not exceed a."""
         x = self.position(t)
         layer = self.layer.at(self.speed)
         return np.asarray(layer.width**2 * (layer.k - layer.c / layer.v * self.velocity(t) / x) / x)
 
     @property
     def poisson(self) -> float:
-        """Return e_p = p_r/p_c of (37), (38) with f = m dv/dt, the force on the particle.
+        """Return e_p = p_r/p_c [-] of (37), (38) with f = m dv/dt, the force on the particle.
 
         It is equal to Newton's e_v.
         """
@@ -123,7 +132,7 @@ class ParticleImpact:
 
     @property
     def poisson_covector(self) -> float:
-        """Return e_p with f = f̂_1 in (38).
+        """Return e_p [-] with f = f̂_1 in (38).
 
         That is the force in the covector space of the boundary; e_p is a little above e_v.
         """
@@ -134,7 +143,11 @@ class ParticleImpact:
 
 
 def restitution(s: float) -> float:
-    """Return e of s = c/(a k) >= 0."""
+    """Return the restitution e [-] of a damping ratio s = c/(a k) >= 0 [-]: e² h(-s e) = h(s).
+
+    Raises:
+        InputError: s is negative or no number.
+    """
     number("restitution", "the damping ratio s = c/(a k)", s, not_negative=True)
     if s > 1.0:
         return (1.0 + float(lambertw(-(1.0 + s) * np.exp(-(1.0 + s))).real)) / s
@@ -145,7 +158,11 @@ def restitution(s: float) -> float:
 
 
 def damping_ratio(e: float) -> float:
-    """Return s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
+    """Return s = c/(a k) [-] that gives the restitution 0 < e <= 1: inverse of ``restitution``.
+
+    Raises:
+        InputError: e is not between 1e-9 and 1.
+    """
     if not LEAST <= number("damping_ratio", "the restitution coefficient e", e) <= 1.0:
         raise InputError(
             f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to "
@@ -166,12 +183,26 @@ def layer_for(
     start: float | None = None,
     deepest: float = 0.5,
 ) -> Layer:
-    """Find the layer from which this mass [kg] with this speed [m/s] returns at e times its speed.
+    """Find the layer from which a particle returns with a wanted restitution.
 
-    This holds for the dominant terms.
+    This holds for the dominant terms, ``Metric.DOMINANT``: s = c/(a k) follows from e, and k from
+    x_min = a exp(-kappa h(s)) with kappa = m V²/(k a²).
 
-    ``deepest``: x_min/a, left of the distance a at the greatest compression. InputError unless 0 <
-    e <= 1, deepest < 1.
+    Args:
+        e: V'/V, 0 < e <= 1 [-].
+        mass: m [kg].
+        speed: V [m/s].
+        width: b [m].
+        start: a [m], where the force is complete; None: a = b.
+        deepest: x_min/a [-], what is left of the distance a at the greatest compression, below 1.
+
+    Returns:
+        The layer, with its speed V.
+
+    Raises:
+        InputError: a value is outside its range.
+
+    Source: ENOC 2017, equations 36 and 37, solved for k and c.
     """
     if not 0.0 < number("layer_for", "deepest", deepest) < 1.0:
         raise InputError(

@@ -18,7 +18,7 @@ the boundary are unchanged.
 
 from enum import Enum
 
-from demos.boundary_layer.layer import Layer
+from .layer import Layer
 
 
 class Metric(Enum):
@@ -43,10 +43,14 @@ class Metric(Enum):
     FLAT = "flat"
 
     def reaction(self, layer: Layer, g: float, rho: float, rate: float, free: float) -> float:
-        """Return lambda [N].
+        """Return lambda [N] of g ρ̈ = g ``free`` + lambda, positive away from the obstacle.
 
-        It is that of g ρ̈ = g ``free`` + lambda; g = g_11 [kg]; ``free`` is the acceleration [m/s²]
-        without layer.
+        Args:
+            layer: the law, whose speed V is known.
+            g: g_11 [kg], the mass along the normal.
+            rho: distance [m], positive.
+            rate: ρ̇ [m/s], negative on the way in.
+            free: the acceleration ρ̈ [m/s²] without the layer.
         """
         force = float(layer.force(rho, rate))
         ratio = (layer.width / rho) ** 2

@@ -28,28 +28,42 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from demos.beam.elements import Elements, beam_matrices, rod_matrices
-from demos.beam.values import Rod, Start, TimoshenkoBeam
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, function, instance, number, optional, provides, whole
-from vi_contact.core.errors import InputError
-from vi_contact.core.problem import ContactProblem
-from vi_contact.core.protocols import FrictionLaw, Frictionless
-from vi_contact.core.step import Scheme
-from vi_contact.core.system import Load
-from vi_contact.fem.contact.points import contact_points
-from vi_contact.fem.matrices.own_matrices import system_from_arrays
-from vi_contact.laws.mass import ConsistentMass
-from vi_contact.run.march import march
-from vi_contact.schemes.midpoint import Midpoint
+from ..core.algebra import Array
+from ..core.checks import array, function, instance, number, optional, provides, whole
+from ..core.errors import InputError
+from ..core.problem import ContactProblem
+from ..core.protocols import FrictionLaw, Frictionless
+from ..core.step import Scheme
+from ..core.system import Load
+from ..fem.contact.points import contact_points
+from ..fem.matrices.own_matrices import system_from_arrays
+from ..laws.mass import ConsistentMass
+from ..run.march import march
+from ..schemes.midpoint import Midpoint
+from .elements import Elements, beam_matrices, rod_matrices
+from .values import Rod, Start, TimoshenkoBeam
 
 History = Callable[[float], float]
 
 
 def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> ContactProblem:
-    """Set up the rod before its wall (2.1)-(2.5).
+    """Return the contact problem of the rod before its wall, (2.1)-(2.5) of Ahn (2012).
 
-    ``start``: u and v along the axis; at rest when None.
+        rho A v'' = E A (v_xx + a1 v'_xx) + f(t),    v(length) <= gap,    r_n >= 0
+
+    v is positive towards the wall, r_n is the force [N] of the wall on the tip, against it.
+
+    Args:
+        rod: the body and its loads.
+        elements: their number is that of equal linear elements.
+        start: u [m] and v [m/s] along the axis at t = 0; None: at rest.
+
+    Returns:
+        A problem of ``elements.count`` unknowns with one contact point of weight 1, for ``march``
+        and ``simulate``.
+
+    Raises:
+        InputError: an argument is of another type, or a load returns no finite number.
     """
     _check("rod_problem", elements, (start,), rod=rod)
     x = elements.nodes(rod.length)
@@ -66,12 +80,28 @@ def beam_problem(
     start: Start | None = None,
     load: History | None = None,
 ) -> ContactProblem:
-    """Set up the beam pressed on the wall with normal_force(t) >= 0 [N].
+    """Return the problem of the beam whose tip is pressed on the wall, (2.6)-(2.9) of Ahn (2012).
 
-    The force is the load of a mass rho A l held by the wall.
+        |R(t)| <= mu |r_N(t)|,    R = mu |r_N| sgn(u') where the tip slips
 
-    ``friction``: Coulomb or SlipRateCoulomb. Schemes take the force where they take loads:
-    ``Midpoint`` at t + dt/2, Algorithm 10 at t. ``load``: uniform, across [N/m].
+    R [N] is the friction that the wall takes from the tip, u is positive across and upwards. The
+    given force is the load of a point mass rho A l, which the wall holds: one more unknown.
+
+    Args:
+        beam: the body.
+        elements: equal elements of deflection and rotation.
+        normal_force: t [s] -> |r_N| >= 0 [N]. Schemes take it where they take loads:
+            ``Midpoint`` at t + dt/2, Algorithm 10 at t.
+        friction: a law, for example ``Coulomb(mu)``.
+        start: u [m], v [m/s], theta [-] and omega [1/s] at t = 0; None: at rest.
+        load: t [s] -> uniform force across [N/m]; None: no load.
+
+    Returns:
+        A problem of 2 ``elements.count`` + 1 unknowns with one contact point, for ``march`` and
+        ``simulate``. It keeps the consistent mass.
+
+    Raises:
+        InputError: an argument is of another type, or a function returns no finite number.
     """
     _check("beam_problem", elements, (start,), load, beam=beam, friction=friction)
     function(
@@ -98,9 +128,27 @@ def rubbing_problem(
     start: Start | None = None,
     load: History | None = None,
 ) -> ContactProblem:
-    """Set up rod and beam of one length: the beam rubs with the rod's contact force.
+    """Return the problem of a body that is rod and beam: it rubs with its own contact force.
 
-    InputError for two lengths.
+    Along the axis it obeys the equations of ``rod_problem``, across those of ``beam_problem`` with
+    |r_N| = r_n of the rod, the coupling that Ahn (2012) leaves out.
+
+    Args:
+        rod: the body along its axis, with the gap.
+        beam: the body across, of the same length.
+        elements: equal elements, the same for both.
+        friction: a law, for example ``Coulomb(mu)``.
+        rod_start: u [m] and v [m/s] along the axis at t = 0; None: at rest.
+        start: u [m], v [m/s], theta [-] and omega [1/s] across at t = 0; None: at rest.
+        load: t [s] -> uniform force across [N/m]; None: no load.
+
+    Returns:
+        A problem of 3 ``elements.count`` unknowns with one contact point, for ``march`` and
+        ``simulate``. It keeps the consistent mass.
+
+    Raises:
+        InputError: rod and beam differ in length, an argument is of another type, or a function
+            returns no finite number.
     """
     _check(
         "rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction
@@ -119,9 +167,15 @@ def rubbing_problem(
 
 @dataclass(frozen=True)
 class StepForces:
-    """Hold forces [N], one per step of dt [s].
+    """Hold forces, one for each time step, as a function of time.
 
-    They are called as a function of the time in a step; it raises InputError for times of no step.
+    Args:
+        dt: time step [s].
+        forces: (steps,) [N], pressing where positive.
+
+    Raises:
+        InputError: dt is not positive, a force is no finite number, or the time that is asked for
+            is in none of the steps.
     """
 
     dt: float
@@ -153,13 +207,26 @@ def rod_forces(
     start: Start | None = None,
     scheme: Scheme | None = None,
 ) -> StepForces:
-    """Return |r_N| of every step of the rod [N], for Algorithm 10.
-
-    ``scheme``: Midpoint(), the source's, when None.
+    """Compute the contact force |r_N| of every step of the rod, for Algorithm 10 of Ahn (2012).
 
     The force r_N^k of (5.1) acts in the step from t_k to t_k+1, and (7.1) of the same step rubs
     with it. The rod does not feel the beam: rod first, beam second is no approximation, with
     ``ExactFriction`` it is ``rubbing_problem``.
+
+    Args:
+        rod: the body and its loads.
+        elements: equal linear elements.
+        dt: time step [s].
+        steps: number of steps.
+        start: u [m] and v [m/s] along the axis at t = 0; None: at rest.
+        scheme: None: ``Midpoint()``, that of the source.
+
+    Returns:
+        The forces [N] as a function of time, for ``normal_force`` of ``BeamStepper``.
+
+    Raises:
+        InputError: an argument is outside its range.
+        StepFailure: a step of the rod is not solved.
     """
     dt = number("rod_forces", "dt", dt, positive=True, unit="s")
     steps = whole("rod_forces", "steps", steps, least=1)

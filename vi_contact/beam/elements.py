@@ -25,12 +25,11 @@ from typing import Annotated, Any
 import numpy as np
 import scipy.sparse as sp
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import counted, number
-from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Between
-
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.checks import counted, number
+from ..core.errors import InputError
+from ..core.quantities import Between
 from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements
@@ -41,12 +40,19 @@ W = 0.5 * _WEIGHTS
 
 @dataclass(frozen=True)
 class Elements:
-    """Describe ``count`` equal elements.
+    """Describe equal elements along a rod or beam.
 
-    ``reduced_shear``: shear energy by one point; ``published_end``: see above.
+    The source has Elements(1000, reduced_shear=False, published_end=True).
 
-    The source has Elements(1000, reduced_shear=False, published_end=True). InputError for fewer
-    than two elements, and for a published end with reduced shear, which the source does not have.
+    Args:
+        count: number of elements, two at least.
+        reduced_shear: integrate the shear energy by one point per element, which does not lock.
+        published_end: take the last rotation function of Ahn (2012), which clamps the tip's
+            rotation as h -> 0; see the head of this file.
+
+    Raises:
+        InputError: fewer than two elements, or a published end with reduced shear, which the source
+            does not have.
     """
 
     count: Annotated[int, Between(2, math.inf)] = 100
@@ -63,17 +69,24 @@ class Elements:
             )
 
     def nodes(self, length: float) -> Array:
-        """Return the positions of the unknowns [m]: all nodes but the clamped, shape (count,)."""
+        """Return the positions [m] of all nodes but the clamped one, shape (count,).
+
+        Raises:
+            InputError: the length [m] is not positive.
+        """
         return np.linspace(
             0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
         )[1:]
 
 
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
-    """Assemble (M, S, unit of distributed force [N/m]) of the beam.
+    """Assemble the matrices of the beam: ½ wᵀMw and ½ yᵀSy are its energies [J], and C = a2 S.
 
-    They are sparse, of y = (theta_1 … theta_m, u_1 … u_m): ½ wᵀMw and ½ yᵀSy are energies [J], C =
-    a2 S; from M1, M2, K1, K2, L1 of section 7 with their coefficients.
+    They are made of M1, M2, K1, K2, L1 of section 7 of Ahn (2012) with their coefficients.
+
+    Returns:
+        M and S, sparse (2 m, 2 m), of y = (theta_1 … theta_m [-], u_1 … u_m [m]), and the forces
+        (2 m,) of a uniform load of 1 N/m.
     """
     m = elements.count
     h = beam.length / elements.count
@@ -112,7 +125,12 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
 
 
 def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
-    """Assemble (M, K, unit of distributed force [N/m]) of v_1 … v_n, sparse; C = viscosity K."""
+    """Assemble the matrices of the rod: ½ wᵀMw and ½ vᵀKv are its energies [J], and C = a1 K.
+
+    Returns:
+        M and K, sparse (n, n), of v_1 … v_n [m] with n = ``count``, and the forces (n,) of a
+        uniform load of 1 N/m.
+    """
     h = rod.length / count
     lines = _lines(S)
     slopes = _line_slopes(S) / h

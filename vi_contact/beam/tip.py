@@ -16,14 +16,20 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.errors import StepFailure
-from vi_contact.core.quantities import Positive, Unit
+from ..core.arguments import check_fields
+from ..core.errors import StepFailure
+from ..core.quantities import Positive, Unit
 
 
 @dataclass(frozen=True)
 class Slip:
-    """Hold the slip s of a step [m], the friction force R [N] and the Newton updates it took."""
+    """Hold what friction makes of a step.
+
+    Args:
+        s: the slip of the tip [m], positive upwards.
+        force: R [N], which the wall takes from the beam, positive with s.
+        updates: of Newton's method.
+    """
 
     s: float
     force: float
@@ -34,7 +40,13 @@ class TipFriction(Protocol):
     """Solve the scalar equation: what every friction at the tip offers."""
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """Return the slip of a step."""
+        """Return the slip of a step, the root of c s - g + R(s) = 0.
+
+        Args:
+            c: stiffness of the step at the tip, positive [N/m].
+            g: the force that would hold the tip [N].
+            limit: mu |r_N| >= 0 [N].
+        """
 
 
 @dataclass(frozen=True)
@@ -45,7 +57,10 @@ class ExactFriction:
     """
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """Return s = (g - R)/c with R the point of [-limit, limit] nearest to g."""
+        """Return s = (g - R)/c [m] with R [N] the point of [-limit, limit] nearest to g.
+
+        c [N/m], g [N] and limit [N] are those of ``TipFriction``.
+        """
         force = min(max(g, -limit), limit)
         return Slip((g - force) / c, force, 0)
 
@@ -58,11 +73,21 @@ class RegularisedFriction:
 
         F(s) = sqrt(s² + eps²) (c s - g) + limit s = 0
 
-    ``tolerance``: |F| over c eps² (plus the round-off of F); ``absolute`` replaces it: 1e-10 in the
-    source. F has one zero, between 0 and the frictionless slip g/c, but is not monotonic where the
-    slip is large beside eps; Newton's method may then run away.
-    ``safeguard`` bisects when an iterate leaves the bracket of the zero; off, the method is the
-    source's.
+    F has one zero, between 0 and the frictionless slip g/c, but is not monotonic where the slip is
+    large beside eps; Newton's method may then run away.
+
+    Args:
+        eps: slip of a step at which the friction is 0.7 of its limit [m].
+        tolerance: of |F| over c eps² [-], plus the round-off of F.
+        absolute: of |F| [N m], in place of ``tolerance``; 1e-10 in the source.
+        max_iterations: of Newton updates.
+        safeguard: bisect when an iterate leaves the bracket of the zero; off, the method is that of
+            the source.
+
+    Raises:
+        InputError: a number is outside its range.
+
+    Source: J. Ahn (2012), equations (7.8) and (7.9).
     """
 
     eps: Annotated[float, Positive, Unit("m")]
@@ -75,9 +100,10 @@ class RegularisedFriction:
         check_fields(self)
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """Return the zero of F.
+        """Return the zero of F; c [N/m], g [N] and limit [N] are those of ``TipFriction``.
 
-        StepFailure when max_iterations updates do not reach the tolerance.
+        Raises:
+            StepFailure: max_iterations updates do not reach the tolerance.
         """
         # a little wider: the zero may be its end
         s, low, high = (0.0, *sorted((0.0, g / c * (1.0 + 1e-9))))

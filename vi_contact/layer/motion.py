@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from demos.boundary_layer.layer import sized
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, function, number
-from vi_contact.core.errors import InputError, StepFailure
+from ..core.algebra import Array
+from ..core.checks import array, function, number
+from ..core.errors import InputError, StepFailure
+from .layer import sized
 
 EVALUATIONS = 100_000  # of the acceleration in one motion
 DIFFERENCE_STEP = (
@@ -36,7 +36,7 @@ DIFFERENCE_STEP = (
 class ConstrainedSystem:
     """Describe a configuration manifold with boundary, and the forces on it.
 
-    Attributes:
+    Args:
         mass: M, (n, n) [kg], constant or a function of q.
         rho: q -> distance to the boundary, > 0 inside.
         gradient: q -> A (n,), ρ̇ = A v.
@@ -45,6 +45,9 @@ class ConstrainedSystem:
         rates: (q, v) -> q̇; None: v are the rates of q.
         gradient_rate: (q, v) -> Ȧ v; None: by a central difference, to ten digits.
         scale: a typical size of the coordinates, which central differences are taken over 6e-6 of.
+
+    Raises:
+        InputError: the mass is not symmetric positive definite, or a function is none.
     """
 
     mass: Array | Callable[[Array], Array]
@@ -65,9 +68,10 @@ class ConstrainedSystem:
                 function(owner, name, getattr(self, name), "give a function, see its docstring")
 
     def check(self, q: Array, v: Array, t: float = 0.0) -> None:
-        """Raise InputError for functions that return what is no vector.
+        """Check what the functions return at coordinates q (n_q,), velocities v (n,), time t [s].
 
-        That is, at this state, other shapes, texts, NaN or infinity.
+        Raises:
+            InputError: a function returns another shape, a text, NaN or infinity.
         """
         owner = "ConstrainedSystem"
         n = len(v)
@@ -134,7 +138,7 @@ class ConstrainedSystem:
         return DIFFERENCE_STEP * max(self.scale, float(np.max(np.abs(q))))
 
     def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
-        """Return (v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""
+        """Return (v̇ without layer (n,), M⁻¹Aᵀ (n,), g_11 [kg], ρ̈ without layer [m/s²])."""
         A = np.asarray(self.gradient(q), dtype=float)
         both = np.linalg.solve(
             self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A])

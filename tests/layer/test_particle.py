@@ -8,9 +8,9 @@ import pytest
 from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.integrate import quad
 
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.core.errors import InputError
+from vi_contact.layer.layer import Layer
+from vi_contact.layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 
 pytestmark = pytest.mark.serial
 

@@ -30,12 +30,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vi_contact.core import checks
-from vi_contact.core.algebra import Array, SerialFactor, SerialMatrix
-from vi_contact.core.checks import counted, function, instance, number, optional, provides, whole
-from vi_contact.core.errors import StepFailure
-from vi_contact.core.files import write_csv
-
+from ..core import checks
+from ..core.algebra import Array, SerialFactor, SerialMatrix
+from ..core.checks import counted, function, instance, number, optional, provides, whole
+from ..core.errors import StepFailure
+from ..core.files import write_csv
 from .elements import Elements, beam_matrices
 from .tip import ExactFriction, TipFriction
 from .values import Start, TimoshenkoBeam
@@ -72,10 +71,13 @@ class Snapshot:
 class BeamRun:
     """Hold what a run recorded: columns of shape (steps + 1,) and, when asked for, snapshots.
 
-    history: t [s]; u_tip [m], v_tip [m/s]; friction_force [N] and slip [m] of the step that led
-    there; normal_force [N] and mu [-] of that step; newton: updates; energy_kinetic, energy_strain,
-    work_input, loss_damping, loss_friction and energy_defect [J] (works and losses since the
-    start).
+    Args:
+        x: positions of the nodes (m + 1,) [m], the clamped one first.
+        history: t [s]; u_tip [m], v_tip [m/s]; friction_force [N] and slip [m] of the step that led
+            there; normal_force [N] and mu [-] of that step; newton: updates; energy_kinetic,
+            energy_strain, work_input, loss_damping, loss_friction and energy_defect [J] (works and
+            losses since the start).
+        snapshots: the whole beam at some times.
     """
 
     x: Array
@@ -93,7 +95,11 @@ class BeamRun:
         return float(np.mean(self.history["newton"][1:]))
 
     def save(self, path: str | Path) -> Path:
-        """Write the history as CSV, a line per time."""
+        """Write the history as CSV, a line per time, and return the path.
+
+        Raises:
+            InputError: the path is none, or a file may not be written there.
+        """
         file = checks.path("BeamRun.save", "the path", path)
         return write_csv(
             file, list(self.history), np.column_stack(list(self.history.values())).tolist()
@@ -102,10 +108,22 @@ class BeamRun:
 
 @dataclass(frozen=True)
 class BeamStepper:
-    """Describe a beam and what acts on it.
+    """Describe a beam and what acts on it, for ``run_beam``.
 
-    ``normal_force``: t -> |r_N| >= 0 [N]; ``mu``: (t, slip rate [m/s] >= 0) -> coefficient;
-    ``load``: t -> uniform force along the beam [N/m], or None. InputError for dt <= 0.
+    Args:
+        beam: the body.
+        elements: equal elements of deflection and rotation.
+        dt: time step [s].
+        normal_force: t [s] -> |r_N| >= 0 [N], which presses the tip on the wall.
+        mu: (t [s], slip rate [m/s] >= 0) -> coefficient of friction >= 0 [-].
+        friction: ``ExactFriction`` or ``RegularisedFriction``.
+        load: t [s] -> uniform force across the beam [N/m], positive upwards; None: no load.
+
+    Raises:
+        InputError: dt is not positive, or an argument is of another type.
+
+    Source: J. Ahn (2012), A viscoelastic Timoshenko beam with Coulomb law of friction, Algorithm
+    10.
     """
 
     beam: TimoshenkoBeam
@@ -136,7 +154,11 @@ class BeamStepper:
         optional(function, owner, "load", self.load, "give a function of t in N/m, or None")
 
     def given(self, t: float, rate: float) -> tuple[float, float, float]:
-        """Return (|r_N|, mu, load) at a time and slip rate, checked."""
+        """Return (|r_N| [N], mu [-], load [N/m]) at a time t [s] and a slip rate [m/s].
+
+        Raises:
+            InputError: a function returns no finite number, or a negative force or coefficient.
+        """
         owner = "BeamStepper"
         at = f"({t:.6g} s)"
         N = number(owner, f"normal_force{at}", self.normal_force(t), not_negative=True, unit="N")
@@ -149,12 +171,23 @@ class BeamStepper:
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
-    """March ``steps`` steps from ``start`` and keep the ledger.
+    """March the beam by Algorithm 10 of Ahn (2012) and keep the energy ledger.
 
-    ``every`` are the steps between snapshots, 0 for none.
+    The equations are those at the head of this file. The tip's friction opposes its motion; u is
+    positive across and upwards.
 
-    Raises InputError for bad numbers and StepFailure, with step and time, where the tip's equation
-    is not solved.
+    Args:
+        stepper: the beam, its time step and what acts on it.
+        start: u [m], v [m/s], theta [-] and omega [1/s] at t = 0.
+        steps: number of steps.
+        every: steps between snapshots of the whole beam; 0: none.
+
+    Returns:
+        The histories, with one row more than steps, and the snapshots.
+
+    Raises:
+        InputError: an argument is outside its range, or a function returns no finite number.
+        StepFailure: the tip's equation is not solved; the message names step and time.
     """
     instance("run_beam", "stepper", stepper, BeamStepper, "give BeamStepper(...)")
     instance("run_beam", "start", start, Start, "give Start(...)")

@@ -9,10 +9,10 @@ from typing import Annotated
 
 import numpy as np
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import array, function, optional, shape_of
-from vi_contact.core.quantities import NotNegative, Positive, Unit
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.checks import array, function, optional, shape_of
+from ..core.quantities import NotNegative, Positive, Unit
 
 Profile = Callable[[Array], Array]
 
@@ -26,8 +26,22 @@ class TimoshenkoBeam:
         rho I theta'' = E I theta_xx + K A G (u_x - theta) + viscosity (same terms of the rates)
         rho A u''     = K A G (u_xx - theta_x) + viscosity (same terms of the rates) + f(t)
 
-    area: A; inertia: I; shear_factor: K; viscosity: a2. The defaults are Ahn's, with EI = KAG =
-    100; his viscosities are 0.001 and 2 s.
+    The defaults are Ahn's, with E I = 100 N m² and K A G = 100 N.
+
+    Args:
+        length: l.
+        rho: mass density.
+        area: A, of the cross-section.
+        inertia: I, second moment of area.
+        E: Young's modulus.
+        G: shear modulus.
+        shear_factor: K, for the shape of the cross-section.
+        viscosity: a2, of Kelvin and Voigt; Ahn's are 0.001 and 2 s.
+
+    Raises:
+        InputError: a number is outside its range.
+
+    Source: J. Ahn (2012), A viscoelastic Timoshenko beam with Coulomb law of friction.
     """
 
     length: Annotated[float, Positive, Unit("m")] = 5.0
@@ -61,8 +75,22 @@ class Rod:
 
         rho A v'' = E A (v_xx + viscosity v'_xx) + body_force(t),    v(length) <= gap
 
-    viscosity: a1/c1; body_force [N/m] (f_h of the paper, uniform) and end_force [N] pull towards
-    the wall for positive values.
+    v is positive towards the wall. The clamped end stands still.
+
+    Args:
+        length: l.
+        rho: mass density.
+        area: A, of the cross-section.
+        E: Young's modulus.
+        viscosity: a1/c1 of the paper, of Kelvin and Voigt.
+        gap: distance of the wall from the end at rest.
+        body_force: t [s] -> uniform force [N/m], f_h of the paper, positive towards the wall.
+        end_force: t [s] -> force on the free end [N], positive towards the wall.
+
+    Raises:
+        InputError: a number is outside its range, or a force is no function.
+
+    Source: J. Ahn (2012), section 2.
     """
 
     length: Annotated[float, Positive, Unit("m")] = 5.0
@@ -84,9 +112,16 @@ class Rod:
 
 @dataclass(frozen=True)
 class Start:
-    """Give initial values as functions of x.
+    """Give initial values as functions of the positions x (n,) [m] along the body.
 
-    They are displacement u [m], velocity v [m/s], rotation theta and rate omega [1/s].
+    Args:
+        u: displacement [m], of a rod along it, of a beam across it.
+        v: velocity [m/s], likewise.
+        theta: rotation of the sections of a beam [-].
+        omega: rate of the rotation [1/s].
+
+    Raises:
+        InputError: one of them is no function.
     """
 
     u: Profile = np.zeros_like
@@ -99,9 +134,10 @@ class Start:
             function("Start", name, getattr(self, name), "give a function of the positions x")
 
     def at(self, name: str, x: Array) -> Array:
-        """Return a field at the nodes.
+        """Return the field of this name at the nodes x (n,) [m], shape (n,).
 
-        It raises InputError unless it gives finite numbers, one for each node or one for all.
+        Raises:
+            InputError: it does not give finite numbers, one for each node or one for all.
         """
         values = getattr(self, name)(x)
         shape = () if shape_of(values) == () else x.shape

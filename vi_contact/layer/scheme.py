@@ -19,15 +19,15 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from demos.boundary_layer.contact_law import ContactLayer
-from vi_contact.core.algebra import Array, EffectiveMatrix, max_abs
-from vi_contact.core.checks import instance
-from vi_contact.core.errors import InputError, StepFailure
-from vi_contact.core.problem import ContactProblem
-from vi_contact.core.sizes import refuse_dense
-from vi_contact.core.step import State, StepProblem, StepResult
-from vi_contact.schemes.midpoint import Midpoint
-from vi_contact.solvers.condensed import Condensed
+from ..core.algebra import Array, EffectiveMatrix, max_abs
+from ..core.checks import instance
+from ..core.errors import InputError, StepFailure
+from ..core.problem import ContactProblem
+from ..core.sizes import refuse_dense
+from ..core.step import State, StepProblem, StepResult
+from ..schemes.midpoint import Midpoint
+from ..solvers.condensed import Condensed
+from .contact_law import ContactLayer
 
 NEWTON_STEPS, HALVINGS = 60, 30
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
@@ -44,12 +44,17 @@ class LayeredStep(StepProblem):
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryLayer(Midpoint):
-    """Step without friction, on rigid supports at rest.
+    """Step by the midpoint rule with the law of a boundary layer at the contact points.
 
-    There is mass at the contact nodes; the equations are the module's.
+    The equations are those at the head of this file. There is no friction, supports are rigid and
+    at rest, and there is mass at the contact nodes. Reactions push away from the obstacle. The
+    gap that the surface has is that to the obstacle, so that a body at rest begins at the edge of
+    the layer after ``ContactLayer.set_back``.
 
-    InputError for anything else, and a start outside the admissible set; StepFailure where Newton's
-    method fails.
+    Raises:
+        InputError: the law is none, or, when a run begins, the problem has friction, an impact law
+            or other supports, or a gap that is not positive.
+        StepFailure: Newton's method for the gaps of a step fails.
     """
 
     law: ContactLayer

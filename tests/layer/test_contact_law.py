@@ -12,11 +12,6 @@ import pytest
 from bar import bar, bouncing, energy, run, thrown
 from chain import chain_problem
 
-from demos.boundary_layer import scheme as layered
-from demos.boundary_layer.contact_law import ContactLayer, contact_layer
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.scheme import BoundaryLayer
 from demos.exact.bar import ThrownBar
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
@@ -25,6 +20,11 @@ from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
+from vi_contact.layer import scheme as layered
+from vi_contact.layer.contact_law import ContactLayer, contact_layer
+from vi_contact.layer.layer import Layer
+from vi_contact.layer.metric import Metric
+from vi_contact.layer.scheme import BoundaryLayer
 from vi_contact.run.march import march
 from vi_contact.run.simulate import simulate
 from vi_contact.run.time_steps import Schedule

@@ -8,15 +8,15 @@ import pytest
 from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.special import ellipk
 
-from demos.boundary_layer import motion as layer_motions
-from demos.boundary_layer.bilateral import bilateral_motion
-from demos.boundary_layer.layer import Layer
-from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.motion import ConstrainedSystem
-from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
-from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
-from demos.boundary_layer.trajectory import LayerContact, Trajectory, layer_motion
 from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.layer import motion as layer_motions
+from vi_contact.layer.bilateral import bilateral_motion
+from vi_contact.layer.layer import Layer
+from vi_contact.layer.metric import Metric
+from vi_contact.layer.motion import ConstrainedSystem
+from vi_contact.layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
+from vi_contact.layer.rigid_body import Ellipsoid, RigidBody, rotation
+from vi_contact.layer.trajectory import LayerContact, Trajectory, layer_motion
 
 pytestmark = pytest.mark.serial
 # a unit mass before x = 0

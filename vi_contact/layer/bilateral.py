@@ -22,22 +22,27 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from demos.boundary_layer.motion import (
+from ..core.algebra import Array
+from ..core.checks import array, instance, several, shown
+from ..core.errors import InputError, StepFailure
+from .motion import (
     ConstrainedSystem,
     Evaluations,
     check_tolerance,
     one_sentence,
 )
-from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, instance, several, shown
-from vi_contact.core.errors import InputError, StepFailure
 
 
 @dataclass(frozen=True)
 class BilateralMotion:
-    """Hold times t (m,); q, v (m, n).
+    """Hold a motion under k equality constraints.
 
-    With them come constraint values phi, coordinates lambda and reactions (m, k).
+    Args:
+        t: times (m,) [s].
+        q, v: coordinates and their rates (m, n).
+        phi: values of the constraints (m, k).
+        multiplier: coordinates lambda^R of the constraints (m, k).
+        reaction: forces along a^R (m, k) [N], of either sign.
     """
 
     t: Array
@@ -51,13 +56,26 @@ class BilateralMotion:
 def bilateral_motion(
     systems: Sequence[ConstrainedSystem], *, q0: Array, v0: Array, times: Array, rtol: float = 1e-11
 ) -> BilateralMotion:
-    """Compute the motion with phi^R = 0 held, at the given times (the first is the start).
+    """Integrate the motion with the constraints phi^R(q) = 0 held, by (31) and (34).
 
-    systems: one for each constraint, its ``rho`` and ``gradient`` being phi and a; mass and forces
-    are those of the first. lambda starts from 0, at rest. v must be the rates of q.
+    lambda starts from 0, at rest.
 
-    Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the
-    integrator stops.
+    Args:
+        systems: one for each constraint, its ``rho`` and ``gradient`` being phi and a; mass and
+            forces are those of the first, and its velocities are the rates of q.
+        q0: coordinates (n,) at the start.
+        v0: their rates (n,) at the start.
+        times: (m,) [s], increasing; the first is the start.
+        rtol: relative tolerance of the integration by Dormand and Prince's method of order 8.
+
+    Returns:
+        The motion and its reactions at these times.
+
+    Raises:
+        InputError: quasi-velocities, no constraint, or times that do not increase.
+        StepFailure: the integrator stops; the message names the time.
+
+    Source: ENOC 2017, equations 29 to 34.
     """
     owner = "bilateral_motion"
     k = len(several("bilateral_motion", "systems", systems, "give a list of them"))
