@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.checks import AtRest, Coulomb, Rankine
+from vi_contact.engineering.checks import AtRest, CoulombWedge, Rankine
 from vi_contact.engineering.checks.earth_pressure_static import wedge
 
 pytestmark = pytest.mark.serial
@@ -75,7 +75,7 @@ def test_textbook_coefficients() -> None:
     ]
     assert thrusts == pytest.approx([250e3 / 3.0, 750e3], rel=1e-14)
     slope = {"phi": 30.0 * DEGREE, "slope": 10.0 * DEGREE}
-    rankine, other = Rankine(**WALL, **slope), Coulomb(**WALL, **slope, delta=10.0 * DEGREE)
+    rankine, other = Rankine(**WALL, **slope), CoulombWedge(**WALL, **slope, delta=10.0 * DEGREE)
     assert rankine.compare(RUN).expected == pytest.approx(other.compare(RUN).expected, rel=1e-14)
     assert rankine.compare(RUN).expected / 250e3 / math.cos(10.0 * DEGREE) == pytest.approx(
         0.3495, abs=1e-4
@@ -119,7 +119,7 @@ def test_surcharge_on_a_slope_behind_a_batter() -> None:
         (35.0, 0.0, 20.0, -20.0),
     ):
         angles = [DEGREE * one for one in (phi, delta, slope, batter)]
-        found = Coulomb(
+        found = CoulombWedge(
             **soil, **dict(zip(("phi", "delta", "slope", "batter"), angles, strict=True))
         ).compare(RUN)
         searched = (
@@ -133,14 +133,14 @@ def test_surcharge_on_a_slope_behind_a_batter() -> None:
 
 def test_passive_is_told() -> None:
     """In name and inputs, and where its ground does not stand or its wedge is not at rest."""
-    told = {one: Coulomb(**WALL, phi=0.5, passive=one).compare(RUN) for one in (False, True)}
-    assert [told[one].name for one in (False, True)] == ["Coulomb", "Coulomb, passive"]
+    told = {one: CoulombWedge(**WALL, phi=0.5, passive=one).compare(RUN) for one in (False, True)}
+    assert [told[one].name for one in (False, True)] == ["CoulombWedge", "CoulombWedge, passive"]
     assert told[True].inputs == told[False].inputs | {"passive": (1.0, "-")}
     for slope, words in (
         (0.6, "the ground is steeper than phi"),
         (-0.6, "phi + slope - psi is below zero, psi = 0"),
     ):
-        steep = Coulomb(**WALL, phi=0.5, slope=slope, passive=True).compare(RUN)
+        steep = CoulombWedge(**WALL, phi=0.5, slope=slope, passive=True).compare(RUN)
         assert words in steep.applies and math.isnan(steep.expected)
 
 
@@ -152,11 +152,11 @@ def test_outside_its_range_no_number_is_claimed() -> None:
         and steep.found == 9e4
     )
     for delta, passive, words in ((0.6, False, "above 0.5:"), (0.3, True, "above 0.25:")):
-        rough = Coulomb(**WALL, phi=0.5, delta=delta, passive=passive).compare(RUN)
+        rough = CoulombWedge(**WALL, phi=0.5, delta=delta, passive=passive).compare(RUN)
         assert math.isnan(rough.expected) and math.isnan(rough.ratio) and words in rough.applies
     assert (
         "below zero, psi = 0: no wedge is at rest"
-        in Coulomb(**WALL, phi=0.5, slope=0.6).compare(RUN).applies
+        in CoulombWedge(**WALL, phi=0.5, slope=0.6).compare(RUN).applies
     )
     unknown = AtRest(**WALL, nu=0.3, part="stem").compare(RUN)
     assert unknown.unit == "N/m" and unknown.inputs["nu"] == (0.3, "-")
@@ -170,7 +170,7 @@ def test_outside_its_range_no_number_is_claimed() -> None:
     [
         ({"phi": 30.0}, "phi is 30.0; give one from 0 to 1.57 radians; 30 degrees"),
         ({"phi": 0.5, "height": -1.0}, "height is -1.0; give a finite number above zero in m"),
-        ({"phi": 0.5, "of": "moment"}, "unknown Coulomb: of 'moment'"),
+        ({"phi": 0.5, "of": "moment"}, "unknown CoulombWedge: of 'moment'"),
         (
             {"phi": 0.5, "surcharge": -1.0},
             "surcharge is -1.0; give zero or a positive finite number in Pa",
@@ -179,4 +179,4 @@ def test_outside_its_range_no_number_is_claimed() -> None:
 )
 def test_wrong_fields(wrong: dict, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        Coulomb(**(WALL | wrong))
+        CoulombWedge(**(WALL | wrong))

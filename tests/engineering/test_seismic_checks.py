@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from demos.exact.housner import HousnerBlock
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.checks import (
-    Coulomb,
+    CoulombWedge,
     Housner,
     MononobeOkabe,
     NewmarkBlock,
@@ -77,7 +77,7 @@ def test_mononobe_okabe_in_a_run() -> None:
     assert given.found == history["N_wall"].max()
     lifted = MononobeOkabe(**WALL, phi=0.6, delta=0.3, kh=0.2, kv=0.1).compare(history)
     still = MononobeOkabe(**WALL, phi=0.6, delta=0.3, kh=0.0).compare(history)
-    assert still.expected == Coulomb(**WALL, phi=0.6, delta=0.3).compare(history).expected
+    assert still.expected == CoulombWedge(**WALL, phi=0.6, delta=0.3).compare(history).expected
     factor = 0.9 * wedge(0.6, 0.3, 0.0, 0.0, psi=math.atan(0.2 / 0.9)) / wedge(0.6, 0.3, 0.0, 0.0)
     assert lifted.expected == pytest.approx(factor * still.expected, rel=1e-14)
     beyond = MononobeOkabe(**WALL, phi=0.5, kh=0.6).compare(history)

@@ -81,6 +81,17 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 3
 
 
+def test_the_old_word_of_the_wedge_is_read_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Up to 0.2 the check was called Coulomb, as the friction law is."""
+    old = RANKINE.replace("Rankine", "Coulomb")
+    (tmp_path / "layer.toml").write_text(LAYER + old, encoding="utf-8")
+    read_case(tmp_path / "layer.toml").check()
+    told = [record.getMessage() for record in caplog.records]
+    assert any("type 'Coulomb' is now 'CoulombWedge': write that" in one for one in told), told
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

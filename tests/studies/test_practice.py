@@ -114,7 +114,7 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
     assert list(found) == [
         "AtRest",
         "Rankine",
-        "Coulomb",
+        "CoulombWedge",
         "MononobeOkabe",
         "Wood",
         "VeletsosYounan",

@@ -1,13 +1,15 @@
 """Hold the names that have changed since version 0.2.0, so that old programs are told the new ones.
 
 A name stays here for the versions that docs/reference/releases.md promises. ``core.lazy`` gives the
-thing of the new name with a DeprecationWarning, and case files name the new word.
+thing of the new name with a DeprecationWarning, and a case file with an old word is read with a
+warning in the log.
 """
 
 from __future__ import annotations
 
 # Package -> old public name -> dotted path of the new one.
 NAMES: dict[str, dict[str, str]] = {
+    "vi_contact.engineering.checks": {"Coulomb": "vi_contact.engineering.checks.CoulombWedge"},
     "vi_contact.engineering": {
         "Racking": "vi_contact.Racking",
         "Resultants": "vi_contact.Resultants",
@@ -20,4 +22,6 @@ NAMES: dict[str, dict[str, str]] = {
 }
 
 # Old word of a case file or an option -> new word.
-WORDS: dict[str, str] = {}
+WORDS: dict[str, str] = {
+    "Coulomb": "CoulombWedge",  # of [[check]]: the friction law keeps the name
+}

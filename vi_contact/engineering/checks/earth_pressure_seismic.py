@@ -18,7 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 from ...core.algebra import Array
 from ...core.quantities import RATIO, Between, Positive, Unit
 from .comparison import Formula, History, Length, Numbers, Poisson
-from .earth_pressure_static import WALL_ANSWERS, WALL_COLUMNS, Coulomb, EarthPressure
+from .earth_pressure_static import WALL_ANSWERS, WALL_COLUMNS, CoulombWedge, EarthPressure
 
 # CHOSEN: share of the layer's lowest frequency below which inertia adds less than 5 %, 1/sqrt(1 -
 # 0.3²)
@@ -49,7 +49,7 @@ def smooth_wall(nu: float, length: float, terms: int = 2000) -> tuple[float, flo
 
 
 @dataclass(frozen=True, kw_only=True)
-class MononobeOkabe(Coulomb):
+class MononobeOkabe(CoulombWedge):
     """Expect the largest thrust of Coulomb's wedge.
 
     Weight and earthquake act together; the thrust acts at H/3 in this theory.

@@ -176,7 +176,7 @@ class Rankine(EarthPressure):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coulomb(EarthPressure):
+class CoulombWedge(EarthPressure):
     """Expect the thrust of a plane wedge of soil.
 
     The wedge slides on the wall and on the ground below it.

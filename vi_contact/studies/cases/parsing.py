@@ -1,5 +1,6 @@
 """Read values of a TOML file into nodes of calls, by type hints; see ``table_calls``."""
 
+import logging
 import os
 import types
 from collections import ChainMap
@@ -15,6 +16,8 @@ from ...core.renamed import WORDS
 from .own_classes import own_class
 from .quantities import FIELD, HISTORY, Expression, list_node, text_node
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -200,6 +203,10 @@ def _chosen(
         return own_class(word, kinds, words.allowed, spot)
     if word is None:
         raise spot.inside(f"has no type: give type = one of {', '.join(choices)}")
+    renamed = WORDS.get(str(word))
+    if renamed is not None and word not in choices and renamed in choices:
+        log.warning("%s", spot.inside(f"type {_shown(word)} is now {_shown(renamed)}: write that"))
+        return choices[renamed]
     if not isinstance(word, str) or word not in choices:
         raise spot.inside(f"has the unknown type {_shown(word)}: {nearest(word, choices)}")
     return choices[word]
