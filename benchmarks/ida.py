@@ -2,7 +2,7 @@
 r"""Measure what an incremental dynamic analysis costs with eight runs in a process, or with one.
 
     python3 benchmarks/ida.py [--records 20] [--scales 5] [--duration 4] [--mesh 4 6] [--json FILE]
-    python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= \
+    python3 benchmarks/ida.py --case vi_contact/practice/studies/starters/wall.toml --set fields= \
         --scales 10 --step 0.2 --duration 10 --jobs 2
 
 The case is the wall of demos/cases/wall_record.toml, which begins under its weight and slides with
@@ -39,8 +39,8 @@ sys.path.insert(0, str(ROOT))
 import numpy as np  # noqa: E402
 
 from vi_contact import ground_motion  # noqa: E402
-from vi_contact.studies import IDA, read_case, run_ida  # noqa: E402
-from vi_contact.studies.ida import processes  # noqa: E402
+from vi_contact.practice.studies import IDA, read_case, run_ida  # noqa: E402
+from vi_contact.practice.studies.ida import processes  # noqa: E402
 
 DEMANDS = ("contact_uplift:max", "contact_resultant:max", "u_x_top:min")
 

@@ -148,7 +148,7 @@ def told(*_, **__):
     os._exit(0)
 
 import_module("vi_contact.run.march").March._attempt = told  # imported by the command in any case
-from vi_contact.cli.entry import main
+from vi_contact.practice.cli.entry import main
 main(["run", "wall", "--quiet", "--out", sys.argv[1]])
 """
 

@@ -41,7 +41,7 @@ import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.fem.compat import geometry_dofmap  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
-from vi_contact.soil import FreeField, upgoing  # noqa: E402
+from vi_contact.practice.soil import FreeField, upgoing  # noqa: E402
 
 NU = 0.25
 LENGTH = 2.5  # of the packet, in wavelengths

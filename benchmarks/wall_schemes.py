@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from vi_contact.cli.entry import main as command
+from vi_contact.practice.cli.entry import main as command
 
 SCHEMES = {  # the first column of the table -> what is added to vi-contact run wall
     "`ZienkiewiczWoodTaylor`": [],

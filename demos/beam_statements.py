@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from demos.pictures.beam_statements import plot_statements
 from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, row
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

@@ -29,7 +29,7 @@ import vi_contact as vc
 from demos.exact.bar import PeriodicBar
 from demos.pictures.bars import plot_bounces
 from demos.problems.bar import Bar, build
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

@@ -40,7 +40,7 @@ from demos.problems.boundary_elements import (
 from demos.problems.compare_tractions import Tractions, compared
 from demos.problems.interior import interior_displacement
 from vi_contact import bem
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

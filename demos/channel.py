@@ -37,10 +37,10 @@ from demos.pictures.friction import plot_states
 from demos.pictures.histories import plot_energy, plot_excitation
 from demos.problems.channel import REFERENCE, Channel, build
 from vi_contact import fem
-from vi_contact.cli import main as command
-from vi_contact.cli import status_of
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.plots.histories import History
+from vi_contact.practice.cli import main as command
+from vi_contact.practice.cli import status_of
+from vi_contact.practice.plots.histories import History
 from vi_contact.run.static import static_equilibrium
 
 # Parameters

@@ -30,8 +30,8 @@ from demos.pictures.runs import plot_runs
 from demos.problems.embedded import Embedded, build
 from demos.problems.square import concrete
 from vi_contact import fem
-from vi_contact.cli import status_of
-from vi_contact.plots.histories import History
+from vi_contact.practice.cli import status_of
+from vi_contact.practice.plots.histories import History
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

@@ -30,8 +30,8 @@ from mpi4py import MPI
 from demos.exact.crack import critical, homogeneous
 from demos.pictures.bounds import gathered, plot_crack
 from vi_contact import vi
-from vi_contact.cli import status_of
 from vi_contact.fem import compat
+from vi_contact.practice.cli import status_of
 from vi_contact.solvers import ReducedNewton
 
 # Parameters

@@ -24,7 +24,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem, laws, meshes
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

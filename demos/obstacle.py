@@ -26,7 +26,7 @@ from demos.exact.membrane import HALF, Membrane
 from demos.pictures.bounds import gathered, plot_membrane
 from demos.problems.membrane import build
 from vi_contact import vi
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

@@ -39,9 +39,9 @@ from demos.pictures import raft as pictures
 from demos.pictures.histories import plot_certificate, plot_energy
 from meshes.raft import RaftMesh
 from vi_contact import fem, ground_motion, soil
-from vi_contact.cli import status_of
-from vi_contact.plots.bodies import film, plot_deformed
-from vi_contact.plots.faces import plot_faces
+from vi_contact.practice.cli import status_of
+from vi_contact.practice.plots.bodies import film, plot_deformed
+from vi_contact.practice.plots.faces import plot_faces
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ from demos.pictures.histories import plot_certificate, plot_energy
 from demos.pictures.rocking import plot_pulses, plot_rocking
 from demos.problems import rocking_block as rocking
 from vi_contact import fem
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

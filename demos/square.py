@@ -32,8 +32,8 @@ from demos.pictures.deformed import plot_snapshots, plot_tractions
 from demos.pictures.runs import plot_runs
 from demos.problems.square import Square, build
 from vi_contact import fem
-from vi_contact.cli import status_of
-from vi_contact.plots.histories import History
+from vi_contact.practice.cli import status_of
+from vi_contact.practice.plots.histories import History
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

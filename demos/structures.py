@@ -27,7 +27,7 @@ import vi_contact as vc
 from demos.exact.structures import arm_flexibility, stop_force
 from demos.pictures.structures import Shown, plot_structures
 from demos.problems import structures as posed
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

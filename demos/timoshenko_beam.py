@@ -41,7 +41,7 @@ from vi_contact.beam.published import (
     published_start,
     readings,
 )
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

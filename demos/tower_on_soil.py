@@ -28,9 +28,9 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.histories import plot_certificate, plot_energy
 from vi_contact import fem, soil
-from vi_contact.cli import status_of
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.practice.cli import status_of
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

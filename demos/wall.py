@@ -34,8 +34,8 @@ from demos.pictures.wall import plot_data, plot_decomposition, plot_frames
 from demos.problems import wall as wall_model
 from demos.problems.decomposition import split
 from vi_contact import fem
-from vi_contact.cli import main as command
-from vi_contact.cli import status_of
+from vi_contact.practice.cli import main as command
+from vi_contact.practice.cli import status_of
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 

@@ -7,5 +7,7 @@ scipy only. All else has a room: ``vi_contact.fem`` (meshes, assembly, surfaces)
 """
 
 from .core.lazy import lazy
+from .core.moved_rooms import accept_old_paths
 
 __all__, __getattr__, __dir__ = lazy(__name__, __file__)
+accept_old_paths()

@@ -17,8 +17,6 @@ from .core import ViContactError as ViContactError
 from .core.version import __version__ as __version__
 from .fem.contact.points import contact_points as contact_points
 from .fem.matrices.own_matrices import system_from_arrays as system_from_arrays
-from .ground_motion import GroundMotion as GroundMotion
-from .ground_motion import read_record as read_record
 from .laws import ComponentReset as ComponentReset
 from .laws import ConsistentMass as ConsistentMass
 from .laws import Coulomb as Coulomb
@@ -48,6 +46,13 @@ from .laws import StaticKinetic as StaticKinetic
 from .laws import Tabulated as Tabulated
 from .laws import Tresca as Tresca
 from .laws import with_weight as with_weight
+from .practice import engineering as engineering
+from .practice import ground_motion as ground_motion
+from .practice import plots as plots
+from .practice import soil as soil
+from .practice import studies as studies
+from .practice.ground_motion import GroundMotion as GroundMotion
+from .practice.ground_motion import read_record as read_record
 from .run import Contact as Contact
 from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy

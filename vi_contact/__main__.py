@@ -1,6 +1,6 @@
 """``python3 -m vi_contact``: the command line."""
 
-from .cli.entry import main
+from .practice.cli.entry import main
 
 if __name__ == "__main__":
     raise SystemExit(main())

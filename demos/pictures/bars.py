@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import History, canvas, save
+from vi_contact.practice.plots.histories import History, canvas, save
 
 COLUMNS = (
     "displacement of the foot [m]",

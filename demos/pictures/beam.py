@@ -13,7 +13,7 @@ import numpy as np
 
 from vi_contact.beam import BeamRun
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import History, canvas, panels, save
+from vi_contact.practice.plots.histories import History, canvas, panels, save
 
 _QUANTITIES = (
     "(A) rotation [-]",

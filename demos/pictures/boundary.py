@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import canvas, save, scale
+from vi_contact.practice.plots.histories import canvas, save, scale
 
 ARROW = 0.3  # length of the longest arrow of a row over the size of its bodies
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from demos.exact.membrane import HALF, Membrane
-from vi_contact.plots.histories import canvas, plain_numbers, save
+from vi_contact.practice.plots.histories import canvas, plain_numbers, save
 
 
 def gathered(function: Any) -> tuple[Any, Any] | None:

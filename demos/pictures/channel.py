@@ -25,7 +25,7 @@ from demos.pictures.channel_mesh import (
     plane,
     read_bodies,
 )
-from vi_contact.plots.histories import History, canvas, panels, save
+from vi_contact.practice.plots.histories import History, canvas, panels, save
 
 
 def plot_layout(

@@ -12,8 +12,16 @@ import numpy as np
 
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.errors import InputError
-from vi_contact.plots.histories import History, canvas, cell_edges, panels, save, scale, shaken
-from vi_contact.plots.maps import thinned
+from vi_contact.practice.plots.histories import (
+    History,
+    canvas,
+    cell_edges,
+    panels,
+    save,
+    scale,
+    shaken,
+)
+from vi_contact.practice.plots.maps import thinned
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
     "tops of the walls": {"19": (-1.0, 0.0), "13": (1.0, 0.0)},

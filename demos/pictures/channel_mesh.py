@@ -15,8 +15,8 @@ import numpy as np
 from demos.pictures.tractions import Tractions, read_tractions
 from vi_contact.core.algebra import Array, Indices, Mask
 from vi_contact.core.errors import InputError
-from vi_contact.plots.deformed import StoredFrames, read_frames
-from vi_contact.plots.histories import History, canvas, scale
+from vi_contact.practice.plots.deformed import StoredFrames, read_frames
+from vi_contact.practice.plots.histories import History, canvas, scale
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures

@@ -10,8 +10,8 @@ import numpy as np
 
 from demos.pictures.tractions import Tractions, read_tractions
 from vi_contact.core.algebra import Array
-from vi_contact.plots.deformed import StoredFrames, read_frames
-from vi_contact.plots.histories import canvas, save, scale, scaled
+from vi_contact.practice.plots.deformed import StoredFrames, read_frames
+from vi_contact.practice.plots.histories import canvas, save, scale, scaled
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
 

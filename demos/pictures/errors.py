@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vi_contact.plots.histories import canvas, plain_numbers, save
+from vi_contact.practice.plots.histories import canvas, plain_numbers, save
 
 STYLES: dict[str, dict[str, Any]] = {
     "symmetric": {"color": "black", "marker": "o", "ms": 5, "lw": 1.2},

@@ -11,9 +11,9 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.plots.deformed import contact_states
-from vi_contact.plots.faces import STATES
-from vi_contact.plots.histories import (
+from vi_contact.practice.plots.deformed import contact_states
+from vi_contact.practice.plots.faces import STATES
+from vi_contact.practice.plots.histories import (
     History,
     canvas,
     cell_edges,

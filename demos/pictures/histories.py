@@ -13,7 +13,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.plots.histories import (
+from vi_contact.practice.plots.histories import (
     LEDGER,
     History,
     length_unit,
@@ -23,7 +23,7 @@ from vi_contact.plots.histories import (
     scale,
     shaken,
 )
-from vi_contact.plots.maps import arc_position, coloured
+from vi_contact.practice.plots.maps import arc_position, coloured
 
 SOIL = "_soil"  # after the label of a point: that of the soil which touches it
 

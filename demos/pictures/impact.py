@@ -10,7 +10,7 @@ import numpy as np
 
 from demos.exact.hertz import HertzImpact
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import canvas, save
+from vi_contact.practice.plots.histories import canvas, save
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from vi_contact.plots.histories import canvas, plain_numbers, save
+from vi_contact.practice.plots.histories import canvas, plain_numbers, save
 
 Row = dict[str, Any]
 LOOK = {

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import History, canvas, panels, save, scale
+from vi_contact.practice.plots.histories import History, canvas, panels, save, scale
 
 CORNERS = {
     f"{x}_{y}": (i, j)

@@ -7,7 +7,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Indices
 from vi_contact.core.errors import InputError
-from vi_contact.plots.bodies import Scene
+from vi_contact.practice.plots.bodies import Scene
 from vi_contact.run.files.reading import RunFolder
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import History, panels, save
+from vi_contact.practice.plots.histories import History, panels, save
 
 
 def plot_rocking(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vi_contact.plots.histories import History, panels, save, scale
+from vi_contact.practice.plots.histories import History, panels, save, scale
 
 
 def plot_runs(

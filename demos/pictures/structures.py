@@ -14,7 +14,7 @@ import numpy as np
 
 from demos.exact.structures import DiskOnGround, LiftedBeam
 from vi_contact.core.algebra import Array
-from vi_contact.plots.histories import canvas, plain_numbers, save
+from vi_contact.practice.plots.histories import canvas, plain_numbers, save
 
 LARGER = 10.0  # how much larger displacements of the frame are drawn
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.plots.deformed import nearest, stored_tangents
+from vi_contact.practice.plots.deformed import nearest, stored_tangents
 from vi_contact.run.files.reading import read_run
 
 

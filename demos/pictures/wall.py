@@ -15,8 +15,8 @@ import numpy as np
 from demos.pictures.tractions import read_tractions
 from demos.problems.decomposition import Decomposition
 from demos.problems.wall import Wall
-from vi_contact.plots.deformed import nearest, read_frames
-from vi_contact.plots.histories import canvas, save, scale
+from vi_contact.practice.plots.deformed import nearest, read_frames
+from vi_contact.practice.plots.histories import canvas, save, scale
 
 GROUND, WALL, CONTACT = "0.87", "#e8dfc8", "#c0392b"
 PRESSURE = "tab:blue"

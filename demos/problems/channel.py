@@ -34,8 +34,8 @@ from vi_contact.laws.mass import ConsistentMass
 from vi_contact.laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
 from vi_contact.laws.weight import with_weight
 from vi_contact.meshes.channel import ChannelMesh
+from vi_contact.practice.soil.moving_base import BaseMotion
 from vi_contact.run.recorders import Contact, Energy, Probe
-from vi_contact.soil.moving_base import BaseMotion
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 

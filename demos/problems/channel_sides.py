@@ -14,9 +14,9 @@ from vi_contact.fem.body.dashpots import CompliantBase, Dashpots
 from vi_contact.fem.body.loads import Prescribed
 from vi_contact.fem.body.ties import Tied
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.soil.free_field import FreeField
-from vi_contact.soil.moving_base import BaseMotion, base_motion
-from vi_contact.soil.upgoing_wave import upgoing
+from vi_contact.practice.soil.free_field import FreeField
+from vi_contact.practice.soil.moving_base import BaseMotion, base_motion
+from vi_contact.practice.soil.upgoing_wave import upgoing
 
 ENDS = ("left_side", "right_side")
 

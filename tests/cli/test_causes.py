@@ -19,11 +19,11 @@ from drawn_run import drawn_run
 from marched_chain import chain, run
 
 from vi_contact import ground_motion
-from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.checks import on_all
 from vi_contact.core.errors import InputError, ViContactError, of_machine, of_memory
 from vi_contact.core.files import sentence
+from vi_contact.practice.cli.entry import main
 from vi_contact.run.files.checkpoint import read_checkpoint
 from vi_contact.run.files.reading import read_run
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -71,9 +71,9 @@ WHERE = (
     "vi_contact.run.files.reading.read_bytes",
     "vi_contact.run.files.reading.open_hdf5",
     "vi_contact.run.files.reading.numbers_of",
-    "vi_contact.plots.deformed.open_hdf5",
+    "vi_contact.practice.plots.deformed.open_hdf5",
     "vi_contact.core.hdf5.StoredGroup.__getitem__",
-    "vi_contact.studies.report.sketch",
+    "vi_contact.practice.studies.report.sketch",
     "matplotlib.figure.Figure.savefig",
 )
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import vi_contact
-from vi_contact.cli import errors as cli_errors
-from vi_contact.cli.entry import main, split_petsc
-from vi_contact.cli.errors import told
 from vi_contact.core.errors import InputError, ViContactError
+from vi_contact.practice.cli import errors as cli_errors
+from vi_contact.practice.cli.entry import main, split_petsc
+from vi_contact.practice.cli.errors import told
 
 pytestmark = pytest.mark.serial
 ROOT = Path(vi_contact.__file__).parent.parent
@@ -216,7 +216,7 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
     monkeypatch.setattr(cli_errors, "PATIENCE", 0.0)
     monkeypatch.setattr(
-        "vi_contact.cli.entry.parser",
+        "vi_contact.practice.cli.entry.parser",
         lambda *_: SimpleNamespace(parse_args=lambda words: SimpleNamespace(run=fails)),
     )
     if others == "wait":

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from vi_contact.cli.entry import main
-from vi_contact.cli.motion import acceleration
-from vi_contact.ground_motion import (
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.cli.motion import acceleration
+from vi_contact.practice.ground_motion import (
     EC8Spectrum,
     Record,
     arias,
@@ -20,7 +20,7 @@ from vi_contact.ground_motion import (
     response_spectrum,
     write_at2,
 )
-from vi_contact.plots.records import plot_motion, plot_spectra
+from vi_contact.practice.plots.records import plot_motion, plot_spectra
 
 pytestmark = pytest.mark.serial
 

@@ -18,14 +18,14 @@ WITHOUT = (  # what the wall has no use for
     "scipy.spatial",
     "scipy.interpolate",
     "vi_contact.bem",
-    "vi_contact.plots",
-    "vi_contact.studies.ida",
-    "vi_contact.ground_motion.formats",
+    "vi_contact.practice.plots",
+    "vi_contact.practice.studies.ida",
+    "vi_contact.practice.ground_motion.formats",
     "vi_contact.run.files.reading",
 )
 CODE = """
 import sys
-from vi_contact.cli.entry import main
+from vi_contact.practice.cli.entry import main
 status = main(["run", "wall", "--steps", "1", "--quiet", "--out", sys.argv[1]])
 print(*sorted(sys.modules), sep="\\n")
 raise SystemExit(status)

@@ -9,7 +9,7 @@ import pytest
 
 import vi_contact
 from vi_contact.core import renamed
-from vi_contact.studies.cases.parsing import nearest
+from vi_contact.practice.studies.cases.parsing import nearest
 
 pytestmark = pytest.mark.serial
 

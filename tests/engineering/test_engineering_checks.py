@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.checks import AtRest, CoulombWedge, Rankine
-from vi_contact.engineering.checks.earth_pressure_static import wedge
+from vi_contact.practice.engineering.checks import AtRest, CoulombWedge, Rankine
+from vi_contact.practice.engineering.checks.earth_pressure_static import wedge
 
 pytestmark = pytest.mark.serial
 DEGREE = math.pi / 180.0

@@ -14,7 +14,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.studies import read_case
+from vi_contact.practice.studies import read_case
 
 G, RHO = 9.80665, 2000.0
 B, H, N = 4.0, 6.0, 12  # [m], and cells over the height

@@ -16,9 +16,9 @@ import vi_contact as vc
 from vi_contact import engineering
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.floor_spectra import konno_ohmachi
-from vi_contact.engineering.peak_values import HEADER
-from vi_contact.plots.maps import arc_position, thinned
+from vi_contact.practice.engineering.floor_spectra import konno_ohmachi
+from vi_contact.practice.engineering.peak_values import HEADER
+from vi_contact.practice.plots.maps import arc_position, thinned
 from vi_contact.run.recorders.racking import racking
 
 pytestmark = pytest.mark.serial

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from demos.exact.housner import HousnerBlock
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.checks import (
+from vi_contact.practice.engineering.checks import (
     CoulombWedge,
     Housner,
     MononobeOkabe,
@@ -24,8 +24,8 @@ from vi_contact.engineering.checks import (
     VeletsosYounan,
     Wood,
 )
-from vi_contact.engineering.checks.earth_pressure_seismic import smooth_wall
-from vi_contact.engineering.checks.earth_pressure_static import wedge
+from vi_contact.practice.engineering.checks.earth_pressure_seismic import smooth_wall
+from vi_contact.practice.engineering.checks.earth_pressure_static import wedge
 
 pytestmark = pytest.mark.serial
 DEGREE, G = math.pi / 180.0, 9.80665

@@ -10,7 +10,7 @@ from thin_lining import ThinLining
 
 from vi_contact import LinearElastic
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.checks.racking_ratio import flexibility, racking_ratio
+from vi_contact.practice.engineering.checks.racking_ratio import flexibility, racking_ratio
 
 pytestmark = pytest.mark.serial
 CONCRETE, SOIL, GAMMA = (

@@ -14,8 +14,8 @@ from soil import SOIL, column_of
 
 import vi_contact as vc
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import Record
-from vi_contact.soil import upgoing
+from vi_contact.practice.ground_motion import Record
+from vi_contact.practice.soil import upgoing
 
 pytestmark = pytest.mark.serial
 ANGLES = (15, 30, 45, 60, 75, 85)

@@ -30,7 +30,7 @@ from vi_contact.fem.mesh.tagged_mesh import Facets
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.soil.moving_base import base_motion
+from vi_contact.practice.soil.moving_base import base_motion
 from vi_contact.solvers.volume.route import Volume
 
 COMM = MPI.COMM_WORLD

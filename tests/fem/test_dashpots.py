@@ -17,7 +17,7 @@ from wave_packet import energy_sent_back
 import vi_contact as vc
 from vi_contact import fem, soil
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion.record import Record
+from vi_contact.practice.ground_motion.record import Record
 
 HEIGHT, CELLS = 20.0, 80  # of 0.25 m
 WAVES = {"S": (SOIL.c_s, (1.0, 0.0)), "P": (SOIL.c_p, (0.0, 1.0))}

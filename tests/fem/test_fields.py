@@ -30,7 +30,7 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.output.fields import XDMF, VonMises
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, PlaneStress, Section
-from vi_contact.plots.deformed import read_frames
+from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.run.march import march
 from vi_contact.run.recorders import Contact
 from vi_contact.run.simulate import Solution, simulate

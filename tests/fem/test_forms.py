@@ -36,7 +36,7 @@ from vi_contact.laws import (
     with_weight,
 )
 from vi_contact.laws.mass import ConsistentMass, Redistributed
-from vi_contact.plots.deformed import read_frames
+from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.run.files.identity import differences, identity
 from vi_contact.run.modal import lowest_frequency
 from vi_contact.solvers import Lemke

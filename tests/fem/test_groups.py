@@ -24,7 +24,7 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.fem import compat
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.plots.deformed import read_frames
+from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.run.recorders import Contact, Energy
 from vi_contact.run.simulate import Solution, simulate
 from vi_contact.run.static import static_equilibrium

@@ -37,9 +37,9 @@ from vi_contact.laws import (
     Rayleigh,
     with_weight,
 )
+from vi_contact.practice.soil import FreeField
 from vi_contact.run.modal import lowest_frequency
 from vi_contact.run.static import static_equilibrium
-from vi_contact.soil import FreeField
 
 SPRUCE = {
     "E1": 11.6e9,

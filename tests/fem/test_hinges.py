@@ -14,7 +14,7 @@ from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes import BlockMesh, CutOpen, TwoBlocks
 from vi_contact.meshes.extract import add_arrays, arrays_of
-from vi_contact.studies import read_case
+from vi_contact.practice.studies import read_case
 
 COMM = MPI.COMM_WORLD
 ROCK = vc.LinearElastic(E=1e9, nu=0.2, rho=2000.0)

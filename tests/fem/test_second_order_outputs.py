@@ -27,9 +27,9 @@ from vi_contact.fem import compat
 from vi_contact.fem.output import fields, functions
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen
-from vi_contact.plots.bodies import Scene, plot_deformed
-from vi_contact.plots.deformed import read_frames
-from vi_contact.soil.free_field import FreeField
+from vi_contact.practice.plots.bodies import Scene, plot_deformed
+from vi_contact.practice.plots.deformed import read_frames
+from vi_contact.practice.soil.free_field import FreeField
 
 COMM = MPI.COMM_WORLD
 P = 1.0e4

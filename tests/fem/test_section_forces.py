@@ -16,8 +16,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.state_checks import initial_state
 from vi_contact.fem import compat
+from vi_contact.practice.soil.moving_base import base_motion
 from vi_contact.run.recorders.contact_parts import tangent_vectors
-from vi_contact.soil.moving_base import base_motion
 
 WIDTH, HEIGHT = 0.5, 4.0
 TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³

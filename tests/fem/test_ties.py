@@ -14,7 +14,7 @@ from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.soil.soil_column import SoilColumn
+from vi_contact.practice.soil.soil_column import SoilColumn
 
 
 @pytest.mark.parametrize("simplices", [False, True])

@@ -10,9 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import Record, read_record, record_info, write_at2, write_columns
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.ground_motion import (
+    Record,
+    read_record,
+    record_info,
+    write_at2,
+    write_columns,
+)
 
 pytestmark = pytest.mark.serial
 G = 9.80665

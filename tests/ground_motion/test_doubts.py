@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import (
+from vi_contact.practice.ground_motion import (
     KanaiTajimi,
     Record,
     filtered,

@@ -8,7 +8,7 @@ import pytest
 from record_files import AFAD, COUNTS, VALUES, cosmos, csmip, esm, knet, rows
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import (
+from vi_contact.practice.ground_motion import (
     Record,
     read_record,
     write_at2,

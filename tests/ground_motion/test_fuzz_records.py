@@ -16,7 +16,7 @@ import pytest
 from record_layouts import LAYOUTS, STEP, Grid, Layout
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import read_record
+from vi_contact.practice.ground_motion import read_record
 
 pytestmark = pytest.mark.serial
 SAMPLES = 43  # of a mutated record: the last row of ten, eight, five and four is short

@@ -11,7 +11,7 @@ import pytest
 from record_layouts import LAYOUTS, geonet, unam_head, volume1_head
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import read_record
+from vi_contact.practice.ground_motion import read_record
 
 pytestmark = pytest.mark.serial
 G = 9.80665

@@ -8,7 +8,7 @@ import pytest
 import record_files
 
 from vi_contact.core.errors import InputError, ViContactError
-from vi_contact.ground_motion import UNITS, read_record
+from vi_contact.practice.ground_motion import UNITS, read_record
 
 pytestmark = pytest.mark.serial
 

@@ -9,7 +9,7 @@ import pytest
 from shared_records import EL_CENTRO, LOMA, shared
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import (
+from vi_contact.practice.ground_motion import (
     STANDARD_GRAVITY,
     Record,
     arias,

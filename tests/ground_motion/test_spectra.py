@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from shared_records import EL_CENTRO, shared
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import (
+from vi_contact.practice.ground_motion import (
     STANDARD_GRAVITY,
     Record,
     arias,
@@ -30,7 +30,7 @@ from vi_contact.ground_motion import (
     rms,
     significant_duration,
 )
-from vi_contact.ground_motion.spectra import _factors, _moved
+from vi_contact.practice.ground_motion.spectra import _factors, _moved
 
 pytestmark = pytest.mark.serial
 

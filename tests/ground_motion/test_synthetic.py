@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import EC8Spectrum, Envelope, KanaiTajimi, pga, synthetic
+from vi_contact.practice.ground_motion import EC8Spectrum, Envelope, KanaiTajimi, pga, synthetic
 
 pytestmark = pytest.mark.serial
 

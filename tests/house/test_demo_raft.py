@@ -15,7 +15,7 @@ from meshes.raft import RaftMesh
 from vi_contact import read_run, simulate
 from vi_contact.core.files import on_root
 from vi_contact.meshes.gmsh_session import write
-from vi_contact.studies.cases.case import read_case
+from vi_contact.practice.studies.cases.case import read_case
 
 FIGURES = ("motions", "moments", "energy", "certificate")
 

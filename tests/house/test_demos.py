@@ -19,8 +19,8 @@ import pytest
 from demo_runs import ROOT, demo
 from pictures import is_drawn
 
-from vi_contact.cli.entry import main
-from vi_contact.ground_motion import Record, pga, read_record
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.ground_motion import Record, pga, read_record
 
 SHARED = Path(
     os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions")

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import vi_contact
-from vi_contact.cli.entry import parser
+from vi_contact.practice.cli.entry import parser
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,7 +17,7 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from vi_contact.cli.entry import main
+from vi_contact.practice.cli.entry import main
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
@@ -136,7 +136,7 @@ def test_a_scheme_is_one_file_and_one_registry_line(tmp_path: Path) -> None:
     asked = """
 import vi_contact as vc
 from vi_contact.core.step import Scheme
-from vi_contact.studies.cases.vocabulary import names_of
+from vi_contact.practice.studies.cases.vocabulary import names_of
 name = "BackwardEuler"
 print(vc.BackwardEuler(), name in vc.__all__, name in names_of(Scheme), vc.__file__)
 """

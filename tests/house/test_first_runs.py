@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from site_pages import blocks
 
-from vi_contact.cli.entry import main
+from vi_contact.practice.cli.entry import main
 
 
 def test_a_run_on_several_ranks(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from vi_contact.cli.entry import parser
+from vi_contact.practice.cli.entry import parser
 from vi_contact.run.solution import LINES
 
 pytestmark = pytest.mark.serial
@@ -38,7 +38,7 @@ def shipped() -> list[Path]:
 
 def test_tables_of_case_files_are_named() -> None:
     pytest.importorskip("dolfinx")
-    from vi_contact.studies.cases.schema import text
+    from vi_contact.practice.studies.cases.schema import text
 
     schema = json.loads(text())
     missing = {

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from site_pages import DOCS, ROOT, blocks, loaded
 
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.own_classes import GROUP
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.own_classes import GROUP
 
 pytestmark = pytest.mark.serial
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from vi_contact.studies.cases.library import FOLDER
+from vi_contact.practice.studies.cases.library import FOLDER
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -66,7 +66,7 @@ def test_compiled_form_gives_area_of_unit_square(comm: Any) -> None:
 def test_the_cases_that_ship_are_installed() -> None:
     """pip installs files that are no modules only where pyproject.toml names them."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    patterns = project["tool"]["setuptools"]["package-data"]["vi_contact.studies.cases"]
+    patterns = project["tool"]["setuptools"]["package-data"]["vi_contact.practice.studies.cases"]
     files = sorted(
         path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file()
     )

@@ -17,8 +17,8 @@ from public_callables import callables, right
 from vi_contact.core.arguments import _check, fits
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Between, Quantity, quantities
-from vi_contact.engineering import checks
-from vi_contact.studies.cases.vocabulary import _FUNCTIONS
+from vi_contact.practice.engineering import checks
+from vi_contact.practice.studies.cases.vocabulary import _FUNCTIONS
 
 pytestmark = pytest.mark.serial
 BEHIND = {  # checked behind what needs a body, which the tests of these have

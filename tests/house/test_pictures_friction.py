@@ -14,7 +14,7 @@ from demos.pictures import friction as plotting_friction
 from demos.pictures.friction import plot_hysteresis, plot_states
 from vi_contact.core.errors import InputError
 from vi_contact.laws.friction import Coulomb
-from vi_contact.plots.deformed import contact_states
+from vi_contact.practice.plots.deformed import contact_states
 from vi_contact.run.recorders import Contact
 from vi_contact.run.simulate import simulate
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from pictures import is_drawn
 
-from vi_contact.cli import main
+from vi_contact.practice.cli import main
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]

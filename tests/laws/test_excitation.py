@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import Record
-from vi_contact.ground_motion.excitation import GroundMotion
 from vi_contact.laws.excitation import FullSine, HalfSine, Harmonic, Rectangular, Ricker, Tabulated
+from vi_contact.practice.ground_motion import Record
+from vi_contact.practice.ground_motion.excitation import GroundMotion
 
 pytestmark = pytest.mark.serial
 

@@ -385,7 +385,7 @@ def test_a_case_file_cuts_between_two_cell_groups(tmp_path):
     from mpi4py import MPI
 
     import vi_contact as vc
-    from vi_contact.studies import read_case
+    from vi_contact.practice.studies import read_case
 
     (tmp_path / "dam.geo").write_text(DAM)
     (tmp_path / "dam.toml").write_text(CASE)

@@ -22,18 +22,18 @@ from demos.problems.channel_sides import (
     bedrock,
 )
 from vi_contact import fem
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
-from vi_contact.engineering import contact_summary
-from vi_contact.ground_motion import Record, read_record
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.studies.cases.case import read_case
-from vi_contact.studies.cases.library import located
-from vi_contact.studies.cases.short_settings import ShortOptions
-from vi_contact.studies.cases.table_calls import build as build_call
-from vi_contact.studies.cases.toml_file import read_toml
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.engineering import contact_summary
+from vi_contact.practice.ground_motion import Record, read_record
+from vi_contact.practice.studies.cases.case import read_case
+from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.short_settings import ShortOptions
+from vi_contact.practice.studies.cases.table_calls import build as build_call
+from vi_contact.practice.studies.cases.toml_file import read_toml
 
 COMM = MPI.COMM_WORLD
 serial = pytest.mark.serial

@@ -13,21 +13,21 @@ from mpi4py import MPI
 from demos.problems.wall import CASES, Wall, build
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
-from vi_contact.ground_motion import read_record
-from vi_contact.ground_motion.excitation import GroundMotion
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
+from vi_contact.practice.ground_motion import read_record
+from vi_contact.practice.ground_motion.excitation import GroundMotion
+from vi_contact.practice.studies.cases.case import Case, read_case
+from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.short_settings import ShortOptions
+from vi_contact.practice.studies.cases.toml_file import read_toml
 from vi_contact.run.march import march
 from vi_contact.run.modal import lowest_frequency
 from vi_contact.run.simulate import simulate
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.studies.cases.case import Case, read_case
-from vi_contact.studies.cases.library import located
-from vi_contact.studies.cases.short_settings import ShortOptions
-from vi_contact.studies.cases.toml_file import read_toml
 
 COMM = MPI.COMM_WORLD
 COARSE = Wall(divisions=(4, 6))

@@ -29,10 +29,10 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.files import open_hdf5
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.plots import bodies, faces
-from vi_contact.plots.bodies import film, plot_deformed
-from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
-from vi_contact.plots.faces import Painter, faces_of, leading, moments, plot_faces
+from vi_contact.practice.plots import bodies, faces
+from vi_contact.practice.plots.bodies import film, plot_deformed
+from vi_contact.practice.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
+from vi_contact.practice.plots.faces import Painter, faces_of, leading, moments, plot_faces
 from vi_contact.run.files.reading import RunFolder, read_run
 
 pytestmark = pytest.mark.serial

@@ -11,7 +11,7 @@ from chain import chain_problem
 from matplotlib.figure import Figure
 
 import vi_contact as vc
-from vi_contact.plots import plot_overview
+from vi_contact.practice.plots import plot_overview
 
 pytestmark = pytest.mark.serial
 SHAKE = vc.Harmonic(-30.0, 3.0, direction=(1.0,))

@@ -31,7 +31,7 @@ from demos.problems.channel import Channel, ChannelModel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.plots.bodies import draw_run, film
+from vi_contact.practice.plots.bodies import draw_run, film
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium
 

@@ -20,13 +20,13 @@ from written_runs import write_run
 
 import vi_contact as vc
 from vi_contact import engineering
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
-from vi_contact.plots.charts import smoothed
-from vi_contact.plots.pages import write_pages
-from vi_contact.plots.sections import Section, header_facts, sections_of
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.plots.charts import smoothed
+from vi_contact.practice.plots.pages import write_pages
+from vi_contact.practice.plots.sections import Section, header_facts, sections_of
+from vi_contact.practice.studies.report import report
 from vi_contact.run.files.reading import ContactGeometry, RunFolder, read_run
-from vi_contact.studies.report import report
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")

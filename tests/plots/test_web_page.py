@@ -15,10 +15,10 @@ import pytest
 from report_packages import browser, report_packages
 from written_runs import write_run
 
-from vi_contact.plots.sections import sections_of
-from vi_contact.plots.web_page import extremes, write_web_page
+from vi_contact.practice.plots.sections import sections_of
+from vi_contact.practice.plots.web_page import extremes, write_web_page
+from vi_contact.practice.studies.report import report
 from vi_contact.run.files.reading import RunFolder
-from vi_contact.studies.report import report
 
 pytestmark = pytest.mark.serial
 report_packages()

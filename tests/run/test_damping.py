@@ -15,15 +15,15 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem, soil
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
-from vi_contact.engineering import first_modes
-from vi_contact.ground_motion.record import Record
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.engineering import first_modes
+from vi_contact.practice.ground_motion.record import Record
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.description import describe
 from vi_contact.run.damping import damping_in_words
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.description import describe
 
 COMM = MPI.COMM_WORLD
 E, NU, RHO, XI = 1.8e9, 0.2, 2000.0, 0.05

@@ -16,12 +16,12 @@ from drawn_run import drawn_run
 from marched_chain import chain, run
 from mpi4py import MPI
 
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import FIELDS
 from vi_contact.fem.output.fields import XDMF
 from vi_contact.fem.output.functions import read_function
-from vi_contact.plots.deformed import read_frames
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.run.files.folder import COPY, FILES, LOCK, MODEL, remove_run
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.simulate import simulate

@@ -22,13 +22,13 @@ from fuzz import Fuzz
 
 import vi_contact as vc
 from vi_contact import ground_motion
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
-from vi_contact.engineering.peak_values import peaks
-from vi_contact.plots.charts import shown_periods
-from vi_contact.plots.deformed import read_frames
-from vi_contact.plots.sections import header_facts, sections_of
-from vi_contact.plots.web_page import can_write
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.engineering.peak_values import peaks
+from vi_contact.practice.plots.charts import shown_periods
+from vi_contact.practice.plots.deformed import read_frames
+from vi_contact.practice.plots.sections import header_facts, sections_of
+from vi_contact.practice.plots.web_page import can_write
 from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial

@@ -15,7 +15,7 @@ from fem_problems import block, plane_strain
 
 import vi_contact as vc
 from vi_contact import fem, soil
-from vi_contact.ground_motion import Record
+from vi_contact.practice.ground_motion import Record
 from vi_contact.run.sampling import sampling_warning
 
 pytestmark = pytest.mark.serial

@@ -19,9 +19,9 @@ from at_step import AtStep
 from marched_chain import equal_files, run, run_wall
 from summaries import summary_of
 
-from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted
+from vi_contact.practice.cli.entry import main
 from vi_contact.run.files import folder as folder_lock
 from vi_contact.run.files.folder import lock_folder
 from vi_contact.run.recorders import Contact, Energy
@@ -138,7 +138,7 @@ def test_exit_status_of_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One sentence on standard error, 128 + n."""
-    monkeypatch.setattr("vi_contact.cli.entry.world", SerialComm)
+    monkeypatch.setattr("vi_contact.practice.cli.entry.world", SerialComm)
     for error, status in (
         (Interrupted("SIGTERM ended the run", signal.SIGTERM), 143),
         (KeyboardInterrupt(), 130),
@@ -147,7 +147,9 @@ def test_exit_status_of_the_command_line(
         def stop(*_: Any, error: BaseException = error, **__: Any) -> None:
             raise error
 
-        monkeypatch.setattr("vi_contact.cli.entry.parser", lambda *_, stop=stop: Parser(stop))
+        monkeypatch.setattr(
+            "vi_contact.practice.cli.entry.parser", lambda *_, stop=stop: Parser(stop)
+        )
         assert main(["anything"]) == status
         said = capsys.readouterr()
         assert said.out == "" and said.err.count("\n") == 1 and said.err.startswith("vi-contact: ")

@@ -18,9 +18,9 @@ from at_step import AtStep
 from marched_chain import equal_files, run, run_wall
 from summaries import summary_of
 
-from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, Interrupted, OutOfTime
+from vi_contact.practice.cli.entry import main
 from vi_contact.run import wall_time as watch
 from vi_contact.run.recorders import Contact, Energy
 from vi_contact.run.wall_time import WallTime, age, seconds_of
@@ -198,7 +198,7 @@ def test_the_command(
 ) -> None:
     """Status 75 and one sentence; what is no wall time is refused."""
     pytest.importorskip("dolfinx")
-    monkeypatch.setattr("vi_contact.cli.entry.world", SerialComm)
+    monkeypatch.setattr("vi_contact.practice.cli.entry.world", SerialComm)
     monkeypatch.setattr(watch, "age", Clock(300.0))
     short = ["run", "wall", "--steps", "3", "--quiet", "--out", str(tmp_path / "wall")]
     assert main([*short, "--wall-time", "0:05:00"]) == 75

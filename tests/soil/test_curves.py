@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.soil import SoilCurves
+from vi_contact.practice.soil import SoilCurves
 
 pytestmark = pytest.mark.serial
 # (PI, OCR, p [Pa], f [Hz], N) -> G/Gmax and damping at 1e-6, 1e-5, … 1e-2, of pystrata 0.5.4

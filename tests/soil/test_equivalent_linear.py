@@ -10,9 +10,9 @@ from site_response import SoilLayer
 
 import vi_contact as vc
 from vi_contact.core.errors import InputError, ViContactError
-from vi_contact.ground_motion import Record
+from vi_contact.practice.ground_motion import Record
+from vi_contact.practice.soil import SoilCurves, equivalent_linear
 from vi_contact.run.march import march
-from vi_contact.soil import SoilCurves, equivalent_linear
 
 pytestmark = pytest.mark.serial
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0)

@@ -16,8 +16,8 @@ from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.practice.soil.moving_base import base_motion
 from vi_contact.run.march import march
-from vi_contact.soil.moving_base import base_motion
 
 WAVES = (vc.Ricker(6.0, 8.0), vc.Ricker(4.0, 11.0, direction=(0.0, 1.0)))
 DT = 2e-3

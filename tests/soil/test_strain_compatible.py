@@ -14,9 +14,9 @@ import vi_contact as vc
 from vi_contact import fem, soil
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.fem import compat
-from vi_contact.ground_motion import Record
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.practice.ground_motion import Record
 
 SOIL = vc.LinearElastic.from_wave_speeds(300.0, 150.0, 1900.0)
 ROCK = vc.LinearElastic.from_wave_speeds(1500.0, 800.0, 2300.0)

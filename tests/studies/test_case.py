@@ -17,19 +17,19 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.problems.wall import Wall, build
 from vi_contact import engineering, fem, ground_motion, laws, meshes, schemes, solvers
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import Scheme, Solver
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.soil import FreeField, upgoing
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.soil import FreeField, upgoing
+from vi_contact.practice.studies import Case, read_case
+from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.short_settings import REFERENCE, ROLLERS, ShortOptions
+from vi_contact.practice.studies.cases.toml_file import with_settings
+from vi_contact.practice.studies.cases.vocabulary import names_of, words
 from vi_contact.solvers.friction.problem import FrictionMethod
-from vi_contact.studies import Case, read_case
-from vi_contact.studies.cases.library import located
-from vi_contact.studies.cases.short_settings import REFERENCE, ROLLERS, ShortOptions
-from vi_contact.studies.cases.toml_file import with_settings
-from vi_contact.studies.cases.vocabulary import names_of, words
 
 ROOT = Path(__file__).resolve().parents[2]
 WALL = ROOT / "demos" / "cases" / "wall.toml"

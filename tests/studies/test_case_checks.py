@@ -14,9 +14,9 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
-from vi_contact.studies import comparisons, read_case
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import comparisons, read_case
 
 pytestmark = pytest.mark.serial
 LAYER = """

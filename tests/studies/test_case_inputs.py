@@ -14,12 +14,12 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 from vi_contact import ground_motion
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.gmsh_session import session, write
-from vi_contact.studies import IDA, read_case, run_ida
-from vi_contact.studies.ida.runs import read_row
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import IDA, read_case, run_ida
+from vi_contact.practice.studies.ida.runs import read_row
 
 pytestmark = pytest.mark.serial
 
@@ -235,7 +235,7 @@ def test_no_run_that_finished_is_a_failure(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     row = {"status": "failed", "reason": "no luck"}
-    monkeypatch.setattr("vi_contact.studies.ida.ida.run_ida", lambda *_, **__: [row, row])
+    monkeypatch.setattr("vi_contact.practice.studies.ida.ida.run_ida", lambda *_, **__: [row, row])
     monkeypatch.setattr("signal.signal", lambda *_: None)
     given = [
         "ida",
@@ -292,7 +292,7 @@ def test_out_of_memory_is_one_sentence(
     def fails(options: object) -> str:
         raise error
 
-    monkeypatch.setattr("vi_contact.cli.motion._info", fails)
+    monkeypatch.setattr("vi_contact.practice.cli.motion._info", fails)
     assert "out of memory: take a coarser mesh" in said(capsys, ["motion", "info", "file"])
 
 
@@ -302,6 +302,6 @@ def test_other_errors_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     def fails(options: object) -> str:
         raise KeyError(json.dumps("defect"))
 
-    monkeypatch.setattr("vi_contact.cli.motion._info", fails)
+    monkeypatch.setattr("vi_contact.practice.cli.motion._info", fails)
     with pytest.raises(KeyError):
         main(["motion", "info", "file"])

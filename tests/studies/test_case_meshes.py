@@ -13,7 +13,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
-from vi_contact.studies import read_case
+from vi_contact.practice.studies import read_case
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]

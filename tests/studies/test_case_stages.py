@@ -15,15 +15,15 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.cli.batch import results
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
+from vi_contact.practice.cli.batch import results
+from vi_contact.practice.soil import upgoing
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.short_settings import ShortOptions
+from vi_contact.practice.studies.ida.runs import ground_motions
 from vi_contact.run import session, static
-from vi_contact.soil import upgoing
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.short_settings import ShortOptions
-from vi_contact.studies.ida.runs import ground_motions
 
 ROOT = Path(__file__).resolve().parents[2]
 COMM = MPI.COMM_WORLD

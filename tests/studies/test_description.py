@@ -16,10 +16,10 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.cli.entry import main
-from vi_contact.plots.sketch import sketch
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.description import _warnings, describe, in_words
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.plots.sketch import sketch
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.description import _warnings, describe, in_words
 
 COMM = MPI.COMM_WORLD
 HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0

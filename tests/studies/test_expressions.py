@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.studies.cases.expressions import DEPTH, LENGTH, Expression, Places
+from vi_contact.practice.studies.cases.expressions import DEPTH, LENGTH, Expression, Places
 
 pytestmark = pytest.mark.serial
 VALUES = {

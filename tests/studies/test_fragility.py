@@ -15,14 +15,14 @@ from scipy.stats import norm
 pytest.importorskip("dolfinx")
 
 from vi_contact.core.errors import InputError
-from vi_contact.engineering import lowest_frequency
 from vi_contact.fem.mesh.tagged_mesh import alone
-from vi_contact.ground_motion import Record, write_at2
-from vi_contact.plots.studies import plot_fragility
-from vi_contact.studies import IDA, fragility_curve, read_case, record_set, run_ida
-from vi_contact.studies.ida.fragility import limit, passing
-from vi_contact.studies.ida.measures import intensity
-from vi_contact.studies.ida.runs import OneRun, Row
+from vi_contact.practice.engineering import lowest_frequency
+from vi_contact.practice.ground_motion import Record, write_at2
+from vi_contact.practice.plots.studies import plot_fragility
+from vi_contact.practice.studies import IDA, fragility_curve, read_case, record_set, run_ida
+from vi_contact.practice.studies.ida.fragility import limit, passing
+from vi_contact.practice.studies.ida.measures import intensity
+from vi_contact.practice.studies.ida.runs import OneRun, Row
 
 pytestmark = pytest.mark.serial
 WALL = Path(__file__).resolve().parents[2] / "demos" / "cases" / "wall_record.toml"
@@ -267,8 +267,8 @@ def test_a_study_ends_in_curves_and_goes_on(
             one: np.array([0.0, factors[name] * float(level)]) for one in wanted
         }, dict.fromkeys(wanted, ("m", "u"))
 
-    monkeypatch.setattr("vi_contact.studies.ida.ida.executed", executed)
-    monkeypatch.setattr("vi_contact.studies.ida.ida._history", history)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.ida.executed", executed)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.ida._history", history)
     said: list[str] = []
     for levels in ((1.0, 2.0, 4.0), (1.0, 1.5, 2.0, 3.0, 4.0)):
         made.clear()

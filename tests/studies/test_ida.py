@@ -25,21 +25,21 @@ import pytest
 pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
-from vi_contact.cli.batch import results
-from vi_contact.cli.entry import main
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, OutOfTime
-from vi_contact.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
-from vi_contact.plots.studies import DemandPanel, plot_ida
+from vi_contact.practice.cli.batch import results
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
+from vi_contact.practice.plots.studies import DemandPanel, plot_ida
+from vi_contact.practice.studies import IDA, read_case, run_ida
+from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.toml_file import toml_value
+from vi_contact.practice.studies.ida.measures import demand, fractiles, intensity
+from vi_contact.practice.studies.ida.processes import command, executed
+from vi_contact.practice.studies.ida.runs import OneRun, Shaking
 from vi_contact.run.files.folder import lock_folder
 from vi_contact.run.solution import Solution
 from vi_contact.run.wall_time import WallTime
-from vi_contact.studies import IDA, read_case, run_ida
-from vi_contact.studies.cases.library import located
-from vi_contact.studies.cases.toml_file import toml_value
-from vi_contact.studies.ida.measures import demand, fractiles, intensity
-from vi_contact.studies.ida.processes import command, executed
-from vi_contact.studies.ida.runs import OneRun, Shaking
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
@@ -265,7 +265,7 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and
     leave no row."""
-    monkeypatch.setattr("vi_contact.studies.ida.processes.PATIENCE", 1.0)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.processes.PATIENCE", 1.0)
     case, shaking, going = (
         read_case("wall.toml"),
         Shaking("motion_1", (Path("motion_1.at2"),)),
@@ -344,7 +344,7 @@ def test_what_a_process_that_died_has_left_runs_alone(
         end = "; kill -9 $$" if len(made) == 1 else ""
         return subprocess.Popen(["sh", "-c", words + end], stdout=subprocess.PIPE, text=True)
 
-    monkeypatch.setattr("vi_contact.studies.ida.processes.started", started)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.processes.started", started)
     found = list(executed(runs, 1, (), WallTime()))
     rows = {row["record"]: row for row in found if not isinstance(row, float)}
     assert made == [["m0", "m1", "m2"], ["m1"], ["m2"]] and found[0] == 1.5

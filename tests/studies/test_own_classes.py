@@ -13,18 +13,18 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.protocols import Excitation, FrictionLaw, ImpactLaw, MassLaw
 from vi_contact.core.step import Recorder, Scheme, Solver
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.own_classes import defect
+from vi_contact.practice.studies.cases.vocabulary import words
+from vi_contact.practice.studies.ida.processes import command
+from vi_contact.practice.studies.ida.runs import OneRun, Shaking
 from vi_contact.run.wall_time import WallTime
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.own_classes import defect
-from vi_contact.studies.cases.vocabulary import words
-from vi_contact.studies.ida.processes import command
-from vi_contact.studies.ida.runs import OneRun, Shaking
 
 pytestmark = pytest.mark.serial
 CASE = """

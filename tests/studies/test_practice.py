@@ -17,11 +17,11 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import engineering
-from vi_contact.cli.entry import main
 from vi_contact.core.units import STANDARD_GRAVITY as G
-from vi_contact.studies import comparisons, read_case
-from vi_contact.studies.cases.library import STARTERS
-from vi_contact.studies.cases.stages import leading
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import comparisons, read_case
+from vi_contact.practice.studies.cases.library import STARTERS
+from vi_contact.practice.studies.cases.stages import leading
 
 pytestmark = pytest.mark.serial
 LARGE = "mesh.refine=0"  # the quick size that each case names

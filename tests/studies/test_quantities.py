@@ -16,10 +16,10 @@ from mpi4py import MPI
 
 from vi_contact import core, fem, meshes
 from vi_contact.core.errors import InputError
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.quantities import text_node
-from vi_contact.studies.cases.short_settings import ShortOptions
-from vi_contact.studies.cases.table_calls import Call, Spot
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.quantities import text_node
+from vi_contact.practice.studies.cases.short_settings import ShortOptions
+from vi_contact.practice.studies.cases.table_calls import Call, Spot
 
 COMM = MPI.COMM_WORLD
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies.cases.library import base_folder, read_copy
+from vi_contact.practice.studies.refinement import refine, refinement
 from vi_contact.run.files.reading import read_run
-from vi_contact.studies.cases.library import base_folder, read_copy
-from vi_contact.studies.refinement import refine, refinement
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("dolfinx")

@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from vi_contact.cli.entry import main
-from vi_contact.studies.cases.schema import text
-from vi_contact.studies.cases.toml_file import read_toml, with_settings
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies.cases.schema import text
+from vi_contact.practice.studies.cases.toml_file import read_toml, with_settings
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("dolfinx")
 pytest.importorskip("gmsh")
 
-from vi_contact.cli.entry import main
+from vi_contact.practice.cli.entry import main
 from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial

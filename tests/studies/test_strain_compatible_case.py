@@ -16,12 +16,12 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem, soil
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.table_calls import build
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.table_calls import build
 
 pytestmark = pytest.mark.serial
 COMM = MPI.COMM_WORLD

@@ -17,13 +17,13 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.description import describe
-from vi_contact.studies.cases.toml_file import toml_value
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.description import describe
+from vi_contact.practice.studies.cases.toml_file import toml_value
 
 COMM = MPI.COMM_WORLD
 CASE = """

@@ -17,8 +17,8 @@ from vi_contact import fem
 from vi_contact.core.step import Recorder
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.studies import read_case
-from vi_contact.studies.cases.vocabulary import names_of
+from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.cases.vocabulary import names_of
 
 COMM = MPI.COMM_WORLD
 CASE = """

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
 from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
-from vi_contact.engineering.checks.racking_ratio import flexibility as flexible
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.grid import Grid, add_grids
+from vi_contact.practice.engineering.checks.racking_ratio import flexibility as flexible
 
 GAMMA = 1e-3
 

@@ -9,8 +9,8 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.problems.channel import Channel, ChannelModel, build
+from vi_contact.practice.soil.moving_base import base_motion
 from vi_contact.run.simulate import Solution
-from vi_contact.soil.moving_base import base_motion
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 CHANNEL = Channel()

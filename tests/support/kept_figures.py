@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from vi_contact.plots import histories
+from vi_contact.practice.plots import histories
 
 
 def keep_figures(monkeypatch: pytest.MonkeyPatch, *modules: ModuleType) -> list[Any]:

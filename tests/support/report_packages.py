@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vi_contact.plots.web_page import can_write
+from vi_contact.practice.plots.web_page import can_write
 
 CHROMIUM_FLAGS = (
     "--headless",

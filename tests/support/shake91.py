@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.ground_motion.record import Record
 from vi_contact.laws.materials import LinearElastic
-from vi_contact.soil.curves import SoilCurves
-from vi_contact.soil.equivalent_linear import Layer
+from vi_contact.practice.ground_motion.record import Record
+from vi_contact.practice.soil.curves import SoilCurves
+from vi_contact.practice.soil.equivalent_linear import Layer
 
 FOOT, PCF, G = 0.3048, 16.018463, 9.80665
 STRAINS = [1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1]

@@ -11,8 +11,8 @@ from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.practice.soil.soil_column import SoilColumn
 from vi_contact.run.march import march
-from vi_contact.soil.soil_column import SoilColumn
 
 SOIL = LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0)
 

@@ -16,8 +16,8 @@ from thick_lining import ThickLining
 
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
 from vi_contact.core.surfaces import empty_surface
-from vi_contact.engineering.checks.racking_ratio import racking_ratio
 from vi_contact.meshes.cut import Welded
+from vi_contact.practice.engineering.checks.racking_ratio import racking_ratio
 
 pytestmark = pytest.mark.serial
 CONCRETE, SOIL = (

@@ -18,7 +18,8 @@ from demos.exact.housner import HousnerBlock
 from demos.problems import rocking_block as rocking
 from vi_contact import Resultants, fem, ground_motion
 from vi_contact.core.algebra import Array
-from vi_contact.engineering.checks import (
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.practice.engineering.checks import (
     AtRest,
     Housner,
     MononobeOkabe,
@@ -27,7 +28,6 @@ from vi_contact.engineering.checks import (
     VeletsosYounan,
     Wood,
 )
-from vi_contact.meshes.block import BlockMesh
 
 pytestmark = pytest.mark.serial
 HEIGHT, C_S, LOAD = 10.0, 150.0, 5e4  # m, m/s, Pa on the ground

@@ -17,7 +17,7 @@ from demos.pictures.tractions import read_tractions
 from demos.problems.square import Square, SquareModel, build
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.plots.deformed import read_frames
+from vi_contact.practice.plots.deformed import read_frames
 
 pytestmark = pytest.mark.slow
 

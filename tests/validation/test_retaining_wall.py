@@ -18,10 +18,10 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.fem.mesh.tagged_mesh import Facets
-from vi_contact.ground_motion import read_record
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.two_blocks import Blocks
+from vi_contact.practice.ground_motion import read_record
 
 pytestmark = pytest.mark.serial
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "ground_motions"

@@ -24,7 +24,7 @@ def lazy(
 
     A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module,
     here and for checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a
-    room and hands on all its names.
+    room and hands on all its names; ``from .practice import soil as soil`` hands on a room.
     """
     home: dict[str, str] = {}
     # importing pathlib takes longer than all stubs
@@ -49,7 +49,10 @@ def lazy(
             if renamed is None:
                 raise AttributeError(f"module '{package}' has no attribute '{name}'")
             return renamed
-        return getattr(import_module(home[name]), name)
+        module = import_module(home[name])
+        if not hasattr(module, name):
+            return import_module(f"{home[name]}.{name}")  # a room that is handed on
+        return getattr(module, name)
 
     class Room(ModuleType):
         """Keep names when Python binds a module of the same name.

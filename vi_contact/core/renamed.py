@@ -9,8 +9,10 @@ from __future__ import annotations
 
 # Package -> old public name -> dotted path of the new one.
 NAMES: dict[str, dict[str, str]] = {
-    "vi_contact.engineering.checks": {"Coulomb": "vi_contact.engineering.checks.CoulombWedge"},
-    "vi_contact.engineering": {
+    "vi_contact.practice.engineering.checks": {
+        "Coulomb": "vi_contact.practice.engineering.checks.CoulombWedge"
+    },
+    "vi_contact.practice.engineering": {
         "Racking": "vi_contact.Racking",
         "Resultants": "vi_contact.Resultants",
     },

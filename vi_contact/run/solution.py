@@ -142,7 +142,7 @@ class Solution:
         It shows probes, contact force, energy ledger and certificates.
         """
         # by name: on a floor above, and no run needs it
-        return import_module("vi_contact.plots").plot_overview(self)
+        return import_module("vi_contact.practice.plots").plot_overview(self)
 
     def _repr_html_(self) -> str:
         """Return summary and figure for a notebook, without reference to anything outside."""

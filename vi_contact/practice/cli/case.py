@@ -1,0 +1,250 @@
+"""Carry out ``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``.
+
+This has their options and what they do.
+"""
+
+import argparse
+import gc
+from contextlib import ExitStack
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ... import schemes
+from ...core import stages
+from ...core.errors import InputError
+from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located, starters
+from ..studies.cases.short_settings import ShortOptions
+from ..studies.cases.toml_file import read_toml
+from .errors import say, world
+from .options import add_command, add_settings
+
+if TYPE_CHECKING:
+    from ..studies.cases.case import Case
+
+
+OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": "--wall-time"}
+
+
+def add_case_commands(commands: Any) -> None:
+    """Add ``run``, ``cases``, ``schema`` and ``new`` to the commands of the top parser."""
+    run = add_command(
+        commands,
+        "run",
+        _run,
+        help="run a case: one that ships with the package, or a TOML file",
+        description=(
+            "Run a case. The short options and --set replace values of the case. "
+            "'vi-contact cases' lists the cases of the package. 'vi-contact "
+            "report DIR' draws the results of the run."
+        ),
+    )
+    run.add_argument(
+        "case", help="name of a case of the package (wall, channel), or the path of a .toml file"
+    )
+    _add_short_options(run)
+    _add_output(run)
+    add_settings(run)
+    _add_check(run)
+    run.set_defaults(spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
+
+    add_command(
+        commands,
+        "cases",
+        _cases,
+        help="list the cases of the package",
+        description="List the cases of the package, and their folder.",
+    )
+    add_command(
+        commands,
+        "schema",
+        _schema,
+        help="print the JSON schema of case files, for editors",
+        description=(
+            "Print the JSON schema of case files. To keep it: vi-contact schema > case.json."
+        ),
+    )
+
+    new = add_command(
+        commands,
+        "new",
+        _new,
+        help="write a case to begin with, and the script of its mesh",
+        description=(
+            "Write a commented case file and the Gmsh script of its mesh, which you then change."
+        ),
+    )
+    new.add_argument("name", metavar="NAME", help=", ".join(starters()))
+    new.add_argument(
+        "folder", metavar="DIR", nargs="?", help="folder to write into (default: NAME)"
+    )
+
+
+def _add_short_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that stand for the most common settings."""
+    group = parser.add_argument_group(
+        "short options", "The run ends with an error when the case cannot use a given option."
+    )
+    group.add_argument(
+        "--motion",
+        metavar="FILE[,FILE]",
+        help=(
+            "shake the model by one record (horizontal), or by two records (horizontal, vertical)"
+        ),
+    )
+    group.add_argument(
+        "--scale", type=float, metavar="F", help="multiply the excitation by this factor"
+    )
+    group.add_argument("--dt", type=float, metavar="S", help="time step [s]")
+    group.add_argument("--steps", type=int, metavar="N", help="number of steps")
+    group.add_argument(
+        "--solver",
+        metavar="NAME",
+        help="Condensed, Iterative, Volume, or a method such as Hildreth",
+    )
+    group.add_argument("--scheme", metavar="NAME", help=", ".join(schemes.__all__))
+    group.add_argument(
+        "--cross-check",
+        action="store_true",
+        help="solve every step a second time by another solver and compare the answers",
+    )
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the output folder and of restarts."""
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help=(
+            "output folder (default: the value of out in [run], or results/NAME, where "
+            "NAME is the name of the case)"
+        ),
+    )
+    parser.add_argument(
+        "--restart",
+        action="store_true",
+        help="continue the run in the output folder from its checkpoint",
+    )
+    parser.add_argument(
+        "--restart-changed",
+        action="store_true",
+        dest="changed",
+        help=(
+            "continue the run from its checkpoint even if the problem has changed since "
+            "the checkpoint"
+        ),
+    )
+    parser.add_argument(
+        "--wall-time",
+        metavar="TIME",
+        help=(
+            "write a checkpoint and end with status 75 before this time since the start "
+            "is over; give hours:minutes:seconds, or another form that Slurm reads as "
+            "--time"
+        ),
+    )
+
+
+def _add_check(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what is computed and printed."""
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help=(
+            "describe the model, draw it as DIR/model.png, and stop; the mesh and the "
+            "records are read, and no step is computed"
+        ),
+    )
+    parser.add_argument("--quiet", action="store_true", help="print no progress line")
+
+
+def _cases(options: argparse.Namespace) -> str:
+    lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
+    return "\n".join([*lines, f"the files: {FOLDER}"])
+
+
+def _schema(options: argparse.Namespace) -> str:
+    from ..studies.cases.schema import text  # late: finite elements
+
+    return text().rstrip()
+
+
+def _new(options: argparse.Namespace) -> str:
+    if world().rank:
+        return ""
+    files = copy_starter(options.name, Path(options.folder or options.name))
+    steps = f"run {files[0]} --check", f"run {files[0]}", f"report results/{options.name}"
+    return "\n".join(
+        [*(f"wrote {path}" for path in files), "next:", *(f"    vi-contact {one}" for one in steps)]
+    )
+
+
+def _run(options: argparse.Namespace) -> str:
+    import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
+
+    from ...run.wall_time import seconds_of
+    from ..studies.cases.case import read_case  # late: finite elements
+
+    comm, path = world(), located(options.case)
+    stages.show(not options.quiet)
+    if options.wall_time is not None:
+        seconds_of(options.wall_time)
+    if options.steps is not None and options.steps < 1:
+        raise InputError(f"--steps {options.steps}: give at least one step")
+    short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
+    with ExitStack() as after:
+        after.callback(gc.enable if gc.isenabled() else gc.disable)
+        # modules are no garbage: looking for it takes a tenth of the way to the first step
+        gc.disable()
+        case = read_case(
+            path, short.settings(read_toml(path), options.settings), allow=options.allow
+        )
+    name = case.tables.get("title") or path.stem
+    restart = options.restart or options.changed
+    out = options.out or case.out or Path("results") / path.stem
+    if options.check:
+        vain = next(
+            (name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None
+        )
+        if vain is not None:
+            raise InputError(
+                f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of "
+                "the two out"
+            )
+        return _checked(case, comm, Path(out))
+    found = case.run(
+        comm,
+        out=out,
+        restart=restart,
+        progress=not options.quiet,
+        changed=options.changed,
+        wall_time=options.wall_time,
+    )
+    return f"{name}\n{found.summary()}\noutput: {out}" if comm.rank == 0 else ""
+
+
+def _checked(case: "Case", comm: Any, folder: Path) -> str:
+    """Describe and draw the model of a case.
+
+    It raises InputError for what is wrong with it, once all the rest is told.
+    """
+    from ...core.files import on_root
+    from ...core.own_files import inner_folder
+    from ...run.files.folder import is_marked, run_folder
+    from ..plots.histories import write_picture  # late: matplotlib
+    from ..plots.sketch import sketch
+    from ..studies.cases.description import describe, in_words, write_model
+
+    case.check()
+    parts = case.parts(comm)
+    model, ranks = describe(case, comm, parts), parts.system.algebra.comm
+    case.columns(comm, parts)  # points and groups of the recorders
+    if is_marked(folder):  # of a run, of which model.json there tells
+        folder = inner_folder(folder, "check")
+    write_model(ranks, model, run_folder(ranks, folder))
+    on_root(ranks, lambda: write_picture(sketch(model), folder / "model.png", bbox_inches="tight"))
+    if comm.rank == 0:
+        say(f"{in_words(model)}\npicture: {folder / 'model.png'}")
+    if model["defects"]:
+        raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
+    return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

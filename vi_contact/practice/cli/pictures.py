@@ -1,0 +1,214 @@
+"""``vi-contact report``, ``plot`` and ``film``: options and what the commands do."""
+
+import argparse
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ...core.checks import shown
+from ...core.errors import InputError
+from .errors import world
+from .options import add_command, add_folder, output_file
+
+
+def add_picture_commands(commands: Any) -> None:
+    """Add ``report``, ``plot`` and ``film`` to the commands of the top parser."""
+    report = add_command(
+        commands,
+        "report",
+        _report,
+        help="write a report on a run, with pictures",
+        description=(
+            "Write a report on a run from the files in its folder. It is a PDF "
+            "file and, where jinja2 and plotly are installed, also a web page in "
+            "one file. peaks.csv and the pictures are written beside it."
+        ),
+    )
+    report.add_argument(
+        "--out",
+        metavar="FILE",
+        help=("file of the report, .html or .pdf (default: DIR/report.pdf and DIR/report.html)"),
+    )
+    report.add_argument(
+        "--title",
+        help=("title of the report (default: the title of the case, or the name of the folder)"),
+    )
+    report.add_argument(
+        "--show",
+        metavar="COLUMN[,COLUMN...]",
+        action="append",
+        help=(
+            "draw a chart of these columns, which must have one unit; the option may be "
+            "repeated (default: a chart for each kind of column that changes during the "
+            "run)"
+        ),
+    )
+    report.add_argument(
+        "--refine",
+        action="store_true",
+        help=(
+            "run the case again with half the element size and with half the time step, "
+            "into DIR/refined, and compare the peaks"
+        ),
+    )
+    report.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="PACKAGE",
+        help="the option of 'vi-contact run', for the runs of --refine",
+    )
+    add_folder(report)
+
+    plot = add_command(
+        commands,
+        "plot",
+        _plot,
+        help="draw the bodies of a run",
+        description=(
+            "Draw the deformed bodies of a run with their stress, contact "
+            "pressure and contact states, from the frames that are stored in its "
+            "folder."
+        ),
+    )
+    plot.add_argument(
+        "--times",
+        metavar="T[,T...]",
+        help=(
+            "moments to draw [s] (default: the first, the last, and the one of the "
+            "largest uplift, contact pressure or displacement)"
+        ),
+    )
+    plot.add_argument(
+        "--out", metavar="FOLDER", help="folder for deformed.png and faces.png (default: DIR)"
+    )
+    add_folder(plot)
+    _add_magnify(plot)
+
+    film = add_command(
+        commands,
+        "film",
+        _film,
+        help="film the bodies of a run",
+        description=(
+            "Film the deformed bodies of a run above the curve of a history, "
+            "from the frames that are stored in its folder."
+        ),
+    )
+    film.add_argument(
+        "--between",
+        metavar="T,T",
+        dest="times",
+        help=(
+            "first and last moment of the film [s] (default: 48 frames around the moment "
+            "of the largest uplift, contact pressure or displacement)"
+        ),
+    )
+    film.add_argument(
+        "--out",
+        metavar="FILE",
+        help=("file of the film, .gif or, where ffmpeg is installed, .mp4 (default: DIR/film.gif)"),
+    )
+    film.add_argument(
+        "--column",
+        metavar="COLUMN",
+        help=(
+            "column of history.csv that is drawn below the bodies (default: the uplift, "
+            "the contact pressure or the first displacement that changes)"
+        ),
+    )
+    add_folder(film)
+    _add_magnify(film)
+
+
+def _add_magnify(parser: argparse.ArgumentParser) -> None:
+    """Add the option of the scale of displacements in a drawing."""
+    parser.set_defaults(spelling={"magnified": "--magnify"})
+    parser.add_argument(
+        "--magnify",
+        type=float,
+        metavar="F",
+        dest="magnified",
+        help=(
+            "factor by which displacements are enlarged in the drawing (default: a round "
+            "number that makes the displacements visible)"
+        ),
+    )
+
+
+def _report(options: argparse.Namespace) -> str:
+    with suppress(ImportError):  # a report needs no MPI
+        import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
+
+    from ..plots.web_page import MISSING, can_write
+    from ..studies.refinement import refine
+    from ..studies.report import report
+
+    comm = world()
+    if options.out is not None:
+        output_file(options.out)
+    failed = refine(options.folder, comm, allow=options.allow) if options.refine else None
+    if comm.rank != 0:
+        return ""
+    columns = None if options.show is None else [one.split(",") for one in options.show]
+    told, written = report(
+        options.folder, out=options.out, title=options.title, columns=columns, failed=failed
+    )
+    lines = [
+        *told.sentences,
+        *(
+            f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:])
+            for table in told.tables
+            for row in (table.header, *table.rows)
+        ),
+    ]
+    missing = [] if options.out is not None or can_write() else [f"no report.html: {MISSING}"]
+    return "\n".join([*(lines if options.refine else ()), *map(str, written), *missing])
+
+
+def _plot(options: argparse.Namespace) -> str:
+    from ..plots.bodies import draw_run
+
+    run, frames, title, times = _opened(options)
+    out = output_file(Path(options.out or options.folder) / "deformed.png").parent
+    return "\n".join(
+        map(str, draw_run(run, out, title=title, times=times, magnified=options.magnified))
+    )
+
+
+def _film(options: argparse.Namespace) -> str:
+    from ..plots.bodies import film
+
+    run, frames, title, times = _opened(options)
+    out = output_file(options.out or Path(options.folder) / "film.gif")
+    if times is not None:
+        times = [t for t in frames.t.tolist() if times[0] <= t <= times[-1]]
+    return str(
+        film(run, out, times=times, magnified=options.magnified, column=options.column, title=title)
+    )
+
+
+def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | None]:
+    """Return the run, its frames, its title, and the moments.
+
+    These are the moments asked for, which have to be within the run.
+    """
+    from ...run.files.reading import read_run
+    from ..plots.deformed import read_frames
+    from ..studies.cases.library import read_copy
+
+    run, asked, times = read_run(options.folder), options.times, None
+    frames, (first, last) = read_frames(run), run.history["t"][[0, -1]]
+    if asked is not None:
+        try:
+            times = [float(one) for one in asked.split(",")]
+        except ValueError:
+            raise InputError(
+                f"{shown(asked)} is not a list of moments: give seconds, such as 3.2,5"
+            ) from None
+        slack = 1e-9 * (last - first)
+        if not all(first - slack <= one <= last + slack for one in times):
+            raise InputError(
+                f"{shown(asked)} is outside the run: give seconds from {first:g} to {last:g}"
+            )
+    return run, frames, str(read_copy(run.folder).get("title", "Deformed bodies")), times

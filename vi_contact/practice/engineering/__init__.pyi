@@ -1,0 +1,15 @@
+from ...run.damping import FirstModes as FirstModes
+from ...run.damping import first_modes as first_modes
+from ...run.modal import lowest_frequency as lowest_frequency
+from ...run.recorders.contact_parts import contact_summary as contact_summary
+from .checks.comparison import Check as Check
+from .checks.comparison import Comparison as Comparison
+from .floor_spectra import TransferFunction as TransferFunction
+from .floor_spectra import floor_spectrum as floor_spectrum
+from .floor_spectra import recorded_motion as recorded_motion
+from .floor_spectra import transfer_function as transfer_function
+from .peak_values import Loop as Loop
+from .peak_values import Peak as Peak
+from .peak_values import hysteresis as hysteresis
+from .peak_values import peaks as peaks
+from .peak_values import write_peaks as write_peaks

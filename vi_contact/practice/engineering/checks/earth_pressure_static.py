@@ -1,0 +1,230 @@
+"""Expect the pressure of resting soil on a wall.
+
+It is that of soil at rest, and of yielding soil after Rankine and Coulomb.
+
+N is the force along the normal of a metre of wall. phi: friction angle of the soil; delta: between
+soil and wall; slope: of the ground, rising from the wall; batter: of its back from the vertical,
+positive where soil rests on it. An elastic soil does not yield: its pressure is that at rest, and
+active and passive ones are bounds beside it.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from ....core.quantities import NotNegative, Unit
+from ....core.units import STANDARD_GRAVITY
+from .comparison import (
+    Check,
+    Density,
+    Formula,
+    Friction,
+    Gravity,
+    History,
+    Incline,
+    Length,
+    Numbers,
+    Poisson,
+)
+
+
+def wedge(
+    phi: float,
+    delta: float,
+    slope: float,
+    batter: float,
+    *,
+    psi: float = 0.0,
+    passive: bool = False,
+) -> float:
+    """Return K of the worst plane wedge.
+
+    The wedge is active or passive, under gravity turned by psi; K is nan where none is at rest.
+
+    K = cos²(phi -+ batter - psi) / (cos psi cos² batter cos(delta +- batter + psi) (1 +- root)²),
+    root² = sin(phi + delta) sin(phi -+ slope - psi) / (cos(delta +- batter + psi) cos(slope -
+    batter)); upper signs active, lower ones passive. Coulomb 1776; psi: Okabe 1924, Mononobe and
+    Matsuo 1929. Angles [rad].
+    """
+    sign = -1.0 if passive else 1.0
+    lean, open_ = math.cos(delta + sign * batter + psi), phi - sign * slope - psi
+    if open_ < 0.0 or lean <= 0.0 or math.cos(slope - batter) <= 0.0:
+        return math.nan
+    root = 1.0 + sign * math.sqrt(
+        math.sin(phi + delta) * math.sin(open_) / (lean * math.cos(slope - batter))
+    )
+    top = math.cos(phi - sign * batter - psi) ** 2
+    return (
+        top / (math.cos(psi) * math.cos(batter) ** 2 * lean * root**2) if root > 0.0 else math.nan
+    )
+
+
+WALL_COLUMNS = ("N_{part}", "height_{part}")
+WALL_ANSWERS = {"thrust": "N/m", "height": "m"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EarthPressure(Check):
+    """Hold what all theories of a wall need.
+
+    That is its height [m], the soil's density [kg/m³], and what is compared.
+
+    part: of the contact, whose ``Resultants`` with their centre at the foot of the wall record
+    N_<part>, height_<part>, uplift_<part>; of: "thrust", N [N/m] per metre of wall, or "height", of
+    its line of action above the foot [m]; surcharge: q [Pa], on a horizontal metre of ground;
+    width: of the model across its plane, of a slice its thickness.
+    """
+
+    # Whether the largest thrust of the run is compared, or that of the first row, the one of rest.
+    largest: ClassVar[bool] = False
+
+    height: Length
+    rho: Density
+    part: str = "wall"
+    of: str = "thrust"
+    surcharge: Annotated[float, NotNegative, Unit("Pa")] = 0.0
+    gravity: Gravity = STANDARD_GRAVITY
+    width: Length = 1.0
+
+    def coefficient(self) -> tuple[float, str]:
+        """Return the K of N, and why there is none."""
+        raise NotImplementedError
+
+    def numbers(self, history: History) -> Numbers:
+        """Compare N, or its height.
+
+        The height is that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2.
+        """
+        factor, why = self.coefficient()
+        slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
+        # the ground of a wedge, by its size
+        laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
+        own, extra = (
+            0.5 * self.rho * self.gravity * self.height**2,
+            laden * self.surcharge * self.height,
+        )
+        thrust, height = history[f"N_{self.part}"], history[f"height_{self.part}"]
+        row = int(np.argmax(thrust)) if self.largest else 0
+        if self.of == "height":
+            return (
+                self.height * (own / 3.0 + extra / 2.0) / (own + extra),
+                float(height[row]),
+                why,
+                {},
+            )
+        return factor * (own + extra), float(thrust[row]) / self.width, why, {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtRest(EarthPressure):
+    """Give the thrust of an elastic layer that cannot give way sideways.
+
+    An elastic soil is compared with it.
+
+    nu: Poisson's ratio. The wall is smooth and does not move; for sand, nu of K0 = 1 - sin(phi) is
+    K0/(1 + K0).
+    """
+
+    formula: ClassVar[Formula] = Formula(
+        text="N = K0 (ρ g H²/2 + q H), K0 = ν/(1-ν)",
+        source="plane strain without lateral strain",
+        range="an elastic layer on a smooth wall that does not move",
+        fields=("height", "rho", "surcharge", "gravity", "width", "nu"),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
+
+    nu: Poisson
+
+    def coefficient(self) -> tuple[float, str]:
+        """Return K, and why there is none."""
+        return self.nu / (1.0 - self.nu), ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rankine(EarthPressure):
+    """Expect the thrust of soil in active, or passive, failure throughout.
+
+    It acts on a vertical wall, parallel to the ground.
+
+    phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand.
+    """
+
+    formula: ClassVar[Formula] = Formula(
+        text="N = K (ρ g H²/2 + q H), K = cos²β (cos β ∓ s)/(cos β ± s), s² = cos²β - cos²φ",
+        source="Rankine 1857",
+        range="β up to φ; soil that yields",
+        fields=("height", "rho", "surcharge", "gravity", "width", "phi", "slope"),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
+
+    phi: Friction
+    slope: Incline = 0.0
+    passive: bool = False
+
+    def coefficient(self) -> tuple[float, str]:
+        """Return K, and why there is none."""
+        # the soil slides up: the same lines, friction turned round
+        along = -self.slope if self.passive else self.slope
+        found = wedge(self.phi, along, self.slope, 0.0, passive=self.passive) * math.cos(self.slope)
+        return found, "the ground is steeper than the friction angle" if abs(
+            self.slope
+        ) > self.phi else ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoulombWedge(EarthPressure):
+    """Expect the thrust of a plane wedge of soil.
+
+    The wedge slides on the wall and on the ground below it.
+
+    phi, delta, slope, batter [rad]; N = P cos(delta). It applies for delta <= phi, passive: delta
+    <= phi/2 (beyond it surfaces that are curved slide at less), ground up to phi, and phi -+ slope
+    - psi >= 0.
+    """
+
+    formula: ClassVar[Formula] = Formula(
+        text=(
+            "N = K cos δ (ρ g H²/2 + q H cos ι cos β/cos(β-ι)), K(φ, δ, slope β, batter ι) "
+            "of the worst plane wedge"
+        ),
+        source="Coulomb 1776",
+        range="δ up to φ, passive up to φ/2; ground up to φ; soil that yields",
+        fields=(
+            "height",
+            "rho",
+            "surcharge",
+            "gravity",
+            "width",
+            "phi",
+            "delta",
+            "slope",
+            "batter",
+        ),
+        reads=WALL_COLUMNS,
+        answers=WALL_ANSWERS,
+    )
+
+    phi: Friction
+    delta: Friction = 0.0
+    slope: Incline = 0.0
+    batter: Incline = 0.0
+    passive: bool = False
+
+    def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
+        """Return K under gravity turned by psi [rad], and why there is none."""
+        most, sign = (0.5 * self.phi, "+") if self.passive else (self.phi, "-")
+        k = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
+        why = "the ground is steeper than phi" if abs(self.slope) > self.phi else ""
+        why = (
+            f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest"
+            if math.isnan(k)
+            else why
+        )
+        why = (
+            f"delta is above {most:.4g}: no plane wedge is the worst" if self.delta > most else why
+        )
+        return k * math.cos(self.delta), why

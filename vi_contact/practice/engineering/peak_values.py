@@ -1,0 +1,133 @@
+"""List peak values of histories as a tidy table.
+
+Loops of a force over a deformation are followed too, with their work.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...core.algebra import Array
+from ...core.arguments import checked
+from ...core.checks import instance, number, several
+from ...core.errors import InputError
+from ...core.files import write_csv
+from ...core.step import Columns
+
+HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
+GROWS = "; raw, not convergent at impacts: it grows as dt falls"
+_NOT_PEAKS = ("t", "k", "iterations", "escalated")
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Hold the largest and smallest value of a column and when they came first [s].
+
+    They are nan where the column is all nan.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    max: float
+    t_max: float
+    min: float
+    t_min: float
+
+
+def peaks(
+    history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None
+) -> list[Peak]:
+    """Return the peaks of these columns, of all columns of numbers but the counters when None.
+
+    nan values are left out.
+
+    The peak of an acceleration is that of the time step where contact closes, and is marked so: it
+    grows as dt falls, while displacements and forces converge. InputError for a column that the
+    history does not have, or one of arrays.
+    """
+    for kind, one in (("history", history), ("columns", columns)):
+        instance("peaks", kind, one, Mapping, f"give the {kind} of a solution")
+    if names is None:
+        names = [
+            name
+            for name in columns
+            if name not in _NOT_PEAKS and name in history and history[name].ndim == 1
+        ]
+    found = []
+    for name in several("peaks", "names", names, "give a list of columns, or None"):
+        values, t = column_of(history, name), history["t"]
+        unit, quantity = columns[name]
+        if name.startswith(("a_x_", "a_y_", "a_z_")):
+            quantity += GROWS
+        numbers = [float("nan")] * 4
+        if not np.isnan(values).all():
+            high, low = int(np.nanargmax(values)), int(np.nanargmin(values))
+            numbers = [float(x) for x in (values[high], t[high], values[low], t[low])]
+        found.append(Peak(name, quantity, unit, *numbers))
+    return found
+
+
+@checked
+def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
+    """Write ``peaks.csv``.
+
+    Its columns are name, quantity (its meaning), unit, max, t_max [s], min, t_min [s], to the last
+    bit.
+    """
+    return write_csv(path, HEADER, map(astuple, rows))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Hold deformation, force and work, (rows,) each.
+
+    The work is ∫ F dx since the start by the trapezoidal rule.
+
+    For a closed loop run through clockwise it is the area, the work that the structure took up.
+    """
+
+    deformation: Array
+    force: Array
+    work: Array
+
+    @property
+    def stiffness(self) -> float:
+        """Return the secant stiffness between the largest and the smallest deformation.
+
+        It is nan where nothing moved.
+        """
+        high, low = int(np.argmax(self.deformation)), int(np.argmin(self.deformation))
+        way = self.deformation[high] - self.deformation[low]
+        return float((self.force[high] - self.force[low]) / way) if way > 0.0 else float("nan")
+
+
+def hysteresis(
+    history: Mapping[str, Array], deformation: str, force: str, *, sign: float = 1.0
+) -> Loop:
+    """Return the loop of two columns.
+
+    Such are base shear over top displacement, shear over racking, or M over theta.
+
+    ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError
+    for missing columns.
+    """
+    number("hysteresis", "sign", sign)
+    x, y = column_of(history, deformation), sign * column_of(history, force)
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))])
+    return Loop(x, y, work)
+
+
+def column_of(history: Mapping[str, Array], name: str) -> Array:
+    """Return a column of numbers; InputError names the columns there are."""
+    instance("history", "the name of a column", name, str, "give a text, such as 'u_x_top'")
+    instance("history", "it", history, Mapping, "give the history of a solution")
+    if name not in history:
+        known = [one for one in history if np.ndim(history[one]) == 1]
+        raise InputError(f"the history has no column '{name}': it has {', '.join(known)}")
+    values = np.asarray(history[name], dtype=float)
+    if values.ndim != 1:
+        raise InputError(f"column '{name}' holds arrays: choose a column of numbers")
+    return values

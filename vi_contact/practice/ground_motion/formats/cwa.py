@@ -1,0 +1,112 @@
+"""Read files of the Central Weather Administration of Taiwan.
+
+There are "#Key: value" lines, then time and columns.
+"""
+
+import math
+import re
+
+import numpy as np
+
+from ....core.errors import InputError
+from ..record import Record
+from .text import SAME_STEP, TextFile
+from .times import time_step
+
+_FORMAT = re.compile(r"^(\d++)F(\d++)\.(\d++)$", re.IGNORECASE)
+_UNIT = re.compile(r"[a-z0-9/^]++", re.IGNORECASE)
+_DIRECTION = re.compile(r"^([^()]*+)\(([+-])\)$")
+
+
+def recognises(text: TextFile) -> bool:
+    """Tell whether two of the three entries are there that say what the columns are."""
+    header = _header(text)
+    return sum(key in header for key in ("SAMPLERATE(HZ)", "AMPLITUDEUNIT", "DATASEQUENCE")) >= 2
+
+
+def read(text: TextFile) -> Record:
+    """Return the record of one column.
+
+    ``channel`` is 1 for the one after the time, or its name such as "U".
+    """
+    header = _header(text)
+    sequence_line, sequence = text.entry(header, "DATASEQUENCE")
+    first, *names = [" ".join(part.split()) for part in re.split(r"[;\s]+", sequence) if part]
+    if first.lower() != "time" or not names:
+        raise InputError(
+            f"{text.at(sequence_line)}: the columns {sequence!r} do not begin with the time; get "
+            "the file again"
+        )
+    form_line, form = text.entry(header, "DATA")
+    if not (match := _FORMAT.match(form)) or int(match[1]) != len(names) + 1:
+        raise InputError(
+            f"{text.at(form_line)}: the format {form!r} is not one of {len(names) + 1} columns, as "
+            "'4F10.3' is; get the file again"
+        )
+    signs = [_DIRECTION.match(name) for name in names]
+    plain = [match[1] if match else name for match, name in zip(signs, names, strict=True)]
+    place = text.chosen(plain)
+    lines = [index for index in text.filled(form_line + 1) if not text.lines[index].startswith("#")]
+    rows = []
+    for index in lines:
+        row = text.fixed(index, int(match[2]))
+        if len(row) != len(names) + 1:
+            raise InputError(
+                f"{text.at(index)}: {len(row)} values instead of {len(names) + 1}; a value is "
+                "missing or too many, get the complete file"
+            )
+        rows.append(row)
+    rate_line, rate = (
+        text.entry(header, "SAMPLERATE(HZ)")[0],
+        text.entry_number(header, "SAMPLERATE(HZ)"),
+    )
+    seconds = text.entry_number(header, "RECORDLENGTH(SEC)")
+    if rate <= 0.0 or len(rows) < 2:
+        raise InputError(
+            f"{text.at(rate_line)}: {len(rows)} samples at {rate:g} Hz are no record; get the "
+            "complete file"
+        )
+    if not abs(len(rows) - seconds * rate) <= 0.5:
+        raise InputError(
+            f"{text.at(text.entry(header, 'RECORDLENGTH(SEC)')[0])}: {seconds:g} s at {rate:g} Hz "
+            f"are announced but {len(rows)} samples follow; get the complete file"
+        )
+    table = np.array(rows)
+    step, rounding, uneven = time_step(text, lines, table[:, 0], decimals=int(match[3]))
+    if uneven or not math.isclose(step, 1.0 / rate, rel_tol=max(rounding, SAME_STEP)):
+        raise InputError(
+            f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} "
+            "s; get the complete file"
+        )
+    units_line, units = text.entry(header, "AMPLITUDEUNIT")
+    unit = _UNIT.match(units)
+    station = header.get("STATIONCODE", (0, ""))[1]
+    origin = next(
+        (content for key, (_, content) in header.items() if key.startswith("ORIGIN TIME")), ""
+    )
+    down = signs[place] is not None and signs[place][2] == "-"  # type: ignore[index]
+    return text.record(
+        table[:, place + 1],
+        units=unit[0] if unit else units,
+        line=units_line,
+        dt=1.0 / rate,
+        lines=lines,
+        format="CWA",
+        title=f"{origin} {station}".strip(),
+        station=station,
+        component=plain[place] + (", positive the other way" if down else ""),
+        notes=tuple(
+            text.heads[index].lstrip("# ").strip() for index, content in header.values() if content
+        ),
+        dt_from=f"header, line {rate_line + 1}",
+    )
+
+
+def _header(text: TextFile) -> dict[str, tuple[int, str]]:
+    """Return the line and the value of every key of "#Key: value"; of two alike the first."""
+    found: dict[str, tuple[int, str]] = {}
+    for index, line in enumerate(text.heads[:60]):
+        key, colon, value = line.partition(":")
+        if line.startswith("#") and colon:
+            found.setdefault(key.lstrip("# ").strip().upper(), (index, value.strip()))
+    return found

@@ -1,0 +1,82 @@
+"""Read files of the Engineering Strong-Motion database.
+
+They are those of ESM and ITACA, and alike of AFAD: 64 lines "KEY: value", then samples.
+
+One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record
+on.
+"""
+
+import re
+from itertools import takewhile
+
+from ....core.errors import InputError
+from ..record import Record
+from .text import TextFile
+
+_KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
+
+
+def recognises(text: TextFile) -> bool:
+    """Tell whether line 1 is an entry "KEY: value" of such a file.
+
+    One of the first 100 lines has to be NDATA or SAMPLING_INTERVAL_S.
+    """
+    keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
+    entries = [_entry(line) for line in text.heads[:100]]
+    return entries[0] is not None and any(
+        entry is not None and entry[0] in keys for entry in entries
+    )
+
+
+def read(text: TextFile) -> Record:
+    """Return the record of an ESM ASCII file; units and dt are only checked."""
+    entries = list(takewhile(bool, map(_entry, text.heads)))
+    header = {entry[0]: (index, entry[1]) for index, entry in enumerate(entries) if entry}
+    index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
+    if kind and "ACCELERATION" not in kind.upper():
+        raise InputError(
+            f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations "
+            "(.ACC.ASC)"
+        )
+    values, lines = text.series(len(entries))
+    text.refuse_other_count(
+        text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values)
+    )
+    line, units = text.entry(header, "UNITS")
+    value = {key: content for key, (_, content) in header.items()}
+    station = ".".join(filter(None, (value.get("NETWORK"), value.get("STATION_CODE"))))
+    title = " ".join(
+        filter(
+            None,
+            (
+                value.get("EVENT_NAME"),
+                value.get("EVENT_DATE_YYYYMMDD"),
+                value.get("EVENT_TIME_HHMMSS"),
+                station,
+                value.get("STREAM"),
+            ),
+        )
+    )
+    notes = tuple(
+        f"{key}: {content}"
+        for key, content in value.items()
+        if content and not key.startswith("USER")
+    )
+    return text.record(
+        values,
+        units=units,
+        line=line,
+        lines=lines,
+        dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
+        format="ESM",
+        title=title,
+        notes=notes,
+        station=station,
+        component=value.get("STREAM", ""),
+    )
+
+
+def _entry(line: str) -> tuple[str, str] | None:
+    """Return the key and value of a line "KEY: value", None for any other line."""
+    key, colon, value = (part.strip() for part in line.partition(":"))
+    return (key, value) if colon and _KEY.fullmatch(key) else None

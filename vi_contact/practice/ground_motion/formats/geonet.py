@@ -1,0 +1,220 @@
+"""Read files of GeoNet (New Zealand), .V1A and .V2A.
+
+They have three components, one after the other, with accelerations in mm/s².
+
+Each component has 16 lines of text, 4 lines of 10 integers and 6 lines of 10 reals in columns of 8,
+then blocks of accelerations, velocities and displacements, ten a line in columns of 8. Integers 34
+to 36 are the numbers of accelerations, velocities and displacements. Velocities and displacements
+are skipped.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ....core.errors import InputError
+from ..record import Record
+from .statements import agreed
+from .text import NUMBER, TextFile
+
+TEXT_LINES, INTEGER_LINES, REAL_LINES, PER_LINE, WIDTH = 16, 4, 6, 10, 8
+COUNTS = slice(33, 36)  # places of the three numbers of samples among the 40 integers, from 0
+STEP = 25  # place of the time step among the 60 reals
+
+_FIRST = re.compile(r"^\s*+(?:un)?corrected\s++accelerogram\b", re.IGNORECASE)
+_PROCESSED = re.compile(r"^\s*+accelerogram\b.*\bprocessed\b", re.IGNORECASE)
+_POINTS = re.compile(r"\bnumber of points\s*+(\d++)", re.IGNORECASE)
+_DURATION = re.compile(rf"\bduration\s*+({NUMBER})", re.IGNORECASE)
+_STEP = re.compile(
+    rf"\bat intervals of\s++({NUMBER})\s*+s|\bat\s++({NUMBER})\s*+sec intervals", re.IGNORECASE
+)
+_SCALE = re.compile(rf"\breadings in units of\s++({NUMBER})\s*+mm/s", re.IGNORECASE)
+_COMPONENT = re.compile(r"^\s*+component\s++(\S++)", re.IGNORECASE)
+_STATION = re.compile(r"^\s*+site\s++(\S++)", re.IGNORECASE)
+_PEAK = re.compile(rf"^\s*+acceleration:\s*+peak\s*+({NUMBER})\s*+mm/s/s", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Describe one component.
+
+    It has its first line, its name, and the numbers of its three blocks of samples.
+    """
+
+    start: int
+    name: str
+    counts: tuple[int, ...]
+
+    @property
+    def data(self) -> int:
+        """Return the index of the first line of accelerations."""
+        return self.start + TEXT_LINES + INTEGER_LINES + REAL_LINES
+
+    @property
+    def end(self) -> int:
+        """Return the index of the line after the last block."""
+        return self.data + sum(-(-count // PER_LINE) for count in self.counts)
+
+
+def recognises(text: TextFile) -> bool:
+    """Tell whether two of three signs are there.
+
+    They are the first line, "Accelerogram … Processed", and a peak in mm/s/s.
+    """
+    head = text.heads[:TEXT_LINES]
+    signs = (
+        _FIRST.search(head[0]) is not None,
+        any(map(_PROCESSED.search, head)),
+        any(map(_PEAK.search, head)),
+    )
+    return sum(signs) >= 2
+
+
+def read(text: TextFile) -> Record:
+    """Return the record of one component.
+
+    ``channel`` is 1 for the first of the file, or its name such as "S16W".
+    """
+    parts = list(_parts(text))
+    part = parts[text.chosen([part.name for part in parts])]
+    values, lines = _samples(text, part)
+    header = range(part.start, part.start + TEXT_LINES)
+    count = _first(text, header, _POINTS, "Number of points")
+    if count[1] != part.counts[0]:
+        raise InputError(
+            f"{text.at(count[0])}: {count[1]:g} points are announced but the integers of the "
+            f"header say {part.counts[0]}; get the file again"
+        )
+    step = _first(text, header, _STEP, "the interval of the samples")
+    _check_step(text, part, step, count[1])
+    scale = next(
+        (text.number(k, match[1]) for k in header if (match := _SCALE.search(text.heads[k]))), 1.0
+    )
+    peak = next(
+        (text.number(k, match[1]) for k in header if (match := _PEAK.search(text.heads[k]))), None
+    )
+    found = max(map(abs, values)) * scale
+    doubts = (
+        ()
+        if peak is None or abs(found - abs(peak)) <= 0.01 * abs(peak) + 0.1
+        else (
+            f"the header says that the peak is {abs(peak):g} mm/s2, and the samples have {found:g} "
+            "mm/s2",
+        )
+    )
+    words = [" ".join(text.heads[index].split()) for index in header]
+    station = next((match[1] for word in words if (match := _STATION.search(word))), "")
+    return text.record(
+        values,
+        units="mm/s2",
+        scale=scale,
+        dt=step[1],
+        lines=lines,
+        line=None,
+        format="GeoNet",
+        title=" ".join(filter(None, (words[7], station))),
+        notes=tuple(filter(None, words)),
+        station=station,
+        component=part.name,
+        dt_from=f"header, line {step[0] + 1}",
+        doubts=doubts,
+    )
+
+
+def _parts(text: TextFile) -> Iterator[_Part]:
+    """Yield the components of the file, which follow one another without a gap."""
+    start = 0
+    total = len(text.lines)
+    while total and not text.lines[total - 1].strip():
+        total -= 1
+    while start < total:
+        if not (
+            _FIRST.search(text.heads[start])
+            or any(map(_PROCESSED.search, text.heads[start : start + TEXT_LINES]))
+        ):
+            raise InputError(
+                f"{text.at(start)}: a component should begin here with 'Corrected accelerogram' or "
+                "'Uncorrected accelerogram'; lines were lost or added, get the complete file"
+            )
+        integers = _fields(text, start + TEXT_LINES, INTEGER_LINES)
+        named = (_COMPONENT.search(line) for line in text.heads[start : start + TEXT_LINES])
+        part = _Part(
+            start,
+            next((match[1] for match in named if match), ""),
+            tuple(int(count) for count in integers[COUNTS]),
+        )
+        if part.counts[0] < 2 or min(part.counts) < 0 or part.end > total:
+            raise InputError(
+                f"{text.at(start + TEXT_LINES + 3)}: {part.counts[0]} accelerations, "
+                f"{part.counts[1]} velocities and {part.counts[2]} displacements are announced but "
+                f"the file has {total - part.data} lines for them; get the complete file"
+            )
+        yield part
+        start = part.end
+
+
+def _fields(text: TextFile, start: int, lines: int) -> list[float]:
+    """Return the values of lines of ten fields."""
+    values: list[float] = []
+    for index in range(start, start + lines):
+        row = text.fixed(index, WIDTH) if index < len(text.lines) else []
+        if len(row) != PER_LINE:
+            raise InputError(
+                f"{text.path}, line {index + 1}: {len(row)} header values instead of {PER_LINE}; "
+                "get the file again"
+            )
+        values += row
+    return values
+
+
+def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
+    """Return the accelerations as they are written, and the index of the line of each."""
+    values: list[float] = []
+    lines: list[int] = []
+    for index in range(part.data, part.data + -(-part.counts[0] // PER_LINE)):
+        row, wanted = text.fixed(index, WIDTH), min(PER_LINE, part.counts[0] - len(values))
+        if len(row) != wanted:
+            raise InputError(
+                f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is "
+                "missing or too many, get the complete file"
+            )
+        values += row
+        lines += [index] * len(row)
+    return values, lines
+
+
+def _first(text: TextFile, header: range, pattern: re.Pattern[str], what: str) -> tuple[int, float]:
+    """Return the line and the number of the first match; InputError where there is none."""
+    for index in header:
+        if match := pattern.search(text.heads[index]):
+            return index, text.number(index, next(filter(None, match.groups())))
+    raise InputError(
+        f"{text.at(header[0])}: the header does not give {what}; get the complete file"
+    )
+
+
+def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: float) -> None:
+    """Raise InputError unless the step agrees with the one among the reals.
+
+    It has to agree with the duration too.
+    """
+    index = part.start + TEXT_LINES + INTEGER_LINES + STEP // PER_LINE
+    column = STEP % PER_LINE
+    word = text.lines[index][WIDTH * column : WIDTH * (column + 1)].strip()
+    printed = text.number(index, word)
+    if printed > 0.0:
+        half_digit = 0.5 * 10.0 ** -len(word.partition(".")[2])
+        agreed(
+            text,
+            "the time step",
+            [step, (index, printed)],
+            rounding=max(1e-6, 1.01 * half_digit / step[1]),
+        )
+    for place in range(part.start, part.start + TEXT_LINES):
+        if match := _DURATION.search(text.heads[place]):
+            seconds = text.number(place, match[1])
+            if not abs(seconds - count * step[1]) <= 1.01 * step[1] + 0.01:
+                raise InputError(
+                    f"{text.at(place)}: {seconds:g} s are announced but {count:g} points at "
+                    f"{step[1]:g} s follow; get the complete file"
+                )

@@ -1,0 +1,99 @@
+"""Read NIED K-NET and KiK-net files.
+
+There are 17 header lines, then integer counts, eight a row, one component a file.
+
+Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's
+offset, so their mean is removed, as the agency does before it prints "Max. Acc.". NIED forbids
+passing these files on.
+"""
+
+import re
+
+import numpy as np
+
+from ....core.errors import InputError
+from ..record import Record, canonical_units
+from .text import NUMBER, TextFile
+
+# header entries used here; the last one ends the header
+KEYS = (
+    "Origin Time",
+    "Station Code",
+    "Dir.",
+    "Record Time",
+    "Sampling Freq(Hz)",
+    "Duration Time(s)",
+    "Scale Factor",
+    "Max. Acc. (gal)",
+    "Memo.",
+)
+
+_SCALE = re.compile(rf"({NUMBER})\s*+\(([^()]*+)\)\s*+/\s*+({NUMBER})\s*+$")
+_FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)
+
+
+def recognises(text: TextFile) -> bool:
+    """Tell whether five of the entries of a header, in any line, are there."""
+    return sum(any(line.startswith(key) for line in text.heads[:30]) for key in KEYS) >= 5
+
+
+def read(text: TextFile) -> Record:
+    """Return the record of a K-NET or KiK-net file, its mean removed.
+
+    Units and dt are only checked.
+    """
+    header = {
+        key: index
+        for key in KEYS
+        for index in range(len(text.lines))
+        if text.heads[index].startswith(key)
+    }
+    missing = [key for key in KEYS if key not in header]
+    if missing:
+        raise InputError(
+            f"{text.path}: the header has no line {missing[0]!r}; get the complete file"
+        )
+    scale, name = _scale(text, header["Scale Factor"])
+    frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
+    counts, _ = text.series(header["Memo."] + 1)
+    seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
+    if not abs(len(counts) - seconds * frequency) <= 0.5:
+        raise InputError(
+            f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are "
+            f"announced but {len(counts)} samples follow; get the complete file"
+        )
+    lines = tuple(" ".join(line.split()) for line in text.heads[: header["Memo."]])
+    time, station, direction = (text.heads[header[key]][len(key) :].strip() for key in KEYS[:3])
+    return text.record(
+        np.array(counts) - np.mean(counts),
+        units=name,
+        line=header["Scale Factor"],
+        scale=scale,
+        dt=1.0 / frequency,
+        format="K-NET",
+        station=station,
+        component=direction,
+        title=f"{time}, {station} {direction}",
+        notes=(*lines, f"mean of {scale * np.mean(counts):.6g} {name} removed"),
+    )
+
+
+def _scale(text: TextFile, index: int) -> tuple[float, str]:
+    """Return the size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
+    match = _SCALE.search(text.heads[index])
+    if match is None or text.number(index, match[3]) == 0.0:
+        raise InputError(
+            f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file "
+            "again"
+        )
+    return text.number(index, match[1]) / text.number(index, match[3]), canonical_units(
+        text.at(index), match[2]
+    )
+
+
+def _number(text: TextFile, index: int, key: str) -> float:
+    """Return the positive number after a key, "Hz" allowed."""
+    match = _FREQUENCY.match(text.heads[index][len(key) :].strip())
+    if match is None or text.number(index, match[1]) <= 0.0:
+        raise InputError(f"{text.at(index)}: {key!r} has no positive number; get the file again")
+    return text.number(index, match[1])

@@ -1,0 +1,141 @@
+"""Read USGS SMC files (National Strong-Motion Program).
+
+They are of type 2 CORRECTED ACCELEROGRAM, with accelerations in cm/s².
+
+Layout: 11 lines of text; 6 lines of 8 integers in columns of 10; 10 lines of 5 reals in columns of
+15; comment lines starting with "|"; the samples, 8 a line in columns of 10 that touch, so they are
+cut by column and not by blanks. The first integer and the first real are the marks of an undefined
+value (-32768 and 1.7E38).
+"""
+
+import re
+
+from ....core.errors import InputError
+from ..record import Record
+from .text import TextFile
+
+TEXT_LINES, INTEGER_LINES, REAL_LINES = 11, 6, 10
+INTEGER_WIDTH, REAL_WIDTH, SAMPLE_WIDTH = 10, 15, 10
+# places among the 48 integers, from 0
+VERTICAL, AZIMUTH, COMMENTS, SAMPLES, PROBLEM = (12, 13, 15, 16, 17)
+SAMPLING_RATE = 1  # place among the 50 reals
+UNDEFINED = 1e38  # any real at least this large is the mark of an undefined value
+
+_KIND = re.compile(
+    r"^\s*+\d\s++(?:(?:UN)?CORRECTED ACCELEROGRAM|UNKNOWN|VELOCITY|DISPLACEMENT|RESPONSE|FOURIER)",
+    re.IGNORECASE,
+)
+_STATION = re.compile(r"station\s*+=\s*+(.*+)", re.IGNORECASE)
+
+
+def recognises(text: TextFile) -> bool:
+    """Tell whether the first line is the type line of an SMC file, of any type."""
+    return _KIND.match(text.heads[0]) is not None
+
+
+def read(text: TextFile) -> Record:
+    """Return the record of an SMC file.
+
+    ``dt`` is needed only where the file leaves its sampling rate undefined.
+    """
+    kind = text.heads[0].strip()
+    if kind.upper().startswith("1"):
+        raise InputError(
+            f"{text.at(0)}: {kind!r} holds unequally spaced (time, acceleration) pairs before "
+            "instrument correction; get the file of type '2 CORRECTED ACCELEROGRAM'"
+        )
+    if not kind.upper().startswith("2"):
+        raise InputError(
+            f"{text.at(0)}: {kind!r} is not an acceleration; get the file of type "
+            "'2 CORRECTED ACCELEROGRAM'"
+        )
+    integers = _fields(text, TEXT_LINES, INTEGER_LINES, INTEGER_WIDTH, 8)
+    reals = _fields(text, TEXT_LINES + INTEGER_LINES, REAL_LINES, REAL_WIDTH, 5)
+    comments_start = TEXT_LINES + INTEGER_LINES + REAL_LINES
+    start = comments_start + int(integers[COMMENTS])
+    comments = text.heads[comments_start:start]
+    if not 0 <= integers[COMMENTS] < len(text.lines) or any(
+        not line.startswith("|") for line in comments
+    ):
+        raise InputError(
+            f"{text.at(TEXT_LINES + 1)}: the header announces {integers[COMMENTS]:g} comment lines "
+            "but as many lines starting with '|' do not follow; get the file again"
+        )
+    rate = reals[SAMPLING_RATE]
+    stated = 1.0 / rate if 0.0 < rate < UNDEFINED else None
+    direction = _direction(integers)
+    notes = [f"component: {direction}"] if direction else []
+    notes += (
+        ["the file carries the agency's problem flag: read its comments"]
+        if integers[PROBLEM] == 1.0
+        else []
+    )
+    notes += [line[1:].strip() for line in comments if line[1:].strip()]
+    title = "; ".join(
+        " ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *")
+    )
+    samples, lines = _samples(text, start, integers[SAMPLES])
+    return text.record(
+        samples,
+        lines=lines,
+        units="cm/s2",
+        dt=stated,
+        format="USGS SMC",
+        title=title,
+        notes=tuple(notes),
+        station=_station(text),
+        component=direction,
+    )
+
+
+def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -> list[float]:
+    """Cut `lines` lines from `start` into `per_line` columns of `width` characters."""
+    values: list[float] = []
+    for index in range(start, start + lines):
+        row = text.fixed(index, width) if index < len(text.lines) else []
+        if len(row) != per_line:
+            raise InputError(
+                f"{text.at(index)}: {len(row)} header values instead of {per_line}; get the file "
+                "again"
+            )
+        values += row
+    return values
+
+
+def _samples(text: TextFile, start: int, count: float) -> tuple[list[float], list[int]]:
+    """Return the samples in cm/s², and the index of the line of each."""
+    values: list[float] = []
+    lines = list(range(start, len(text.lines)))
+    rows = [text.fixed(index, SAMPLE_WIDTH) for index in lines]
+    while rows and not rows[-1]:
+        del lines[-1], rows[-1]
+    for index, row in zip(lines, rows, strict=True):
+        if any(abs(value) >= UNDEFINED for value in row):
+            raise InputError(
+                f"{text.at(index)}: a sample is marked as undefined; fill the gap or use another "
+                "record"
+            )
+        values += row
+    text.refuse_other_count(TEXT_LINES + 2, count, len(values))
+    text.refuse_uneven_rows(lines, rows)
+    return values, [index for index, row in zip(lines, rows, strict=True) for _ in row]
+
+
+def _direction(integers: list[float]) -> str:
+    """Return the component's direction in words."""
+    if integers[VERTICAL] in (0.0, 180.0):
+        return f"vertical, {'up' if integers[VERTICAL] == 0.0 else 'down'}"
+    undefined = integers[0]
+    return (
+        ""
+        if integers[AZIMUTH] == undefined
+        else f"azimuth {integers[AZIMUTH]:g} degrees clockwise from north"
+    )
+
+
+def _station(text: TextFile) -> str:
+    """Return what follows "station =" on text line 6, up to "component"."""
+    match = _STATION.search(text.heads[5])
+    named = match[1] if match else ""
+    end = named.lower().find("component")
+    return " ".join((named if end < 0 else named[:end]).split())

@@ -1,0 +1,472 @@
+"""Hold a record file with what its caller says about it, and read numbers as Fortran writes them.
+
+What do commas mean? "0,12" is one number or two. With a decimal point anywhere in the data, with a
+blank beside a comma, or with two commas in one word, commas separate. With semicolons between the
+columns, as spreadsheets of half of Europe write them, they are decimal. Nobody can tell in any
+other case.
+"""
+
+import hashlib
+import math
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ....core.algebra import Array
+from ....core.checks import LARGEST, shown
+from ....core.errors import InputError
+from ..record import UNITS, Record, canonical_units
+from .gaps import refuse_fill_values
+
+NUMBER = r"[+-]?(?:(?<![\d.])\d++(?:\.\d*+)?|(?<!\d)\.\d++)(?:[EeDd][+-]?\d++)?"
+"""Regular expression of one Fortran or C number: 1, -1., .5, -.123E-02, 1.0D+3.
+
+It begins in no middle of digits, so that a search takes a time that grows as the line does.
+"""
+
+HEAD = 1000  # characters of a line in which words of a header are looked for
+BYTES = 20 * LARGEST  # of a file: the text of the most numbers that an input may hold
+SAME_STEP = 1e-6  # relative difference between time steps that still counts as rounding
+
+_NUMBER = re.compile(NUMBER)
+_BETWEEN = re.compile(r"[\s,;]+")
+_BETWEEN_DECIMALS = re.compile(r"[\s;]+")
+_COMMA_INSIDE = re.compile(r"(?<=\d),(?=\d)")
+_EMPTY_CELL = re.compile(r"[,;]\s*+[,;]|^\s*+[,;]")
+_LEADING_ZERO = re.compile(r"[EeDd][+-]?0\d")
+_END_DATA = re.compile(r"^\s*+\*++\s*+end\s++(?:of\s++)?data\b", re.IGNORECASE)
+_EXPONENT = re.compile(r"[EeDd][+-]?(\d++)")
+
+Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line, and value
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextFile:
+    """Hold a file as read.
+
+    There are its path as given, its lines without ends, the sha256 of its bytes; and what
+    ``read_record`` is told.
+    """
+
+    path: str
+    lines: tuple[str, ...]
+    sha256: str
+    units: str | None
+    dt: float | None
+    resample_dt: float | None
+    channel: int | str | None
+
+    @cached_property
+    def heads(self) -> tuple[str, ...]:
+        """Return the beginning of every line, for patterns of headers.
+
+        A line of data may be as long as the file.
+        """
+        return tuple(line[:HEAD] for line in self.lines)
+
+    def at(self, index: int) -> str:
+        """Return 'path, line N' of lines[index], counted from 1 as editors do."""
+        return f"{self.path}, line {index + 1}"
+
+    def record(
+        self,
+        samples: Sequence[float] | Array,
+        *,
+        units: str | None,
+        dt: float | None,
+        line: int | None = None,
+        scale: float = 1.0,
+        lines: Sequence[int] | None = None,
+        counted: str = "counted, as the header says",
+        dt_from: str = "header",
+        dt_rounding: float = SAME_STEP,
+        **told: Any,
+    ) -> Record:
+        """Return the record of ``scale`` times samples.
+
+        It has the units and the time step [s] that the file states.
+
+        None: it does not state them. line: index of the one with the units. lines: index of the
+        line of every sample, where values are looked for that stand for missing ones. counted,
+        dt_from: where the number of samples and the time step come from. dt_rounding: relative
+        difference to the step of the caller that is rounding. told: title, notes, format, station,
+        component, doubts. Raises InputError for what the file and its caller leave open, or state
+        differently.
+        """
+        place = self.path if line is None else self.at(line)
+        names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
+        step = self.dt if dt is None else dt
+        if not names:
+            raise InputError(
+                f"{place}: the file does not state its units; pass units= as one of "
+                f"{', '.join(UNITS)}"
+            )
+        if UNITS[names[0]] != UNITS[names[-1]]:
+            raise InputError(
+                f"{place}: the file states its units as {names[0]} but units={self.units!r} was "
+                "passed; leave units out or correct the file"
+            )
+        if step is None:
+            raise InputError(
+                f"{self.path}: the file does not state its time step; pass dt= in seconds"
+            )
+        if (
+            dt is not None
+            and self.dt is not None
+            and not math.isclose(dt, self.dt, rel_tol=dt_rounding)
+        ):
+            raise InputError(
+                f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was "
+                "passed; leave dt out or correct the file"
+            )
+        if lines is not None:
+            refuse_fill_values(samples, lambda k: self.at(lines[k]))
+        stated = "header" if line is None else f"header, line {line + 1}"
+        return Record(
+            acceleration=UNITS[names[0]] * scale * np.array(samples, dtype=float),
+            units=names[0],
+            dt=step,
+            source=self.path,
+            sha256=self.sha256,
+            samples_from=counted,
+            units_from="option" if units is None else stated,
+            dt_from="option" if dt is None else dt_from,
+            **told,
+        )
+
+    def chosen(self, components: Sequence[str]) -> int:
+        """Return which component the caller chose, from 0.
+
+        It raises InputError, which lists them, where none or another one is chosen.
+
+        channel: its number, from 1, or its name, capitals or not.
+        """
+        if self.channel is None and len(components) == 1:
+            return 0
+        wanted = self.channel
+        if isinstance(wanted, str):
+            same = [
+                k
+                for k, name in enumerate(components)
+                if name.casefold() == wanted.strip().casefold()
+            ]
+            if len(same) == 1:
+                return same[0]
+            wanted = int(wanted) if wanted.strip().isdecimal() and len(wanted) < 9 else wanted
+        if (
+            isinstance(wanted, int)
+            and not isinstance(wanted, bool)
+            and 0 < wanted <= len(components)
+        ):
+            return wanted - 1
+        names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
+        wrong = "" if self.channel is None else f"there is no channel {shown(self.channel)}: "
+        count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
+        raise InputError(f"{self.path}: {wrong}the file holds {count} ({names}); pass channel=")
+
+    def refuse_other_count(self, index: int, announced: float, found: int) -> None:
+        """Raise InputError unless as many samples were found as lines[index] announces."""
+        if found != announced:
+            raise InputError(
+                f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get "
+                "the complete file"
+            )
+
+    def filled(self, start: int) -> Sequence[int]:
+        """Return the indices of the lines from `start` on that are not blank.
+
+        They go up to a line '*** End data ***'.
+        """
+        end = next(
+            (
+                index
+                for index in range(start, len(self.lines))
+                if _END_DATA.match(self.heads[index])
+            ),
+            len(self.lines),
+        )
+        return [index for index in range(start, end) if self.lines[index].strip()]
+
+    def series(self, start: int) -> tuple[list[float], list[int]]:
+        """Return all values on the lines from `start` on.
+
+        They come row after row, with the index of the line of each.
+
+        Raises InputError where a row but the last has another length than the first, or the last
+        one is longer: a value was lost there, and those after it would be read too early.
+        """
+        lines = self.filled(start)
+        rows = list(self.rows(lines))
+        self.refuse_uneven_rows(lines, rows)
+        self.refuse_misaligned(lines)
+        self.refuse_empty_lines(lines, rows)
+        return [value for row in rows for value in row], [
+            index for index, row in zip(lines, rows, strict=True) for _ in row
+        ]
+
+    def refuse_uneven_rows(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
+        """Raise InputError unless all rows have the length that most have.
+
+        The last one may be shorter.
+        """
+        lengths = [len(row) for row in rows]
+        usual = max(set(lengths), key=lambda length: (lengths.count(length), length), default=0)
+        for k, length in enumerate(lengths):
+            if length != usual and not (k == len(lengths) - 1 and length < usual):
+                raise InputError(
+                    f"{self.at(lines[k])}: the row has {length} values and other rows have "
+                    f"{usual}; a value is missing or too many, get the complete file"
+                )
+
+    def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
+        """Raise InputError for an empty line among values that stand one a line.
+
+        A value is missing there.
+
+        Empty lines between all of them are line ends that were doubled.
+        """
+        gaps = [
+            before
+            for before, after in pairwise(lines)
+            if after > before + 1 and not self.lines[before + 1].strip()
+        ]
+        if gaps and len(gaps) < len(lines) - 1 and all(len(row) == 1 for row in rows):
+            raise InputError(
+                f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so "
+                "that a value is missing; get the complete file, or take the line out where none is"
+            )
+
+    def refuse_misaligned(self, lines: Sequence[int]) -> None:
+        """Raise InputError for a row that is shorter than others that are aligned.
+
+        Nine of ten rows then have numbers that end at the same places, and a character was lost. A
+        longer row holds a number that is too wide for its columns.
+        """
+        if len(lines) < 5:
+            return
+        ends = [
+            tuple(match.end() for match in _NUMBER.finditer(self.lines[index])) for index in lines
+        ]
+        usual, often = Counter(ends[:-1]).most_common(1)[0]
+        if len(usual) < 2 or often < 0.9 * (len(lines) - 1):
+            return
+        for index, found in zip(lines, ends, strict=True):
+            if found != usual[: len(found)] and found[-1] < usual[len(found) - 1]:
+                raise InputError(
+                    f"{self.at(index)}: the row is shorter than the others, whose numbers end at "
+                    "the same places, so that a character is missing; get the complete file"
+                )
+
+    def rows(self, indices: Sequence[int]) -> Iterator[list[float]]:
+        """Return the values on each of these lines, all the data of the file: see ``numbers``."""
+        decimal = self._decimal_commas(indices)
+        self._refuse_cut_numbers(indices, decimal)
+        return (self.numbers(index, decimal) for index in indices)
+
+    def numbers(self, index: int, decimal_commas: bool = False) -> list[float]:
+        """Return the values on lines[index].
+
+        They are divided by blanks, commas or semicolons, or by the sign of the next.
+
+        Raises InputError naming file, line and word for anything else, "1.234.567" included: where
+        two unsigned numbers touch nobody can tell where the first one ends. An empty cell between
+        two commas is refused too.
+        """
+        values = []
+        if _EMPTY_CELL.search(self.lines[index]):
+            raise InputError(
+                f"{self.at(index)}: a cell is empty between two separators, so that a value is "
+                "missing; get the complete file"
+            )
+        for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(
+            self.lines[index].strip()
+        ):
+            written = word.replace(",", ".") if decimal_commas else word
+            parts = _NUMBER.findall(written)
+            # "1.234-105": the exponent lost its letter
+            whole_after_decimal = len({"." in part for part in parts}) > 1
+            if (
+                "".join(parts) != written
+                or whole_after_decimal
+                or any(part[0] not in "+-" for part in parts[1:])
+            ):
+                parts = [word]  # which is no number, and is refused as one
+            values += [self.number(index, part) for part in parts]
+        return values
+
+    def decimals(self, indices: Sequence[int], column: int) -> int | None:
+        """Return the most decimals in a column of numbers, None where some have an exponent."""
+        decimal = self._decimal_commas(indices)
+        split = _BETWEEN_DECIMALS if decimal else _BETWEEN
+        words = (split.split(self.lines[index].strip()) for index in indices)
+        styles = {_style(row[column]) for row in words if len(row) > column}
+        return (
+            None
+            if any(exponent for _, exponent in styles)
+            else max((found for found, _ in styles), default=None)
+        )
+
+    def fixed(self, index: int, width: int, offset: int = 0) -> list[float]:
+        """Return the values on lines[index] in columns of `width` characters.
+
+        They begin at `offset`, and may touch.
+
+        Raises InputError naming file, line and columns for a field that is no number, or that does
+        not end at the end of its columns as numbers written by column do: a character was lost or
+        added on the line.
+        """
+        line = self.lines[index].rstrip()
+        values = []
+        for left in range(offset, len(line), width):
+            field = line[left : left + width]
+            where = f" in columns {left + 1} to {left + width}"
+            values.append(self.number(index, field.strip(), where))
+            if len(field) < width or field[-1].isspace():
+                raise InputError(
+                    f"{self.at(index)}: {shown(field.strip())}{where} does not end where its "
+                    "columns do, so that a character is missing or too many on the line; get the "
+                    "complete file"
+                )
+        return values
+
+    def number(self, index: int, word: str, where: str = "") -> float:
+        """Return a finite number, also with Fortran's exponent letter D.
+
+        It raises InputError naming file, line and word.
+        """
+        found = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
+        if not math.isfinite(found):
+            raise InputError(
+                f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get "
+                "another file"
+            )
+        return found
+
+    def entry(self, header: Entries, key: str) -> tuple[int, str]:
+        """Return the line and the value of a header's key.
+
+        It raises InputError where the key is missing or empty.
+        """
+        if not header.get(key, (0, ""))[1]:
+            raise InputError(f"{self.path}: the header does not give {key}; get the complete file")
+        return header[key]
+
+    def entry_number(self, header: Entries, key: str) -> float:
+        """Return the number after a header's key."""
+        return self.number(*self.entry(header, key), f" of {key}")
+
+    def _refuse_cut_numbers(self, indices: Sequence[int], decimal_commas: bool) -> None:
+        """Raise InputError where the end of a number was cut off.
+
+        It does so as far as the other numbers tell it.
+
+        That is a number whose exponent has one digit where others have leading zeros ("1.2E-0" for
+        "1.2E-02"), and a last number that has fewer decimals, or no exponent, where all the others
+        in its column have as many.
+        """
+        words: list[list[str]] = []
+        split = _BETWEEN_DECIMALS if decimal_commas else _BETWEEN
+        zeros = any(_LEADING_ZERO.search(self.lines[index]) for index in indices)
+        for index in indices:
+            line = self.lines[index].strip()
+            words.append([word for word in split.split(line) if word])
+            short = [
+                word for word in words[-1] for digits in _EXPONENT.findall(word) if len(digits) == 1
+            ]
+            if zeros and short:
+                raise InputError(
+                    f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of "
+                    "other numbers; a digit was lost, get the complete file"
+                )
+        if len(words) < 2 or not words[-1]:
+            return
+        last = words[-1][-1]
+        place = len(words[-1]) - 1
+        first = 1 if len(words) > 4 else 0  # the first row may be one of a header
+        column = [row[place] for row in words[first:-1] if len(row) > place]
+        styles = {_style(word) for word in column}
+        if len(column) < 3 or len(styles) != 1 or not _NUMBER.fullmatch(last.replace(",", ".")):
+            return
+        decimals, exponent = styles.pop()
+        found, has_exponent = _style(last)
+        if found < decimals or exponent and not has_exponent:
+            raise InputError(
+                f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its "
+                f"column have {decimals} decimals{' and an exponent' if exponent else ''}; get the "
+                "complete file"
+            )
+
+    def _decimal_commas(self, indices: Sequence[int]) -> bool:
+        """Tell whether commas in these lines are decimal.
+
+        They then do not separate. It raises InputError where it cannot be told.
+        """
+        data = [self.lines[index] for index in indices]
+        inside = next(
+            (
+                index
+                for index, line in zip(indices, data, strict=True)
+                if _COMMA_INSIDE.search(line)
+            ),
+            None,
+        )
+        points, semicolons = (any(sign in line for line in data) for sign in ".;")
+        if inside is None or points and not semicolons:
+            return False
+        words = (word for line in data for word in _BETWEEN_DECIMALS.split(line))
+        if any(word.count(",") > 1 or word.strip(",") != word for word in words):
+            return False
+        if semicolons and not points:
+            return True
+        raise InputError(
+            f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; "
+            "write decimal points, and blanks between the numbers"
+        )
+
+
+def _style(word: str) -> tuple[int, bool]:
+    """Return the number of decimals of a number, and whether it has an exponent."""
+    mantissa, letter, _ = re.sub("[Dd]", "E", word.upper().replace(",", ".")).partition("E")
+    return len(mantissa.partition(".")[2]), bool(letter)
+
+
+def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
+    """Read `path` as UTF-8 or, failing that, Latin-1.
+
+    Line ends may be any; ``said`` is what the caller says about it.
+
+    Raises InputError when the file is missing, unreadable, empty, too large or not text.
+    """
+    name = os.fspath(path)
+    if "\0" in name:
+        raise InputError(f"{shown(name)}: a path cannot contain the character NUL; correct it")
+    try:
+        with open(name, "rb") as file:
+            data = file.read(BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(f"{name}: there is no such file; check the path") from None
+    except OSError as error:
+        raise InputError(
+            f"{name}: cannot be read ({error.strerror}); check that it is a file you may read"
+        ) from None
+    if len(data) > BYTES:
+        raise InputError(f"{name}: the file is larger than {BYTES:.0e} bytes; give one record")
+    if not data.strip():
+        raise InputError(f"{name}: the file is empty; download or copy it again")
+    if b"\0" in data:
+        raise InputError(
+            f"{name}: this is not a text file; convert MiniSEED and SAC, unpack archives"
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return TextFile(path=name, lines=tuple(lines), sha256=hashlib.sha256(data).hexdigest(), **said)

@@ -1,0 +1,153 @@
+"""Read files of UNAM (Mexico).
+
+They are "ARCHIVO ESTANDAR DE ACELERACION": lines "KEY : value", then a column a channel, gal.
+"""
+
+import re
+
+from ....core.errors import InputError
+from ..record import Record
+from .statements import agreed
+from .text import TextFile
+
+_FORMAT = re.compile(r"^(\d++)F(\d++)\.(\d++)$", re.IGNORECASE)
+_KEY = re.compile(r"^\s*+([^:]*[^:\s])\s*+:(.*+)$")
+
+
+def recognises(text: TextFile) -> bool:
+    """Tell whether the title of the format, or the beginning of its data, stands in the header."""
+    head = text.heads[:200]
+    titled = any("ARCHIVO ESTANDAR DE ACELERACION" in line.upper() for line in head)
+    return titled or any(line.strip().upper() == "DATOS DE ACELERACION:" for line in head)
+
+
+def read(text: TextFile) -> Record:
+    """Return the record of one channel.
+
+    ``channel`` is its number, from 1, or its direction such as "N00E".
+    """
+    start = next(
+        (k for k, line in enumerate(text.heads) if line.strip().upper() == "DATOS DE ACELERACION:"),
+        None,
+    )
+    if start is None:
+        raise InputError(
+            f"{text.path}: no line 'DATOS DE ACELERACION:' announces the columns; get the complete "
+            "file"
+        )
+    header: dict[str, tuple[int, str]] = {}
+    for index in range(start):
+        if (match := _KEY.match(text.heads[index])) and match[1].strip():
+            header.setdefault(" ".join(match[1].split()).upper(), (index, match[2].strip()))
+    form_line, form = _entry(text, header, "FORMATO DATOS")
+    if not (match := _FORMAT.match(form)):
+        raise InputError(
+            f"{text.at(form_line)}: the format {form!r} of the data is not like '3F10.4'; get the "
+            "file again"
+        )
+    channels, width = int(match[1]), int(match[2])
+    names = _split(_entry(text, header, "ORIENTACION C1")[1])
+    if len(names) != channels or width < 1:
+        raise InputError(
+            f"{text.at(form_line)}: the data have {channels} columns and the header names "
+            f"{len(names)} directions; get the file again"
+        )
+    place = text.chosen(names)
+    data = _first_row(text, start)
+    values: list[float] = []
+    lines = text.filled(data)
+    for index in lines:
+        row = text.fixed(index, width)
+        if len(row) != channels:
+            raise InputError(
+                f"{text.at(index)}: {len(row)} values instead of {channels}, one of each channel; "
+                "a value is missing or too many, get the complete file"
+            )
+        values.append(row[place])
+    count_line, counts = _entry(text, header, "NUM. TOTAL DE MUESTRAS, C1")
+    count = _of(text, count_line, counts, place)
+    text.refuse_other_count(count_line, count, len(values))
+    step = _step(text, header, place, count)
+    units_line, units = _entry(text, header, "UNIDADES DE LOS DATOS")
+    station = header.get("CLAVE DE LA ESTACION", (0, ""))[1]
+    date = " ".join(
+        header.get(key, (0, ""))[1] for key in ("FECHA DEL SISMO [GMT]", "HORA EPICENTRO (GMT)")
+    )
+    notes = tuple(
+        " ".join(text.heads[index].split()) for index, content in header.values() if content
+    )
+    return text.record(
+        values,
+        units=units.partition("(")[0] or units,
+        line=units_line,
+        dt=step[1],
+        lines=lines,
+        format="UNAM",
+        title=f"{date} {station}".strip(),
+        station=station,
+        component=names[place],
+        notes=notes,
+        dt_from=f"header, line {step[0] + 1}",
+    )
+
+
+def _entry(text: TextFile, header: dict[str, tuple[int, str]], start: str) -> tuple[int, str]:
+    """Return the line and the value of the entry whose key begins so.
+
+    It raises InputError where it is missing or empty.
+    """
+    found = next(
+        (entry for key, entry in header.items() if key.startswith(start) and entry[1]), None
+    )
+    if found is None:
+        raise InputError(f"{text.path}: the header does not give {start!r}; get the complete file")
+    return found
+
+
+def _split(value: str) -> list[str]:
+    """Return the parts of "/200/200/200"."""
+    return [part.strip() for part in value.strip().lstrip("/").split("/")]
+
+
+def _of(text: TextFile, line: int, value: str, place: int) -> float:
+    """Return the number of one channel of "/200/200/200"."""
+    parts = _split(value)
+    return text.number(line, parts[place] if place < len(parts) else "", " of the channel")
+
+
+def _step(
+    text: TextFile, header: dict[str, tuple[int, str]], place: int, count: float
+) -> tuple[int, float]:
+    """Return the line of the time step, and the step [s].
+
+    The sampling rate and the duration must confirm it.
+    """
+    line, steps = _entry(text, header, "INTERVALO DE MUESTREO, C1")
+    found = [(line, _of(text, line, steps, place))]
+    rate_line, rates = _entry(text, header, "VEL. DE MUESTREO, C1")
+    rate = _of(text, rate_line, rates, place)
+    found += [(rate_line, 1.0 / rate)] if rate > 0.0 else []
+    agreed(text, "the time step", found, rounding=1e-3)
+    seconds_line, seconds = _entry(text, header, "DURACION DEL REGISTRO (S), C1")
+    duration = _of(text, seconds_line, seconds, place)
+    if not abs(duration - count * found[0][1]) <= 1.01 * found[0][1] + 0.01:
+        raise InputError(
+            f"{text.at(seconds_line)}: {duration:g} s are announced but {count:g} samples at "
+            f"{found[0][1]:g} s follow; get the complete file"
+        )
+    return found[0]
+
+
+def _first_row(text: TextFile, start: int) -> int:
+    """Return the index of the line after the second ruler, or after the line of directions."""
+    rulers = [
+        k
+        for k in range(start, min(start + 8, len(text.lines)))
+        if text.heads[k].strip().startswith("-----")
+    ]
+    if len(rulers) < 2:
+        raise InputError(
+            f"{text.at(start)}: the names of the columns do not stand between two rulers '-----'; "
+            "get the complete file"
+        )
+    return rulers[-1] + 1

@@ -1,0 +1,212 @@
+"""Measure how strong a record is.
+
+There are peaks, Arias intensity, durations, and what spectra say; there is also a table of what it
+holds.
+"""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array
+from ...core.arguments import checked
+from ...core.errors import InputError
+from ...core.units import STANDARD_GRAVITY
+from .processing import integrated
+from .record import UNITS, Record
+from .spectra import fourier_spectrum, response_spectrum
+
+
+@checked
+def pga(record: Record) -> float:
+    """Return the peak ground acceleration, the largest |a| of the samples [m/s²]."""
+    return float(np.max(np.abs(record.acceleration)))
+
+
+@checked
+def pga_time(record: Record) -> float:
+    """Return the time of the first sample that reaches the peak ground acceleration [s]."""
+    return float(np.argmax(np.abs(record.acceleration))) * record.dt
+
+
+@checked
+def pgv(record: Record) -> float:
+    """Return the peak ground velocity.
+
+    It is the largest |v| at the samples of the integrated record [m/s].
+    """
+    return float(np.max(np.abs(integrated(record)[0])))
+
+
+@checked
+def pgd(record: Record) -> float:
+    """Return the peak ground displacement.
+
+    It is the largest |u| of the twice integrated samples, their drift included [m].
+    """
+    return float(np.max(np.abs(integrated(record)[1])))
+
+
+@checked
+def arias(record: Record) -> float:
+    """Return the Arias intensity of the record.
+
+    It is pi / (2 g) times the integral of a² over the record, by the trapezoidal rule [m/s].
+    """
+    return float(husid(record)[-1])
+
+
+@checked
+def d5_95(record: Record) -> float:
+    """Return the time between 5 % and 95 % of the Arias intensity [s].
+
+    It is zero for a record that is all zero.
+
+    Both instants are interpolated linearly in the Husid curve, the Arias intensity accumulated up
+    to t.
+    """
+    return significant_duration(record, 0.05, 0.95)
+
+
+@checked
+def husid(record: Record) -> Array:
+    """Return the Arias intensity accumulated up to each sample, shape (n,) [m/s]."""
+    square = record.acceleration**2
+    steps = 0.5 * record.dt * (square[:-1] + square[1:])
+    return math.pi / (2.0 * STANDARD_GRAVITY) * np.concatenate(([0.0], np.cumsum(steps)))
+
+
+@checked
+def significant_duration(record: Record, start: float, end: float) -> float:
+    """Return the time between fractions `start` and `end` of the Arias intensity [s].
+
+    It is zero if all is zero.
+    """
+    if not 0.0 <= start < end <= 1.0:
+        raise InputError(
+            f"significant_duration: {start!r} to {end!r}; give fractions with 0 <= start < end <= 1"
+        )
+    curve = husid(record)
+    if curve[-1] == 0.0:
+        return 0.0
+    first, last = np.interp((start * curve[-1], end * curve[-1]), curve, record.times)
+    return float(last - first)
+
+
+@checked
+def cav(record: Record) -> float:
+    """Return the cumulative absolute velocity, the integral of |a| [m/s].
+
+    It is exact for straight lines between samples.
+    """
+    a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
+    # two triangles where the sign changes
+    change = record.acceleration[:-1] * record.acceleration[1:] < 0.0
+    total = np.where(change, a + b, 1.0)
+    return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
+
+
+@checked
+def rms(record: Record) -> float:
+    """Return the root of the mean of a² over the record, by the trapezoidal rule [m/s²]."""
+    return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
+
+
+# periods [s] of the trapezoidal rule in `housner_intensity`
+HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)
+# periods [s] among which `predominant_period` looks, 1.6 % apart
+PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)
+
+
+@checked
+def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
+    """Return the pseudo-acceleration at one period [m/s²]."""
+    return float(response_spectrum(record, np.array([period]), damping=damping).psa[0])
+
+
+@checked
+def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
+    """Return Housner's spectrum intensity.
+
+    It is the integral of the pseudo-velocity over T from 0.1 to 2.5 s [m].
+    """
+    psv = response_spectrum(record, HOUSNER_PERIODS, damping=damping).psv
+    return float(np.sum(0.5 * (psv[:-1] + psv[1:]) * np.diff(HOUSNER_PERIODS)))
+
+
+@checked
+def predominant_period(record: Record, *, damping: float = 0.05) -> float:
+    """Return the period of the largest pseudo-acceleration.
+
+    The range is from 0.02 (or ten steps of the record) to 10 s [s].
+    """
+    periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
+    if not periods.size:
+        raise InputError(
+            f"predominant_period: a step of {record.dt:g} s resolves no period; use a smaller step"
+        )
+    return float(periods[np.argmax(response_spectrum(record, periods, damping=damping).psa)])
+
+
+@checked
+def mean_period(record: Record) -> float:
+    """Return the mean period of Rathje, Abrahamson and Bray (1998) [s].
+
+    It is sum(C²/f) / sum(C²) over 0.25 <= f <= 20 Hz.
+
+    C are the Fourier amplitudes. Raises InputError when nothing lies in that band.
+    """
+    frequencies, amplitudes = fourier_spectrum(record)
+    inside = (frequencies >= 0.25) & (frequencies <= 20.0)
+    power = amplitudes[inside] ** 2
+    if not np.any(power > 0.0):
+        raise InputError(
+            "mean_period: the record has no motion from 0.25 to 20 Hz; use a longer or finer one"
+        )
+    return float(np.sum(power / frequencies[inside]) / np.sum(power))
+
+
+@checked
+def record_info(record: Record) -> str:
+    """Return the table of a record.
+
+    It says where it comes from, peaks, intensities, what is left at its end, what is doubted, and
+    notes.
+    """
+    measures = (pga, pga_time, pgv, pgd, arias, d5_95, cav, rms, housner_intensity)
+    found: dict[str, Any] = {one.__name__: one(record) for one in measures}
+    for one in (predominant_period, mean_period):
+        found[one.__name__] = _period_in_words(one, record) if found["pga"] > 0.0 else "(all zero)"
+    velocity, displacement = (values[-1] for values in integrated(record))
+    text = (
+        Path(__file__)
+        .with_name("record_info.txt")
+        .read_text(encoding="utf-8")
+        .format(
+            **found,
+            record=record,
+            title=record.title or "(none)",
+            station=record.station or "(not stated)",
+            component=record.component or "(not stated)",
+            unit=UNITS[record.units],
+            velocity=velocity,
+            displacement=displacement,
+            in_g=found["pga"] / STANDARD_GRAVITY,
+        )
+    )
+    doubts = (f"{'doubt':<20}{doubt}" for doubt in record.doubts)
+    return "\n".join([text, *doubts, *(f"{'note':<20}{note}" for note in record.notes)])
+
+
+def _period_in_words(period: Callable[[Record], float], record: Record) -> str:
+    """Return a period [s], or why the record has none.
+
+    All else of the table is told all the same.
+    """
+    try:
+        return f"{period(record):.3g} s"
+    except InputError as error:  # "name: why; remedy"
+        return f"({str(error).partition(': ')[2].partition(';')[0]})"

@@ -1,0 +1,213 @@
+"""Continue level ground behind a body's sides.
+
+There are dashpots on the difference to the free field, and its stress.
+
+On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the
+ground far away,
+
+    traction = sigma_ff·n - D (v - v_ff),    D v = rho c_P v_n n + rho c_S v_t
+
+(FLAC and PLAXIS free-field boundaries; OpenSees ASDAbsorbingBoundary2D). Without a structure v =
+v_ff and the side is not there: exact here to round-off, as the column has the heights and materials
+of the side's own elements and is marched with the run's scheme. Waves that a structure sends out
+leave through the dashpots. No static load is held: for a gravity stage put the sides on rollers,
+then ``release`` them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, total
+from ...core.checks import provides
+from ...core.errors import InputError
+from ...core.problem import ContactProblem
+from ...core.protocols import EXCITATION, Excitation
+from ...fem import compat
+from ...fem.body.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
+from ...fem.body.space import FemSpace
+from ...fem.matrices.petsc_algebra import PetscMatrix
+from ...laws.materials import Section
+from .companion import CompanionRun
+from .moving_base import BaseMotion, GroundFrame
+from .soil_column import SoilColumn
+
+Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeField(Dashpots):
+    """Describe one vertical side of a body in the plane, its lowest node at the base.
+
+    ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion``
+    (prescribed base) or its ``CompliantBase``. The column behind the side is marched with the
+    scheme and the time steps of the run, from t = 0.
+    """
+
+    base: Base = field(repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for one in getattr(self.ground, "excitations", ()):
+            remedy = "give the excitations of the run, its BaseMotion or its CompliantBase"
+            provides("FreeField", "base", one, EXCITATION, remedy)
+
+    @property
+    def ground(self) -> CompliantBase | GroundFrame:
+        """Return what the column stands on.
+
+        It is the base, or the frame of the ground that the excitations shake.
+        """
+        if isinstance(self.base, BaseMotion | CompliantBase):
+            return self.base
+        return GroundFrame(tuple(self.base) if isinstance(self.base, Sequence) else (self.base,))
+
+    def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
+        """Return the stress of the free field on the side.
+
+        With it come D v_ff, and the column that both are taken from.
+        """
+        side = FreeFieldSide(matrix, self, forms)
+        return BoundaryLoads(
+            (side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ()))
+        )
+
+    @property
+    def expects(self) -> str:
+        """Return in words which motion it expects."""
+        if self.ground.lets_waves_in:
+            return "expects the upgoing motion of the compliant base"
+        return "expects the motion of the rigid base itself (within motion)"
+
+
+class FreeFieldSide:
+    """March the column beside one side, and give the forces it puts on the body.
+
+    InputError for a body in space, a side not vertical, a lowest node free on a rigid base or held
+    on a compliant one.
+    """
+
+    def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:
+        self.space, self.given, self._ground = absorber.space, given, given.ground
+        self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
+        if self.space.dimension != 2:
+            raise InputError(
+                "FreeField is for plane bodies: tie the sides of this one, or give them dashpots"
+            )
+        if self.space.degree > 1:
+            raise InputError("FreeField has a soil column of first order: give assemble degree=1")
+        self._section: Section = forms.section
+        self._dashpots = PetscMatrix(absorber.mat)
+        self.column, self._sign = _column(self.space, forms, self.given)
+        blocks = self.space.facet_blocks(self.given.facets.indices)
+        self._rows = np.abs(self.space.points[blocks, 1][:, None] - self.column.heights).argmin(
+            axis=1
+        )
+        self._blocks = blocks
+        held = total(self.space.comm, self.space.held[blocks[self._rows == 0]].sum())
+        name, compliant = given.facets.name, self._ground.lets_waves_in
+        if not compliant and held < 2:
+            raise InputError(
+                f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the "
+                "base, or give the side its CompliantBase"
+            )
+        if compliant and held:
+            raise InputError(
+                f"the lowest node of free-field side '{name}' is held, but its base is compliant: "
+                "leave the base free"
+            )
+
+    def _problem(self) -> ContactProblem:
+        """Return the column on its base."""
+        ground, column = self._ground, self.column
+        if isinstance(ground, CompliantBase):
+            normal, shear = impedances(
+                ground, self._section, column.lame[0], column.shear[0], column.rho[0]
+            )
+            return column.on_dashpots(float(shear), float(normal), ground.motion)
+        return column.on_rigid_base(lambda t: ground.at(t)[2], lambda t: ground.at(t)[1])
+
+    def motion(self, t: float) -> tuple[Array, Array]:
+        """Return (u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
+        u, v = (x.reshape(-1, 2) for x in self.run.at(t))
+        if isinstance(self._ground, CompliantBase):
+            return u, v
+        u_base, v_base, _ = self._ground.at(t)
+        foot = np.zeros((1, 2))
+        return np.vstack([foot, u]) + u_base, np.vstack([foot, v]) + v_base
+
+    def elastic(self, t: float) -> Array:
+        """Return Pᵀ times the nodal forces of sigma_ff·n."""
+        return self._nodal(self.column.stress(self.motion(t)[0]))
+
+    def viscous(self, t: float) -> Array:
+        """Return Pᵀ D v_ff, and the nodal forces of the damping stresses."""
+        v = self.motion(t)[1]
+        far = np.zeros((len(self.space.nodes), 2))
+        far[self._blocks] = v[self._rows]
+        damping = self.column.beta[:, None] * self.column.stress(v)
+        return self.space.pull(self._dashpots @ far.ravel()) + self._nodal(damping)
+
+    def _nodal(self, stress: Array) -> Array:
+        """Pᵀ of ∫ sigma·n phi_i over the side, sigma (n, 2) constant on every element."""
+        halves = 0.5 * self._sign * np.diff(self.column.heights)[:, None] * stress
+        at_nodes = np.zeros((len(self.column.heights), 2))
+        at_nodes[:-1] += halves
+        at_nodes[1:] += halves
+        force = np.zeros((len(self.space.nodes), 2))
+        force[self._blocks] = at_nodes[self._rows]
+        return self.space.pull(force.ravel())
+
+
+def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
+    """Return the column beside the side.
+
+    It is the same on every rank. With it comes the sign of the side's outward normal.
+    """
+    mesh, name = space.mesh, given.facets.name
+    owned = given.facets.indices[given.facets.indices < mesh.topology.index_map(1).size_local]
+    mesh.topology.create_connectivity(1, 2)
+    cells = np.array(
+        [mesh.topology.connectivity(1, 2).links(facet)[0] for facet in owned], dtype=np.int64
+    )
+    ends = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, owned)][:, :, :2]
+    middles = np.array(
+        [mesh.geometry.x[compat.geometry_dofmap(mesh)[cell], 0].mean() for cell in cells]
+    )
+    _refuse_unlike(forms, name)
+    values = [forms.cellwise(key)[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
+    low, high = ends[:, :, 1].min(axis=1), ends[:, :, 1].max(axis=1)
+    mine = np.column_stack([low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]).reshape(
+        -1, 10
+    )
+    rows = np.concatenate(space.comm.bcast(space.comm.gather(mine)))
+    rows = rows[np.argsort(rows[:, 0])]
+    if np.isnan(rows).any():
+        raise InputError(
+            f"free-field side '{name}' stands beside orthotropic cells, and its soil column is "
+            "isotropic: put a LinearElastic there, or Dashpots(…, material=)"
+        )
+    x, close = rows[:, 7:9], 1e-9 * space.size
+    if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):
+        raise InputError(
+            f"free-field side '{name}' is not one vertical line of facets: give a straight side of "
+            "the body"
+        )
+    lame, shear, rho, alpha_rho, beta = rows[:, 2:7].T
+    column = SoilColumn(np.append(rows[:, 0], rows[-1, 1]), lame, shear, rho, alpha_rho / rho, beta)
+    return column, 1.0 if x[0, 0] > rows[0, 9] else -1.0
+
+
+def _refuse_unlike(forms: Any, name: str) -> None:
+    """Raise InputError where the column could not be what the body is beside it."""
+    if forms.viscous or not forms.fields:
+        what = (
+            "of Rayleigh damping only, not KelvinVoigt"
+            if forms.fields
+            else "of materials, and forms=… have none"
+        )
+        raise InputError(
+            f"free-field side '{name}': its column is {what}: put Dashpots(…, material=) there"
+        )

@@ -1,0 +1,401 @@
+"""Say the words of case files: which classes and functions a table may call where.
+
+Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the
+kind that is asked for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What
+takes functions has no word, or one of a function here that takes none.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Annotated, Any, get_origin, get_type_hints
+
+from .... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, soil, solvers
+from ....core import (
+    ContactSurface,
+    Excitation,
+    FrictionLaw,
+    ImpactLaw,
+    MassLaw,
+    Obstacle,
+    Recorder,
+    Scheme,
+    Solver,
+)
+from ....core.arguments import checked
+from ....core.corners import FEATURE_ANGLE
+from ....core.quantities import RATIO, Positive, Unit
+from ....core.system import SemiDiscreteSystem
+from ....core.units import STANDARD_GRAVITY
+from ....fem import (
+    BodyForce,
+    Cells,
+    CompliantBase,
+    Dashpots,
+    Facets,
+    Heterogeneous,
+    Prescribed,
+    Traction,
+)
+from ....fem.contact.matching import Matching
+from ....laws.impact import VelocityUpdate
+from ....laws.materials import Damping, LinearElastic, Section
+from ....laws.orthotropic import Orthotropic
+from ....meshes.gmsh_session import MeshScript
+from ....run import HalvedAtImpact, Schedule
+from ....run.files.writer import FieldWriter
+from ....solvers import friction, normal, volume
+from ....solvers.condensed import SmallMethod
+from ....solvers.friction.extrapolation import Extrapolation
+from ....solvers.friction.problem import FrictionMethod
+from ....solvers.volume.route import Method
+from ...engineering import checks
+from ...engineering.checks.comparison import Check
+from ...ground_motion.record import LARGEST_PEAK, Record
+from ...soil import SoilCurves, UpgoingVelocity
+from .expressions import Expression, Places
+from .own_classes import defect, is_protocol
+from .parsing import Words
+from .table_calls import Callee, callee
+
+_KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
+    core: (Obstacle, FrictionLaw),
+    laws: (
+        LinearElastic,
+        Orthotropic,
+        Section,
+        Damping,
+        FrictionLaw,
+        ImpactLaw,
+        VelocityUpdate,
+        MassLaw,
+        Excitation,
+    ),
+    ground_motion: (Excitation,),
+    meshes: (MeshScript,),
+    fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, FieldWriter),
+    solvers: (Solver,),
+    normal: (SmallMethod,),
+    friction: (FrictionMethod, Extrapolation),
+    volume: (Method,),
+    schemes: (Scheme,),
+    run: (Solver, Schedule, HalvedAtImpact, Recorder),
+    checks: (Check,),
+    soil: (SoilCurves,),
+}
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
+
+    path: Path
+
+
+def record(
+    path: Path,
+    units: str | None = None,
+    *,
+    dt: Annotated[float | None, Unit("s")] = None,
+    resample_dt: Annotated[float | None, Unit("s")] = None,
+    channel: int | str | None = None,
+    largest: Annotated[float, Unit("m/s²")] = LARGEST_PEAK,
+    processing: "ground_motion.Processing | None" = None,
+) -> Record:
+    """Read a record, ``read_record``, then apply ``processing``."""
+    found = ground_motion.read_record(
+        path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest
+    )
+    return found if processing is None else processing(found)
+
+
+def surface(
+    system: SemiDiscreteSystem,
+    facets: Facets,
+    *,
+    obstacle: Obstacle | None = None,
+    points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
+    feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
+    held: bool = False,
+    springs: Annotated[float | None, Unit("Pa/m")] = None,
+    frictionless_corners: bool = False,
+    hinges: bool = False,
+    name: str = "",
+) -> ContactSurface:
+    """Make a ``contact_surface``.
+
+    ``held`` makes it bilateral everywhere; it rests on ``springs`` if given; with
+    ``frictionless_corners`` there is no friction in corners; ``hinges`` are those of bodies that
+    share nodes; ``name`` is that of it as ``part`` of recorders.
+    """
+    found = fem.contact_surface(
+        system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle, hinges=hinges
+    )
+    found = found if springs is None else found.on_springs(springs)
+    found = found.with_frictionless_corners() if frictionless_corners else found
+    return found.bilateral_everywhere() if held else found
+
+
+def pair(
+    system: SemiDiscreteSystem,
+    facets1: Facets,
+    facets2: Facets,
+    *,
+    matching: Matching | None = None,
+    points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
+    feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
+    held: bool = False,
+    frictionless_corners: bool = False,
+    hinges: bool = False,
+    name: str = "",
+) -> ContactSurface:
+    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``."""
+    found = fem.contact_pair(
+        system,
+        facets1,
+        facets2,
+        matching=matching,
+        points=points,
+        feature_angle=feature_angle,
+        hinges=hinges,
+    )
+    found = found.with_frictionless_corners() if frictionless_corners else found
+    return found.bilateral_everywhere() if held else found
+
+
+def weight(
+    system: SemiDiscreteSystem,
+    *,
+    acceleration: Annotated[float, Unit("m/s²")] = STANDARD_GRAVITY,
+    direction: Annotated[tuple[float, ...] | None, RATIO] = None,
+    cells: Cells | None = None,
+) -> SemiDiscreteSystem:
+    """Return the system ``with_weight``.
+
+    ``cells`` is a group of whole bodies, which alone have weight.
+    """
+    bodies = None if cells is None else fem.bodies_of(system, cells)
+    return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
+
+
+def first_mode_harmonic(
+    system: SemiDiscreteSystem,
+    *,
+    amplitude: Annotated[float, Unit("m/s²")],
+    ratio: Annotated[float, RATIO] = 0.5,
+    direction: Annotated[tuple[float, ...], RATIO] = (1.0, 0.0),
+) -> laws.Harmonic:
+    """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
+    return laws.Harmonic(
+        amplitude, ratio * engineering.lowest_frequency(system), direction=direction
+    )
+
+
+@checked
+def first_mode_period(system: SemiDiscreteSystem, *, parts: Annotated[float, Positive]) -> float:
+    """Return the time step that divides the body's longest period into so many parts [s]."""
+    return 1.0 / (parts * engineering.lowest_frequency(system))
+
+
+def heterogeneous(
+    E: Annotated[float | Expression, Unit("Pa")],
+    nu: Annotated[float | Expression, RATIO],
+    rho: Annotated[float | Expression, Unit("kg/m³")],
+    xi: Annotated[float | Expression, RATIO] = 0.0,
+) -> Heterogeneous:
+    """Make a heterogeneous material."""
+
+    def of(value: float | Expression) -> Any:
+        return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
+
+    return Heterogeneous(of(E), of(nu), of(rho), of(xi))
+
+
+def analytic_gap(function: Annotated[Expression, Unit("m")]) -> core.AnalyticGap:
+    """Make a ``core.AnalyticGap``."""
+    return core.AnalyticGap(Places(function))
+
+
+def resultants(
+    name: str = "",
+    centre: Annotated[tuple[float, ...] | None, Unit("m")] = None,
+    normal: tuple[float, ...] | None = None,
+    part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
+) -> run.Resultants:
+    """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
+    return run.Resultants(name, centre, normal=normal, part=part)
+
+
+def upgoing(
+    excitations: Any,
+    motion: Record | Excitation | Sequence[Excitation] | None = None,
+    *,
+    direction: Annotated[tuple[float, ...], RATIO] = (1.0, 0.0),
+    dt: Annotated[float | None, Unit("s")] = None,
+    outcrop: bool = True,
+) -> Any:
+    """Return ``soil.upgoing`` of a motion, or of the run's excitations.
+
+    These then come up through the base alone.
+    """
+    return soil.upgoing(
+        excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop
+    )
+
+
+def compliant_base(
+    facets: Facets,
+    *,
+    motion: UpgoingVelocity,
+    material: LinearElastic | None = None,
+    normal: float = 1.0,
+    tangential: float = 1.0,
+) -> CompliantBase:
+    """Make a ``fem.CompliantBase``."""
+    return CompliantBase(facets, material, normal, tangential, motion=motion)
+
+
+def free_field(
+    excitations: Any,
+    facets: Facets,
+    *,
+    base: CompliantBase | None = None,
+    material: LinearElastic | None = None,
+    normal: float = 1.0,
+    tangential: float = 1.0,
+) -> "soil.FreeField":
+    """Make a free-field side on the base of the run's excitations, or a compliant one."""
+    foot = excitations if base is None else base
+    return soil.FreeField(facets, material, normal, tangential, base=foot)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Hold what a problem is made of.
+
+    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium;
+    moved: the excitations come up through its base, and are no inertia load.
+    """
+
+    system: SemiDiscreteSystem
+    surface: ContactSurface
+    tags: Any
+    weighted: bool = False
+    moved: bool = False
+
+    @property
+    def steady(self) -> bool:
+        """Say whether they serve other excitations too: nothing in them moves with these."""
+        return not (self.system.companions or self.surface.companions or self.moved)
+
+
+# kind -> word -> what it calls, when asked
+_FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
+    MeshFile: {"read_mesh": lambda: MeshFile},
+    Dashpots: {"CompliantBase": lambda: compliant_base, "FreeField": lambda: free_field},
+    CompliantBase: {"CompliantBase": lambda: compliant_base},
+    UpgoingVelocity: {"upgoing": lambda: upgoing},
+    ContactSurface: {"contact_surface": lambda: surface, "contact_pair": lambda: pair},
+    ImpactLaw: {"Elastic": lambda: laws.Elastic},
+    Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},
+    Excitation: {"FirstModeHarmonic": lambda: first_mode_harmonic},
+    Schedule: {"FirstModePeriod": lambda: first_mode_period},
+    Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
+    Obstacle: {"AnalyticGap": lambda: analytic_gap},
+    Recorder: {"Resultants": lambda: resultants},
+}
+
+
+def names_of(kind: Any) -> tuple[str, ...]:
+    """Return the words for things of a kind: ``names_of(Scheme)`` are the schemes."""
+    return tuple(_choices()[kind])
+
+
+@cache
+def _choices() -> Mapping[Any, Mapping[str, Callee]]:
+    """Return kind -> word -> what it calls."""
+    of_rooms = (kind for kinds in _KINDS.values() for kind in kinds)
+    return MappingProxyType({kind: _Listed(kind) for kind in (*of_rooms, *_FUNCTIONS)})
+
+
+class _Listed(Mapping[str, Callee]):
+    """Find the words for a kind, each when it is asked for.
+
+    Most are of modules that a case does not need.
+    """
+
+    def __init__(self, kind: Any) -> None:
+        self._kind, self._rooms = kind, [room for room, kinds in _KINDS.items() if kind in kinds]
+
+    def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
+        """Return what words with these names before the dot call; of all if it is None."""
+        found: dict[str, Callee] = {}
+        for room in self._rooms:
+            own = (
+                room.__all__ if names is None else [name for name in names if name in room.__all__]
+            )
+            found |= {one.name: one for one in _callees(room, self._kind, own)}
+        functions = _FUNCTIONS.get(self._kind, {}).items()
+        return found | {
+            name: callee(one(), name=name)
+            for name, one in functions
+            if names is None or name in names
+        }
+
+    @cached_property
+    def _all(self) -> dict[str, Callee]:
+        return self._found()
+
+    def __getitem__(self, word: str) -> Callee:
+        return self._found([word.partition(".")[0]])[word]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __bool__(self) -> bool:
+        return True  # without looking
+
+
+def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
+    """Yield the classes of these names that are of this kind.
+
+    Named constructors are among them; none needs functions.
+    """
+    for cls in (getattr(room, name) for name in names):
+        if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
+            made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
+            yield from (
+                one
+                for one in made
+                if not any(get_origin(one.hints[name]) is Callable for name in one.required)
+            )
+
+
+def _constructors(cls: type) -> Iterator[Any]:
+    """Yield the classmethods that return an object of the class."""
+    for name, one in vars(cls).items():
+        if isinstance(one, classmethod) and get_type_hints(one.__func__).get("return") is cls:
+            yield getattr(cls, name)
+
+
+def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
+    """Return the words of a case file in this folder.
+
+    Its relative paths begin there; ``allowed`` are others' packages.
+    """
+    default = {
+        LinearElastic: "LinearElastic",
+        Record: "read_record",
+        ContactSurface: "contact_surface",
+        Traction: "Traction",
+        Dashpots: "Dashpots",
+        FieldWriter: "XDMF",
+    }
+    return Words(
+        folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
+    )
