@@ -151,7 +151,8 @@ class March:
 
     def _make_step(self, dt: float, *, final: bool) -> Report | None:
         """Do the work of ``_attempt``, in its frame of all ranks."""
-        problem, scheme = self.method.problem, self.method.scheme
+        problem = self.method.problem
+        scheme = self.method.scheme
         state = self._state_for(dt)
 
         # The scheme reduces the step to one inequality, A x = b with contact.

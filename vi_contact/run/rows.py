@@ -90,7 +90,8 @@ def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many
     """
 
     def own_state(row: int) -> State:
-        u, v = many.u[row], many.v[row]
+        u = many.u[row]
+        v = many.v[row]
         products = [("M", v, many.v), ("K", u, many.u)]
         if problem.equations.C is not None:
             products.append(("C", u, many.u))

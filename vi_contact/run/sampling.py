@@ -52,7 +52,8 @@ def _sources(problem: ContactProblem) -> Iterator[Any]:
     First come excitations, then loads, prescribed and moving parts.
     """
     yield from problem.excitations
-    system, surface = problem.system, problem.surface
+    system = problem.system
+    surface = problem.surface
     for _, history in system.load.separable:
         yield history
     yield from (*system.load.general, *system.load.viscous, *system.load.inertial)

@@ -100,7 +100,8 @@ class Session:
 
     def settings(self) -> dict[str, Any]:
         """Return what was asked for, for log and summary."""
-        method, problem = self.method, self.method.problem
+        method = self.method
+        problem = self.method.problem
         solver = method.solvers[0]
         if self.request.cross_check is not None:
             solver = getattr(solver, "primary", solver)

@@ -205,7 +205,8 @@ def _words_of(facts: Mapping[str, Any]) -> dict[str, Any]:
     length = (
         f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s"
     )
-    mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
+    mean = facts["seconds_per_step"]
+    plain = facts["seconds_per_linear_step"]
     ratio = None
     if np.isfinite(mean):
         ratio = ""

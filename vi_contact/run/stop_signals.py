@@ -59,7 +59,8 @@ class StopSignals:
         """
         over = over or self._late
         if comm.size == 1:
-            number, late = self._number, over
+            number = self._number
+            late = over
         else:
             number, late = comm.max(np.array([self._number, over], dtype=float))
         if self._lasting:

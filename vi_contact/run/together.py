@@ -198,7 +198,9 @@ class Group:
 
         Where there are such runs none is made.
         """
-        runs, scheme, problem = self._runs, self._scheme, self._problem
+        runs = self._runs
+        scheme = self._scheme
+        problem = self._problem
         if dt != self._dt:
             self._begin(dt)
 
@@ -245,7 +247,8 @@ class Group:
             rows: its answers.
             parts: of the reports, steps and results by row; the certificates are added to them.
         """
-        steps, results = parts["step"], parts["result"]
+        steps = parts["step"]
+        results = parts["result"]
         certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [
             row
@@ -282,7 +285,9 @@ class Group:
             parts: of the reports, by row, to which the rest is added.
             dt: the length of the step [s].
         """
-        problems, scheme, old = self._problems, self._scheme, self._states
+        problems = self._problems
+        scheme = self._scheme
+        old = self._states
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             frozen(vector)  # what is known of them stays true
@@ -316,7 +321,9 @@ class Group:
             free: the same one by one.
             dt: the length of the step [s].
         """
-        problem, scheme, old = self._problem, self._scheme, self._states
+        problem = self._problem
+        scheme = self._scheme
+        old = self._states
         closed = rows.active & problem.surface.rigid
         if problem.impact is None or not closed.any():
             return rows, free

@@ -56,7 +56,8 @@ def identity(
         start: the time [s] from which histories count.
         end: the time [s] up to which they count.
     """
-    system, surface = problem.system, problem.surface
+    system = problem.system
+    surface = problem.surface
 
     # Vectors w made of the numbers of the unknowns, through which matrices and loads are seen.
     probes = [probe(np.asarray(system.space.ids), number) for number in range(PROBES)]
@@ -126,7 +127,9 @@ def _same_numbers(ours: Numbers, theirs: Any) -> bool:
 
 def _same_text(ours: str, theirs: str) -> bool:
     """Say whether words are the same, and numbers between them to SAME."""
-    our, their = _NUMBER.split(ours), _NUMBER.split(theirs)  # words and numbers in turn
+    # words and numbers in turn
+    our = _NUMBER.split(ours)
+    their = _NUMBER.split(theirs)
     if len(our) != len(their) or our[::2] != their[::2]:
         return False
     numbers = zip(our[1::2], their[1::2], strict=True)
@@ -250,6 +253,7 @@ def _friction(problem: ContactProblem) -> Numbers:
 
     They are those at several slip rates.
     """
-    law, weights = problem.friction, problem.surface.weights
+    law = problem.friction
+    weights = problem.surface.weights
     rates = [law.at(np.full(len(weights), speed)).slope(weights) for speed in SPEEDS]
     return _columns(problem.surface, [law.limit(weights, weights, 1.0), *rates])

@@ -332,7 +332,8 @@ class Tally:
 
         The defect is relative to the largest energy or input work of the run.
         """
-        most, last = self._most, self._last
+        most = self._most
+        last = self._last
         start = self._first["energy_kinetic"] + self._first["energy_strain"]
         size = max(most["energy"], most["work"])
         relative = most["defect"] / size if size > 0.0 else most["defect"]

@@ -74,7 +74,9 @@ class Contact:
     """
 
     arrays: bool = True
-    _axes, _frictional = AXES, False  # those of the problem, once it is started
+    # those of the problem, once it is started
+    _axes = AXES
+    _frictional = False
     _ARRAYS: ClassVar[tuple[str, ...]] = ("pressure", "gap", "active", "traction_t", "slip")
 
     def __post_init__(self) -> None:
@@ -111,7 +113,8 @@ class Contact:
 
     def _row(self, state: State) -> Row:
         """Return the row of a state. Collective."""
-        surface, r_n = self._problem.surface, state.r_n
+        surface = self._problem.surface
+        r_n = state.r_n
         gap = surface.gap(state.t) - surface.normal_values(state.u)
         if not surface.plain:
             gap = gap + surface.compliance * r_n
@@ -129,7 +132,8 @@ class Contact:
         if surface.comm.size > 1:
             sums = surface.comm.sum(np.array(sums)).tolist()
         closed, count, resultant, *vectors = sums
-        pull, moment = vectors[: len(self._axes)], vectors[len(self._axes) :]
+        pull = vectors[: len(self._axes)]
+        moment = vectors[len(self._axes) :]
 
         # Largest values; moving obstacles also watch what lies between the points.
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
@@ -161,7 +165,9 @@ class Contact:
         if self._problem.surface.comm.size == 1:
             return arrays
         table = self._problem.surface.on_first(np.column_stack(arrays))
-        pressure, gap, active = table[:, 0], table[:, 1], table[:, 2] > 0.0
+        pressure = table[:, 0]
+        gap = table[:, 1]
+        active = table[:, 2] > 0.0
         rubbing = np.hsplit(table[:, 3:], 2) if self._frictional else ()
         return [array.copy() for array in (pressure, gap, active, *rubbing)]
 
@@ -198,7 +204,8 @@ class Contact:
 
     def _friction_force(self, state: State) -> list[float]:
         """Return the components [N] of the friction force on the body, -Σ r_t t. Collective."""
-        surface, system = self._problem.surface, self._problem.system
+        surface = self._problem.surface
+        system = self._problem.system
         load = surface.reaction_load(np.zeros(surface.count), system.rows, state.r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
         return force.tolist()

@@ -76,7 +76,8 @@ class Energy:
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
-        system, new = self._problem.equations, report.new
+        system = self._problem.equations
+        new = report.new
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # the session refuses overflow
             # The step without its impact: from the energies before it to those of v⁻.

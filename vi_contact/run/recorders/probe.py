@@ -86,7 +86,8 @@ class Probe:
 
         def acceleration() -> Array:
             ground = self._problem.ground_acceleration
-            t_old, t_new = report.old.t, report.new.t
+            t_old = report.old.t
+            t_new = report.new.t
             mean = 0.5 * (ground(t_old) + ground(t_new))
             return self._sample(report.balance.a, t_new, 2) + mean
 

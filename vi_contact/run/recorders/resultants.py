@@ -99,7 +99,8 @@ class Resultants:
         """Call ``start`` first."""
         columns = {}
         for quantity in self._quantities:
-            kind, axis = quantity, ""
+            kind = quantity
+            axis = ""
             if quantity not in _MEANING:  # a component, such as force_x
                 kind, _, axis = quantity.partition("_")
             unit, text = _MEANING[kind]
@@ -172,7 +173,10 @@ class Resultants:
 
     def _row(self, state: State) -> Row:
         """Return the row of a state. Collective."""
-        surface, part, r_n, d = self._surface, self._part, state.r_n, self._part.dimension
+        surface = self._surface
+        part = self._part
+        r_n = state.r_n
+        d = self._part.dimension
         u_n = surface.normal_values(state.u)
         slip = surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
