@@ -317,8 +317,6 @@ def one_per_direction(
 
     Faces of one direction at a node are one condition: weights added, smaller gap.
 
-    ``whole``: the nodes with the weights of all their faces.
-
     Args:
         whole: the nodes, with the weights of all their faces.
         nodes: one for each face of a node, those of one node in a row.
