@@ -346,7 +346,10 @@ def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
 
 
 def _as_table(rows: Any, layout: Any) -> Indices:
-    """Cell rows as a table: an AdjacencyList in 0.5, an array since. A rank may have none."""
+    """Return cell rows as a table: they are an AdjacencyList in 0.5, an array since.
+
+    A rank may have none.
+    """
     return rows if isinstance(rows, np.ndarray) else rows.array.reshape(-1, layout.num_dofs)
 
 

@@ -347,6 +347,16 @@ def check_initial(mesh: Mesh, **values: Any) -> None:
 
 
 def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
+    """Return both members of a pair.
+
+    Args:
+        name: the argument that has it.
+        pair: what was given.
+        remedy: how messages end.
+
+    Raises:
+        InputError: it has not two members.
+    """
     found = several(OWNER, f"a pair of {name}", pair, remedy)
     if len(found) != 2:
         raise InputError(f"{OWNER}: a pair of {name} has {len(found)} members; {remedy}")

@@ -160,7 +160,7 @@ class DashpotMatrix:
         self._refuse_held()
 
     def _matrix(self, facets: Any) -> Any:
-        """∫ over some facets."""
+        """Assemble D over some facets."""
         u = ufl.TrialFunction(self.space.V)
         v = ufl.TestFunction(self.space.V)
         n = ufl.FacetNormal(self.space.mesh)
@@ -170,7 +170,7 @@ class DashpotMatrix:
         return compat.assemble_matrix(self.space.compiled(density * measure))
 
     def _resistance(self, mat: Any) -> Array:
-        """∫ e_c·D e_c of every direction c, on all ranks."""
+        """Return ∫ e_c·D e_c of every direction c, on all ranks."""
         whole = PetscMatrix(mat)
         return self.space.comm.sum(np.array([e @ (whole @ e) for e in self.space.translations]))
 

@@ -234,7 +234,7 @@ class ElasticForms:
         return form + inside * modulus * self.dilatation.of(r) * ufl.div(self.v) * ufl.dx
 
     def _viscous_form(self) -> Any:
-        """∫ of the viscous stresses of KelvinVoigt."""
+        """Return the form of the viscous stresses of KelvinVoigt."""
         lame, shear = (
             compat.constant(self.space.mesh, self.section.thickness * one)
             for one in self.viscous or ()
@@ -288,6 +288,14 @@ def _largest_ratio(xi: Any, dofs: Any) -> float:
 
 
 def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tuple[Any, ...]:
+    """Return lame, shear, rho, alpha rho, beta and lame_out of a material (``FIELDS``).
+
+    Args:
+        one: the material, or values at all unknowns of the cellwise space.
+        section: that of the body.
+        damping: the law of C.
+        dimension: d.
+    """
     lame, shear = section.elastic_constants(one)
     alpha, beta = damping.coefficients(one)
     # sigma_zz = lambda tr(eps) in plane strain, 0 in plane stress: only von Mises stress needs it

@@ -97,10 +97,22 @@ class Heterogeneous:
 
 
 def _is_function(value: Any) -> bool:
+    """Say whether a value is a Function of DOLFINx."""
     return isinstance(value, Expr) and hasattr(value, "function_space")
 
 
 def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
+    """Return a constant at all unknowns of a cellwise space. Collective.
+
+    Args:
+        words: what messages call it.
+        value: a number, a Function, an expression of UFL, or a function of points.
+        space: DG0 or DG1.
+        comm: the ranks.
+
+    Raises:
+        InputError: on all ranks, a value of another mesh, and one that cannot be evaluated.
+    """
     found = compat.function(space)
     domains = extract_domains(value) if isinstance(value, Expr) else ()
     if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):

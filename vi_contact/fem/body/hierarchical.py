@@ -74,7 +74,7 @@ class Hierarchy:
         return every[: len(nodal)]
 
     def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
-        """Return owned nodal values (k, c)at mid-points too.
+        """Return owned nodal values (k, c) at mid-points too.
 
         They are given with a ``mean`` of the ends of edges at mid-points that are known.
 

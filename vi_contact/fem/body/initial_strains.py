@@ -150,7 +150,7 @@ class InitialStrains:
             self.follow(0.0, only=one)  # tells of wrong functions before there is any work
 
     def _split(self, eps: Any) -> tuple[Any, Any]:
-        """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
+        """Return (strain (d, d), that across the plane, none in plane stress) of tensors."""
         d = self._space.dimension
         panel = isinstance(self._body.section, PlaneStress)
         free = d != 2 or panel

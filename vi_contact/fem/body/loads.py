@@ -80,6 +80,7 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
 
 
 def _zero(points: Array, t: float) -> Array:
+    """Return no motion at points (k, d) at any time."""
     return np.zeros_like(points)
 
 
@@ -207,13 +208,14 @@ class Support:
 
 
 def _same(one: Value, other: Value) -> bool:
-    """Whether two values are one, or equal constants; a function that is not given is zero."""
+    """Say whether two values are one, or equal constants; a function not given is zero."""
     if callable(one) or callable(other):
         return bool(one == other) or (_at_rest(one) and _at_rest(other))
     return np.array_equal(one, other)
 
 
 def _at_rest(value: Value) -> bool:
+    """Say whether a value is zero at all times."""
     return value is _zero or (not callable(value) and not np.any(value))
 
 

@@ -67,6 +67,11 @@ def release(
 
 
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
+    """Return the unknowns of both problems.
+
+    Raises:
+        InputError: they are on different meshes, or have other contact points.
+    """
     before = static.system.space
     after = problem.system.space
     if (
@@ -244,7 +249,7 @@ def _refuse_moved(
 
 
 def _contact_force(problem: ContactProblem, state: State) -> Array:
-    """B_nᵀ r_n + B_tᵀ r_t on the system's own unknowns."""
+    """Return B_nᵀ r_n + B_tᵀ r_t on the system's own unknowns."""
     surface = problem.surface
     force = surface.reaction_load(state.r_n, problem.system.rows, state.r_t)
     if surface.coupling is not None:  # the load of relative unknowns is Rᵀ f, and R⁻¹ = 2 - R

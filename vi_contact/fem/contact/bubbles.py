@@ -103,12 +103,7 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
     parts = from_each(space.comm, own.pick(away))
     if not everywhere:
         parts[space.comm.rank] = own
-    return Bubbles(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in Bubbles.__annotations__
-        )
-    )
+    return Bubbles.join(parts)
 
 
 def _integrals(x: Array) -> tuple[Array, Array]:

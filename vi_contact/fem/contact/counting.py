@@ -5,13 +5,12 @@ This is the `Census` of a contact surface.
 
 import logging
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Comm, Mask, from_each, total
+from ...core.algebra import Array, Comm, Mask, total
 from ...core.census import Census
-from .nodes import Nodes
+from .nodes import Nodes, gather_rows
 
 log = logging.getLogger(__name__)
 
@@ -59,9 +58,8 @@ def tell(comm: Comm, census: Census) -> None:
 
 
 def _gathered(comm: Comm, nodes: Nodes) -> Array:
-    """Coordinates of the nodes of all ranks, by their numbers. Collective."""
-    parts: Any = from_each(comm, (nodes.numbers, nodes.points))
-    numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    """Return coordinates of the nodes of all ranks, by their numbers. Collective."""
+    numbers, points = gather_rows(comm, nodes.numbers, nodes.points)
     return np.asarray(points[np.argsort(numbers)])
 
 

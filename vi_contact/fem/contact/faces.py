@@ -23,7 +23,7 @@ from .. import compat
 from ..body.space import FemSpace
 from ..mesh.numbering import facet_rows, is_curved
 from ..mesh.tagged_mesh import Facets
-from .nodes import Nodes
+from .nodes import Nodes, gather_rows
 
 log = logging.getLogger(__name__)
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
@@ -110,8 +110,7 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
         vertices = vertices[kept]
         normals = normals[kept]
     # those of all ranks, each once, with the nodes of a facet in the order of their numbers
-    parts = from_each(space.comm, (vertices, normals))
-    rows, normals = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+    rows, normals = gather_rows(space.comm, vertices, normals)
     if not len(rows):
         return Boundary(rows, normals, local, np.zeros(0, dtype=np.int64))
     order = np.argsort(rows, axis=1)
@@ -138,8 +137,9 @@ def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -
     every = normals.reshape(-1, normals.shape[2])
     numbers, low, high = _boxes(vertices.ravel(), every, every)
     away = ~np.isin(numbers, space.nodes)
-    parts = [(numbers, low, high), *from_each(space.comm, (numbers[away], low[away], high[away]))]
-    numbers, low, high = _boxes(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+    others = gather_rows(space.comm, numbers[away], low[away], high[away])
+    pairs: Any = zip((numbers, low, high), others, strict=True)
+    numbers, low, high = _boxes(*map(np.concatenate, pairs))
     wide = np.linalg.norm(high - low, axis=1) > 2.0 * np.sin(0.5 * angle)
     return np.unique(np.concatenate(from_each(space.comm, numbers[wide])))
 
@@ -370,8 +370,7 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
     """
     _, first, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
     rows = first[counts > 1]
-    parts = from_each(space.comm, (slots[rows], nodes.points[rows]))
-    numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    numbers, points = gather_rows(space.comm, slots[rows], nodes.points[rows])
     if space.comm.rank == 0 and len(numbers):
         some = points[np.argsort(numbers)[:NAMED]]
         places = ", ".join(at(point) for point in some) + (", …" if len(numbers) > NAMED else "")

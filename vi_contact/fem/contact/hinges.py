@@ -19,7 +19,7 @@ from .. import compat
 from ..body.space import FemSpace
 from ..mesh.nodal_space import parts_of
 from ..mesh.numbering import node_numbers
-from .nodes import Nodes
+from .nodes import Nodes, gather_rows
 
 NAMED = 4  # hinges that a message names
 
@@ -124,6 +124,5 @@ def gathered_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
         nodes: those of this rank.
         chosen: which of them.
     """
-    parts = from_each(comm, (nodes.numbers[chosen], nodes.points[chosen]))
-    numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    numbers, points = gather_rows(comm, nodes.numbers[chosen], nodes.points[chosen])
     return np.asarray(points[np.argsort(numbers)])

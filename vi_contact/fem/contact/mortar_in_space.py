@@ -340,10 +340,10 @@ def _assembled(
             )
         if borne.any():
             parts.append(_carry(D, one.nodes.points, theirs, block, by, borne, n))
-    values, *places = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
-    )
-    return D, sp.csr_matrix((values, tuple(places)), shape=(m, n)), overlap
+    values = np.concatenate([part.data for part in parts])
+    rows_of_values = np.concatenate([part.row for part in parts])
+    columns = np.concatenate([part.col for part in parts])
+    return D, sp.csr_matrix((values, (rows_of_values, columns)), shape=(m, n)), overlap
 
 
 def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:

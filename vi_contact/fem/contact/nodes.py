@@ -17,8 +17,21 @@ from ...core.algebra import Array, Comm, Indices, Mask, from_each, largest
 from ...core.collective import together
 
 
+def gather_rows(comm: Comm, *arrays: Any) -> tuple[Any, ...]:
+    """Return arrays of rows, each with the rows of all ranks, on every rank. Collective."""
+    parts = from_each(comm, arrays)
+    return tuple(np.concatenate(array) for array in zip(*parts, strict=True))
+
+
 class Rows:
-    """Take rows out of all arrays of a dataclass that holds nothing else."""
+    """Take rows out of all arrays of a dataclass that holds nothing else, and join them."""
+
+    @classmethod
+    def join(cls, parts: Sequence[Self]) -> Self:
+        """Return the rows of all parts, one part after the other."""
+        names = [each.name for each in fields(cast(Any, cls))]
+        arrays = [[getattr(part, name) for part in parts] for name in names]
+        return cls(*map(np.concatenate, arrays))
 
     def pick(self, rows: Any) -> Self:
         """Return what is in these rows."""
@@ -48,9 +61,7 @@ class Nodes(Rows):
 
 def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
     """Return the nodes of all parts, one part after the other."""
-    return Nodes(
-        *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Nodes))
-    )
+    return Nodes.join(parts)
 
 
 def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
@@ -97,9 +108,9 @@ def asked(
         failed = True
     if not largest(comm, failed):
         return answer
-    parts = from_each(comm, (slots, *values))
-    order = np.argsort(np.concatenate([part[0] for part in parts]))
-    rows = [np.concatenate([part[i] for part in parts])[order] for i in range(1, 1 + len(values))]
+    every_slot, *every = gather_rows(comm, slots, *values)
+    order = np.argsort(every_slot)
+    rows = [array[order] for array in every]
     # a function that depends on the rank may fail on one, and not on the others
     with together(comm):
         whole = ask(*rows)

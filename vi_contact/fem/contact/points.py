@@ -125,7 +125,7 @@ def contact_points(
 
 
 def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") -> Array:
-    """Values of this shape, also given once for all nodes.
+    """Return values of this shape, also given once for all nodes.
 
     Args:
         meaning: what messages call the value.

@@ -30,7 +30,7 @@ from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split
 from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
 from .hinges import gathered_points, hinges_of, refuse_hinges
 from .matching import EDGE_ON
-from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
+from .nodes import Nodes, asked, everywhere, gather_rows, joined_nodes, slots_of
 from .watching import Watched, clamped_or_prescribed, watched_nodes
 
 log = logging.getLogger(__name__)
@@ -192,10 +192,7 @@ def moved_by_held(
     faced = [_faced_by(part) for part in conditions]
     own = [np.zeros(0, dtype=np.int64), *(part.nodes.numbers for parts in faced for part in parts)]
     numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate(own))))
-    shares = [
-        [(part.P, np.searchsorted(numbers, part.nodes.numbers)) for part in parts]
-        for parts in faced
-    ]
+    places = [[np.searchsorted(numbers, part.nodes.numbers) for part in parts] for parts in faced]
 
     def moved(nodal: Array) -> tuple[Array, Array]:
         nodal = nodal.reshape(-1, space.dimension)
@@ -203,9 +200,11 @@ def moved_by_held(
             nodal = space.hierarchy.bent(nodal)
         values = space.at_nodes(numbers, nodal)
         motions = []
-        for part, pairs in zip(conditions, shares, strict=True):
-            still = np.zeros_like(part.directions)
-            motions.append(sum((P @ values[place] for P, place in pairs), start=still))
+        for part, others, where in zip(conditions, faced, places, strict=True):
+            motion = np.zeros_like(part.directions)
+            for other, place in zip(others, where, strict=True):
+                motion = motion + other.P @ values[place]
+            motions.append(motion)
         there = np.concatenate(motions)
         return -np.sum(there * directions, axis=1), np.einsum("ijk,ij->ik", tangents, there) * free
 
@@ -316,8 +315,6 @@ def one_per_direction(
     """Return (nodes, directions, gaps).
 
     Faces of one direction at a node are one condition: weights added, smaller gap.
-
-    ``whole``: the nodes with the weights of all their faces.
 
     Args:
         whole: the nodes, with the weights of all their faces.
@@ -535,13 +532,13 @@ def with_ties(
         angle: the feature angle [rad].
     """
     tied = np.isin(nodes.numbers, space.tied_nodes)
-    parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
-    every = joined_nodes([part[0] for part in parts])
-    n, g = (np.concatenate([p[i] for p in parts]) for i in (1, 2))
-    if not len(g):
+    every = joined_nodes(from_each(space.comm, nodes.pick(tied)))
+    ways, gaps = gather_rows(space.comm, directions[tied], gap[tied])
+    if not len(gaps):
         return nodes, directions, gap
-    every, n, shares = merged(space, name, every, n, angle)
+    # merge those of all ranks, and keep what this rank owns of them
+    every, ways, shares = merged(space, name, every, ways, angle)
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
     nodes = joined_nodes([nodes.pick(~tied), every.pick(own)])
-    directions = np.concatenate([directions[~tied], n[own]])
-    return nodes, directions, np.concatenate([gap[~tied], (shares @ g)[own]])
+    directions = np.concatenate([directions[~tied], ways[own]])
+    return nodes, directions, np.concatenate([gap[~tied], (shares @ gaps)[own]])

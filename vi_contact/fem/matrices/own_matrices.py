@@ -119,8 +119,7 @@ def own_system(
 ) -> SemiDiscreteSystem:
     """Return the system of matrices M, K and perhaps C of one size. Collective.
 
-    What is given of this rank's rows and nodes is checked here. ``unsymmetric``: the algebra for C
-    or K that are not symmetric.
+    What is given of this rank's rows and nodes is checked here.
 
     Args:
         owner: who asks.
@@ -179,7 +178,7 @@ def own_system(
 
 
 def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indices, Indices, Mask]:
-    """(points, node of each row, component of each row, rows that are free).
+    """Return (points, node of each row, component of each row, rows that are free).
 
     Args:
         owner: who asks.
@@ -226,7 +225,7 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
 
 
 def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array, Array]:
-    """Load and initial values of all rows, zero where there are none.
+    """Return the load and initial values of all rows, zero where there are none.
 
     Args:
         owner: who asks.
@@ -261,9 +260,14 @@ class MatrixSpace(NodalSpace):
     def __init__(
         self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix
     ) -> None:
-        """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks.
+        """Give numbers to the nodes, over the ranks, and find bodies. Collective.
 
-        Collective.
+        Args:
+            algebra: that of K.
+            points: (k, d) owned nodes [m].
+            block: (n,) the owned node of each unknown.
+            component: (n,) its component, -1 for what is no displacement.
+            K: stiffness.
         """
         self.algebra = algebra
         self.comm = algebra.comm
@@ -291,13 +295,12 @@ class MatrixSpace(NodalSpace):
 def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
     """Return the body (0, 1, ..., by least numbers) of each owned unknown. Collective.
 
-    Bodies are in the order of least numbers; K or a node joins those of one body. ``block``: (n,)
-    the node of each, all on one rank.
+    Bodies are in the order of least numbers; K or a node joins those of one body.
 
     Args:
         algebra: that of K.
         K: stiffness, of n owned rows.
-        block: (n,) the node of each row.
+        block: (n,) the node of each row, all rows of a node on one rank.
     """
     n = K.rows
     first = algebra.first(K.rows)

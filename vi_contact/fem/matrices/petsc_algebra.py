@@ -200,7 +200,7 @@ class PetscFactor:
         return columns
 
     def _solve_block(self, values: Array) -> Array:
-        """All columns at once, as MUMPS likes it."""
+        """Solve for all columns at once, as MUMPS likes it."""
         shape = ((len(values), self._x.getSize()), (None, values.shape[1]))
         right, solved = (PETSc.Mat().createDense(shape, comm=self._x.comm) for _ in range(2))
         for matrix in (right, solved):

@@ -26,8 +26,7 @@ def moved(mat: Any, comm: Any) -> Any:
 def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
     """Return the PETSc matrix with these rows of this rank. Collective.
 
-    Columns are numbered over all ranks; ``columns``: how many this rank owns, as many as rows
-    unless given.
+    Columns are numbered over all ranks.
 
     Args:
         rows: (n, unknowns of all ranks).

@@ -48,6 +48,18 @@ def cells_of(owner: str, meaning: str, group: Any, mesh: Mesh | None = None) -> 
 
 
 def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type[Group]) -> Group:
+    """Return the group, if it is of the wanted kind and mesh.
+
+    Args:
+        owner: who asks.
+        meaning: what messages call the group.
+        group: what was given.
+        mesh: the mesh that it must be of, or None for any.
+        wanted: Facets or Cells.
+
+    Raises:
+        InputError: anything else; it tells the remedy.
+    """
     kind = KINDS[wanted]
     if isinstance(group, wanted):
         if mesh is None or group.mesh is mesh:

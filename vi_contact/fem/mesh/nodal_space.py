@@ -18,7 +18,7 @@ MEANT = (
 
 
 class NodalSpace:
-    """Hold nodesand the unknowns that are components of their displacements.
+    """Hold nodes and the unknowns that are components of their displacements.
 
     Every rank owns some of the nodes.
 
@@ -143,9 +143,8 @@ def bounding_box(comm: Comm, points: Array) -> float:
 def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indices) -> Indices:
     """Return the part that each of the numbers (n,) of this rank belongs to. Collective.
 
-    Parts are 0, 1, ..., in the order of least numbers, when ``first`` and ``second``, places among
-    the numbers, are joined; ``shared``: places of those that other ranks have too, where parts of
-    different ranks meet and are one.
+    Parts are 0, 1, ..., in the order of least numbers. Links join things of this rank; where ranks
+    have one thing, parts of different ranks meet and are one.
 
     Args:
         comm: the ranks.
@@ -154,7 +153,9 @@ def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indi
         numbers: (n,) of the things of this rank.
         shared: places of things that other ranks have too.
     """
+    # parts of this rank, each called by its smallest number
     part = _smallest(first, second, numbers)
+    # what things that several ranks have are called there: these parts are one
     meeting = np.column_stack([numbers[shared], part[shared]])
     meeting = np.unique(np.concatenate(from_each(comm, meeting)), axis=0)
     parts = np.unique(np.concatenate(from_each(comm, np.unique(part))))

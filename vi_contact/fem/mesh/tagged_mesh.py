@@ -119,8 +119,7 @@ class Group:
 
         Their vertices are all marked.
 
-        ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when
-        it fails or marks none on any rank.
+        InputError, on all ranks, when the marker fails or marks none on any rank.
 
         Args:
             name: that of the group.
@@ -246,6 +245,10 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
 @stage("mesh")
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
+    """Return the mesh that rank 0 produces, distributed, and its groups. Collective.
+
+    ``produce``: returns points, cells and groups; what it raises, all ranks raise.
+    """
     instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
     arrays = on_root(MpiComm(comm), produce)  # what rank 0 raises, all ranks raise
     groups = comm.bcast(

@@ -33,9 +33,7 @@ def work_beyond(
 
     Or it is over parts of the facets of a traction.
 
-    The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not
-    positive. ``motion``: points (k, d) -> virtual displacements (motions, k, d), linear in them;
-    ``density``: one for all or one of each local cell. Collective.
+    They are the parts of crossed cells where the level is not positive. Collective.
 
     Args:
         space: the body's unknowns.

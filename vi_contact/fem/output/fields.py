@@ -170,7 +170,7 @@ class FrameWriter:
         on_root(space.comm, partial(self._start, points, cells, kept))
 
     def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
-        """Rank 0: the mesh, the index of the frames that are kept, and then no others."""
+        """Write the mesh and the index of the frames that are kept, on rank 0."""
         folder = make_inner_folder(self._folder, FIELDS)
 
         def fill(file: Any) -> None:
@@ -274,7 +274,7 @@ class FrameWriter:
             self._remove_others()
 
     def _write_index(self) -> None:
-        """fields.xdmf with all complete frames."""
+        """Write fields.xdmf with all complete frames."""
         frames = "".join(self._grid(k, t) for k, t in self._times.items())
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" '
@@ -380,7 +380,7 @@ def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int =
 
 
 def _three(nodal: Array) -> Array:
-    """Rows (k, d) with zeros for the missing axes, (k, 3)."""
+    """Return rows (k, d) with zeros for the missing axes, (k, 3)."""
     return np.pad(nodal, ((0, 0), (0, 3 - nodal.shape[1])))
 
 

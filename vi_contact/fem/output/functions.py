@@ -248,7 +248,7 @@ class Stress:
 def _stored(
     folder: Path, name: str, t: float | None, frame: int | None
 ) -> tuple[Array, Array, float]:
-    """Points of the mesh, a quantity of a frame at them, and its time."""
+    """Return points of the mesh, a quantity of a frame at them, and its time."""
     if not is_own(folder / FIELDS_INDEX):
         raise InputError(
             f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)"
