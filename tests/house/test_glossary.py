@@ -29,8 +29,8 @@ TABLES = ("system", "contact", "stage", "run")
 def shipped() -> list[Path]:
     """The case files of the package and of the demos."""
     folders = (
-        PACKAGE / "studies" / "starters",
-        PACKAGE / "studies" / "cases" / "builtin",
+        PACKAGE / "practice" / "studies" / "starters",
+        PACKAGE / "practice" / "studies" / "cases" / "builtin",
         ROOT / "demos" / "cases",
     )
     return sorted(path for folder in folders for path in folder.glob("*.toml"))
