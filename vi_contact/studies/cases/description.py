@@ -25,6 +25,7 @@ from ...ground_motion.record import Record
 from ...run.files.folder import MODEL
 from ...run.loose_bodies import judge_loose_bodies
 from ...run.sampling import sampling_warning
+from .bodies import Body
 from .table_calls import Call, Group, build, nodes_in
 from .unread_choices import left_over
 from .vocabulary import Parts
@@ -33,6 +34,7 @@ ELEMENTS = (
     8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
 )
 STEPS = 20.0  # in a period
+PASSAGE = 10.0  # steps in the time b/V of a layer (CHOSEN; the demos take 20)
 COARSER = (
     1.2  # edges of side 2 over those of side 1: more points than a softer side can follow (CHOSEN)
 )
@@ -52,37 +54,41 @@ def describe(
 
     Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass,
     material); supports (kind, groups, components); contact (name, points, size [m²], friction,
-    nodes: a sentence, places, others: kind -> places, sides: name, h and G of both); periods,
-    damping_ratios of their modes and rigid_motions with the contact closed where it touches at the
-    start, and sticking where there is friction; periods_open, the first one with it open, where it
-    touches; damping: in words, "none" without; waves (body, c_s, h: the longest edge over the
-    degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale, dt, duration, pga,
-    f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
-    defects and warnings: sentences.
+    nodes: a sentence, places, others: kind -> places, sides: name, h and G of both; of a body
+    without mesh gap [m] in the place of a size); layers (width [m], speed [m/s], passage: their
+    quotient [s]); periods, damping_ratios of their modes and rigid_motions with the contact closed
+    where it touches at the start, and sticking where there is friction; periods_open, the first one
+    with it open, where it touches; damping: in words, "none" without; waves (body, c_s, h: the
+    longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
+    dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group,
+    lines), on rank 0; defects and warnings: sentences.
 
     parts: those of the case, when they are known; most: unknowns beyond which periods are left out.
     The same on any number of ranks. InputError as of a run. Collective.
     """
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
-    space = space_of("describe", problem.system)
-    volumes = cell_volumes(space.mesh)
-    bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
+    told = _meshed(problem, tags) if case.body is None else case.body.told
+    bodies = told["bodies"]
     run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
     model = {
         "title": case.tables.get("title") or case.path.stem,
-        "dimension": space.dimension,
-        "unknowns": space.unknowns,
-        "degree": space.degree,
-        "mass": sum(one["mass"] for one in bodies),
+        "dimension": problem.system.space.dimension,
+        "unknowns": problem.system.space.unknowns,
+        **({"degree": told["degree"]} if "degree" in told else {}),
+        "mass": told["mass"],
         "groups": [
             {"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()
         ],
         "bodies": [
-            {key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies
+            {key: one[key] for key in ("name", "cells", "mass", "material") if key in one}
+            for one in bodies
         ],
-        "supports": list(_supports(space)),
-        "contact": list(_contact(case, problem, tags)),
+        "supports": told["supports"],
+        "contact": list(
+            _contact(case, problem, tags) if case.body is None else _point(case.body, problem)
+        ),
+        "layers": [] if case.layer is None else [_layer(case.layer)],
         "waves": [
             {
                 "body": one["name"],
@@ -92,10 +98,11 @@ def describe(
                 "dt_ratio": run["dt"] * one["c_s"] / one["h"],
             }
             for one in bodies
+            if "c_s" in one
         ],
         "records": _records(case, parts.system),
         "run": run,
-        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+        "outline": told["outline"],
     } | _modes(case, problem, most)
     model |= {
         "defects": list(_defects(model)),
@@ -113,6 +120,20 @@ def describe(
     )
 
 
+def _meshed(problem: ContactProblem, tags: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is told of bodies with a mesh, as ``Body.told`` has it of others."""
+    space = space_of("describe", problem.system)
+    volumes = cell_volumes(space.mesh)
+    bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
+    return {
+        "degree": space.degree,
+        "mass": sum(one["mass"] for one in bodies),
+        "bodies": bodies,
+        "supports": list(_supports(space)),
+        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+    }
+
+
 def in_words(model: Mapping[str, Any]) -> str:
     """Return what ``describe`` found, as lines of text."""
     lines = []
@@ -124,6 +145,8 @@ def in_words(model: Mapping[str, Any]) -> str:
             if part.get("needs", "title") in model
             else []
         )
+        rows = [row for row in rows if part.get("of") in {None: 0, **row}]
+        rows = [row for row in rows if part.get("without") not in row]
         lines += [part["heading"]] if rows and "heading" in part else []
         lines += [
             part["text"].format(**{key: _word(one) for key, one in row.items()}) for row in rows
@@ -228,6 +251,26 @@ def _contact(
         }
 
 
+def _point(body: Body, problem: ContactProblem) -> Iterator[dict[str, Any]]:
+    """Yield the contact point of a body without a mesh, at which pressures are forces."""
+    yield {
+        "name": body.point,
+        "points": 1,
+        "gap": float(problem.surface.gap0[0]),
+        "friction": repr(problem.friction),
+        "nodes": "",
+        "places": problem.surface.whole().points,
+        "others": {},
+        "sides": [],
+    }
+
+
+def _layer(law: Any) -> dict[str, float]:
+    """Return what there is to tell of a layer; its speed is V, at which restitution is wanted."""
+    width, speed = law.layer.width, law.layer.v
+    return {"width": width, "speed": speed, "passage": width / speed}
+
+
 def _sides(
     space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array
 ) -> list[dict[str, Any]]:
@@ -260,7 +303,7 @@ def _records(case: Any, system: Any) -> list[dict[str, Any]]:
     """
     calls = (
         one
-        for one in nodes_in(case.nodes["system"])
+        for one in nodes_in(case.nodes.get("system", ()))
         if isinstance(one, Call) and one.callee.name == "upgoing"
     )
     rising = (build(one.arguments.get("motion", ()), {"system": system}) for one in calls)
@@ -300,7 +343,7 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
     """
     few = problem.system.space.unknowns <= most
     found: dict[str, Any] = {}
-    if few:
+    if few and problem.system.space.unknowns > 1:  # a particle has no periods
         modes = first_modes(problem)
         found = {"periods": list(modes.periods), "rigid_motions": modes.rigid_motions}
         opened = first_open_period(problem)
@@ -308,6 +351,8 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
         found["damping_ratios"] = [float(f"{one:.{RATIO_DIGITS}g}") for one in modes.ratios]
     if "strain_compatible" in case.nodes:  # the system has the damping of other cells only
         return {**found, "damping_ratios": [], "damping": WORDS["by_curves"]}
+    if problem.system.C is None and "periods" not in found and few:
+        return found | {"damping_ratios": [], "damping": WORDS["undamped"]}
     unknown = WORDS["many"].format(unknown=NOT_COMPUTED, most=most)
     return {**found, "damping": damping_in_words(problem, unknown="" if few else unknown)}
 
@@ -331,6 +376,9 @@ def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
     for sides in (one["sides"] for one in model["contact"] if one["sides"]):
         if sides[1]["h"] > COARSER * sides[0]["h"] and sides[1]["G"] < sides[0]["G"]:
             yield WORDS["unlike"].format(one=sides[0], two=sides[1])
+    for one in model["layers"]:
+        if model["run"]["dt"] > one["passage"] / PASSAGE:
+            yield WORDS["thin"].format(one=one, run=model["run"])
     if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
         yield WORDS["slow"].format(**model)
     elif model["run"]["dt"] > next(iter(model.get("periods_open", ())), np.inf) / STEPS:
