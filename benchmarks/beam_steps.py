@@ -23,9 +23,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vi_contact as vc  # noqa: E402
-from demos import beam  # noqa: E402
-from vi_contact.beam import published as source  # noqa: E402
-from vi_contact.beam.contact_problems import beam_problem  # noqa: E402
+from vi_contact import beam  # noqa: E402
 
 STEPS = 1000
 DT = 0.002
@@ -46,22 +44,24 @@ def runs(count: int) -> list[Callable[[], object]]:
 
     Readings A and C and the exact law go by block elimination, the exact law also by the package.
     """
-    elements = source.published_elements(count)
-    start = source.published_start()
+    elements = beam.published_elements(count)
+    start = beam.published_start()
     body = beam.TimoshenkoBeam(viscosity=0.001)
     law = vc.Coulomb(0.3)
-    problem = beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
+    problem = beam.beam_problem(
+        body, elements, normal_force=lambda t: 100.0, friction=law, start=start
+    )
 
     def algorithm(name: str, friction: beam.TipFriction) -> object:
         stepper = beam.BeamStepper(
-            body, elements, DT, source.readings(DT)[name], source.published_mu, friction
+            body, elements, DT, beam.readings(DT)[name], beam.published_mu, friction
         )
         return beam.run_beam(stepper, start, steps=STEPS)
 
     def contract() -> object:
         return [state.t for state, _ in vc.march(problem, scheme=vc.Midpoint(), dt=DT, steps=STEPS)]
 
-    newton, exact = source.published_friction(), beam.ExactFriction()
+    newton, exact = beam.published_friction(), beam.ExactFriction()
     cases = (("A", newton), ("C", newton), ("A", exact))
     return [*(partial(algorithm, *case) for case in cases), contract]
 

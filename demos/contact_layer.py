@@ -32,9 +32,7 @@ from demos.exact.bouncing_bar import BouncingBar
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
 from demos.problems import wall
 from demos.problems.bar import Bar, build
-from vi_contact.layer.contact_law import contact_layer
-from vi_contact.layer.metric import Metric
-from vi_contact.layer.scheme import BoundaryLayer
+from vi_contact.layer import BoundaryLayer, Metric, contact_layer
 from vi_contact.practice.cli import status_of
 
 # Parameters

@@ -24,11 +24,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from demos.pictures.layer import plot_cut_off, plot_parameters, plot_particle
-from vi_contact.layer.layer import Layer
-from vi_contact.layer.metric import Metric
-from vi_contact.layer.motion import ConstrainedSystem
-from vi_contact.layer.particle import ParticleImpact, layer_for
-from vi_contact.layer.trajectory import layer_motion
+from vi_contact.layer import (
+    ConstrainedSystem,
+    Layer,
+    Metric,
+    ParticleImpact,
+    layer_for,
+    layer_motion,
+)
 from vi_contact.practice.cli import status_of
 
 # Parameters

@@ -24,10 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
-from vi_contact.layer.layer import Layer
-from vi_contact.layer.particle import layer_for
-from vi_contact.layer.rigid_body import Ellipsoid, RigidBody
-from vi_contact.layer.trajectory import layer_motion
+from vi_contact.layer import Ellipsoid, Layer, RigidBody, layer_for, layer_motion
 from vi_contact.practice.cli import status_of
 
 # Parameters

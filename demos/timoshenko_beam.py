@@ -34,13 +34,6 @@ from demos.pictures.beam import (
     plot_tips,
 )
 from vi_contact import beam
-from vi_contact.beam.contact_problems import beam_problem, rubbing_problem
-from vi_contact.beam.published import (
-    published_elements,
-    published_mu,
-    published_start,
-    readings,
-)
 from vi_contact.practice.cli import status_of
 
 # Parameters
@@ -75,7 +68,7 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
     Figs. 8.1 to 8.9 are drawn with READING.
     """
     steps = round(T_END / dt)
-    forces = readings(dt)
+    forces = beam.readings(dt)
     numbers, drawn = {}, {}
     print(
         f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = "
@@ -89,14 +82,14 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
         for name, force in forces.items():
             stepper = beam.BeamStepper(
                 beam.TimoshenkoBeam(viscosity=viscosity),
-                published_elements(count),
+                beam.published_elements(count),
                 dt,
                 normal_force=force,
-                mu=published_mu,
+                mu=beam.published_mu,
                 friction=beam.RegularisedFriction(0.002, absolute=1e-10),
             )
             run = beam.run_beam(
-                stepper, published_start(), steps=steps, every=max(1, round(0.02 / dt))
+                stepper, beam.published_start(), steps=steps, every=max(1, round(0.02 / dt))
             )
             history, energy = run.history, run.energy
             defect = float(np.max(np.abs(history["energy_defect"])))
@@ -141,7 +134,7 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
     """
     body = beam.TimoshenkoBeam(viscosity=VISCOSITIES[0])
     elements = beam.Elements(count)
-    start = published_start()
+    start = beam.published_start()
     steps = round(T_END / dt)
 
     def algorithm(friction: beam.TipFriction) -> beam.BeamRun:
@@ -151,7 +144,7 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
         return beam.run_beam(stepper, start, steps=steps)
 
     law = algorithm(beam.ExactFriction()).history
-    problem = beam_problem(
+    problem = beam.beam_problem(
         body, elements, normal_force=lambda t: FORCE, friction=vc.Coulomb(MU), start=start
     )
     tips = np.array(
@@ -179,12 +172,12 @@ def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float
 
     Their forces do not ring.
     """
-    problem = rubbing_problem(
+    problem = beam.rubbing_problem(
         ROD,
         beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
         beam.Elements(count),
         friction=vc.Coulomb(MU),
-        start=published_start(),
+        start=beam.published_start(),
     )
     solution = vc.simulate(
         problem,
@@ -210,8 +203,8 @@ def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float
     }
 
 
-# Things to try: READING = "A"; beam.Elements(ELEMENTS) instead of published_elements, a tip that
-# may turn (the source's last rotation function holds it: docs/theory/beam.md); eps = 2e-4 in
+# Things to try: READING = "A"; beam.Elements(ELEMENTS) instead of beam.published_elements, a tip
+# that may turn (the source's last rotation function holds it: docs/theory/beam.md); eps = 2e-4 in
 # published(); mu that falls with the rate, vc.SlipRateCoulomb(vc.ExponentialDecay(0.4, 0.2, 0.5)),
 # in rubbing(); scheme=vc.Midpoint() there, whose contact forces ring; body_force=lambda t: 20.0 +
 # 10.0 * np.sin(8.0 * t) for ROD.

@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.layer.layer import Layer
-from vi_contact.layer.particle import ParticleImpact
-from vi_contact.layer.trajectory import Trajectory
+from vi_contact.layer import Layer, ParticleImpact, Trajectory
 from vi_contact.practice.plots.histories import canvas, save
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")

@@ -14,18 +14,18 @@ Statement 2 is asked of the whole force.
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
-from vi_contact.beam.published import (
-    DT,
-    STEPS,
-    Force,
+from vi_contact.beam import (
+    BeamRun,
+    BeamStepper,
+    RegularisedFriction,
+    TimoshenkoBeam,
     published_elements,
     published_mu,
     published_start,
     readings,
+    run_beam,
 )
-from vi_contact.beam.tip import RegularisedFriction
-from vi_contact.beam.values import TimoshenkoBeam
+from vi_contact.beam.published import DT, STEPS, Force
 from vi_contact.core.algebra import Array
 
 EPS = 0.002  # of the friction, and the least swing that counts [m]

@@ -23,7 +23,7 @@ touches or sticks, by turns above and below their mean; those of ``MoreauJean`` 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,6 +33,7 @@ from ..core.checks import array, function, instance, number, optional, provides,
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless
+from ..core.quantities import Unit
 from ..core.step import Scheme
 from ..core.system import Load
 from ..fem.contact.points import contact_points
@@ -75,10 +76,10 @@ def beam_problem(
     beam: TimoshenkoBeam,
     elements: Elements,
     *,
-    normal_force: History,
+    normal_force: Annotated[History, Unit("N")],
     friction: FrictionLaw,
     start: Start | None = None,
-    load: History | None = None,
+    load: Annotated[History | None, Unit("N/m")] = None,
 ) -> ContactProblem:
     """Return the problem of the beam whose tip is pressed on the wall, (2.6)-(2.9) of Ahn (2012).
 
@@ -126,7 +127,7 @@ def rubbing_problem(
     friction: FrictionLaw,
     rod_start: Start | None = None,
     start: Start | None = None,
-    load: History | None = None,
+    load: Annotated[History | None, Unit("N/m")] = None,
 ) -> ContactProblem:
     """Return the problem of a body that is rod and beam: it rubs with its own contact force.
 

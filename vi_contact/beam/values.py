@@ -99,8 +99,8 @@ class Rod:
     E: Annotated[float, Positive, Unit("Pa")] = 100.0
     viscosity: Annotated[float, NotNegative, Unit("s")] = 0.0
     gap: Annotated[float, NotNegative, Unit("m")] = 0.0
-    body_force: Callable[[float], float] | None = None
-    end_force: Callable[[float], float] | None = None
+    body_force: Annotated[Callable[[float], float] | None, Unit("N/m")] = None
+    end_force: Annotated[Callable[[float], float] | None, Unit("N")] = None
 
     def __post_init__(self) -> None:
         for name in ("body_force", "end_force"):

@@ -9,6 +9,7 @@ from .particle import ParticleImpact as ParticleImpact
 from .particle import damping_ratio as damping_ratio
 from .particle import layer_for as layer_for
 from .particle import restitution as restitution
+from .particle_problem import particle_problem as particle_problem
 from .rigid_body import Ellipsoid as Ellipsoid
 from .rigid_body import RigidBody as RigidBody
 from .rigid_body import rotation as rotation

@@ -26,6 +26,7 @@ velocities of the body would leave order 1.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -35,6 +36,7 @@ from scipy.optimize import brentq
 from ..core.algebra import Array
 from ..core.checks import instance, number, shown
 from ..core.errors import InputError
+from ..core.quantities import RATIO, Unit
 from ..core.surfaces import ContactSurface
 from .layer import Layer, sized
 from .metric import Metric
@@ -161,13 +163,13 @@ class ContactLayer:
 
 
 def contact_layer(
-    e: float,
+    e: Annotated[float, RATIO],
     *,
-    mass: float,
-    speed: float,
-    width: float,
-    start: float | None = None,
-    strength: float = 1.0,
+    mass: Annotated[float, Unit("kg/m²")],
+    speed: Annotated[float, Unit("m/s")],
+    width: Annotated[float, Unit("m")],
+    start: Annotated[float | None, Unit("m")] = None,
+    strength: Annotated[float, RATIO] = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
     """Find the law of a contact boundary that returns a rigid body with a wanted restitution.

@@ -40,7 +40,9 @@ def add_case_commands(commands: Any) -> None:
         ),
     )
     run.add_argument(
-        "case", help="name of a case of the package (wall, channel), or the path of a .toml file"
+        "case",
+        help="name of a case of the package (beam, channel, layer, wall), or the path of a "
+        ".toml file",
     )
     _add_short_options(run)
     _add_output(run)

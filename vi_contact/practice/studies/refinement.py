@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...beam import Elements
 from ...core.arguments import check
 from ...core.checks import shown
 from ...core.errors import InputError, ViContactError
@@ -79,7 +80,9 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
     tables, dt = read_copy(folder.folder), folder.facts.get("dt")
     if "fields" in tables:
         yield "fields="
-    if name == "h":
+    if name == "h" and "mesh" not in tables:
+        yield f"beam.elements.count={2 * _elements(tables)}"
+    elif name == "h":
         size = tables["mesh"].get("divisions")  # numbers of elements, or their size
         finer = (
             [2 * one for one in size]
@@ -102,6 +105,14 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
                 yield f"{key}.dt={0.5 * _plain(own['dt'], f'{key}.dt')!r}"
             if "steps" in own:
                 yield f"{key}.steps={2 * _plain(own['steps'], f'{key}.steps')}"
+
+
+def _elements(tables: Mapping[str, Any]) -> int:
+    """Return the number of elements of a beam; InputError for a body without elements."""
+    if "beam" not in tables:
+        raise InputError("a particle has no elements to halve: halve the time step alone")
+    count = tables["beam"].get("elements", {}).get("count", Elements().count)
+    return int(_plain(count, "beam.elements.count"))
 
 
 def _plain(value: Any, key: str) -> Any:

@@ -9,15 +9,17 @@ interface.
 [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
 [friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
 [[stage]]  what replaces these tables in stages that follow one another
+[beam] [particle]  bodies and their contact, in place of [mesh] and the tables that belong to it
+[layer]            layer.contact_layer, in place of [friction], [impact] and [scheme]
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,6 +36,7 @@ from ....fem.body.heterogeneous import Heterogeneous
 from ....fem.contact.joined import joined_surfaces
 from ....fem.mesh.communicators import MpiComm
 from ....fem.mesh.tagged_mesh import Tags, build_mesh, read_mesh
+from ....laws.mass import ConsistentMass
 from ....laws.materials import LinearElastic
 from ....laws.orthotropic import Orthotropic
 from ....meshes.gmsh_session import MeshScript
@@ -46,6 +49,7 @@ from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, simulate
 from ....run.time_steps import StepPlan, step_plan
 from ...engineering.checks.comparison import Check
+from .bodies import BeamBody, Body, LayerLaw, ParticleBody, own_body, refuse_mixed, refuse_ranks
 from .expressions import check_axes
 from .library import base_folder, check_format, keep_copy, refuse_case_of_others
 from .own_classes import packages
@@ -58,14 +62,20 @@ from .toml_file import read_toml, with_settings
 from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
+if TYPE_CHECKING:
+    from ...layer import ContactLayer
+
 # in the order in which they are read: type of what a table makes, or the one call it is
 TABLES: dict[str, Any] = {
     "title": str,
     "mesh": MeshScript | MeshFile,
+    "beam": BeamBody,
+    "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
     "system": callee(assemble),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
+    "layer": LayerLaw,
     "gravity": callee(weight, name="with_weight"),
     "friction": FrictionLaw,
     "impact": ImpactLaw,
@@ -137,6 +147,8 @@ class Case:
                 step_plan(own["dt"], steps, own.get("t_end"))
             except InputError as error:
                 raise InputError(f"{self.path}: [run] {error}") from None
+        if self.body is not None:
+            self._own_problem(self.body)
 
     def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
         """Return the contact problem; ``parts``: those of ``parts``, when they are known.
@@ -167,7 +179,7 @@ class Case:
         problem = self._problem(parts)
         own = self._recorders(parts)
         recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
-        problem, _ = with_defaults(problem, self._made("scheme"))
+        problem, _ = with_defaults(problem, self._scheme())
         state = initial_state(problem)
         return frozenset(
             name
@@ -269,7 +281,7 @@ class Case:
                 keep_copy(self.path, self.settings, folder, ranks)
             yield own | {
                 "problem": problem,
-                "scheme": self._made("scheme"),
+                "scheme": self._scheme(),
                 "solver": solver,
                 "state": state,
                 "out": folder,
@@ -288,8 +300,55 @@ class Case:
         made = self._made(table, **context)
         return made if isinstance(made, tuple) else () if made is None else (made,)
 
+    @cached_property
+    def body(self) -> Body | None:
+        """Return the body of a case without a mesh; None of one with."""
+        made: Body | None = self._made(own_body(self.nodes)) if own_body(self.nodes) else None
+        return made
+
+    @cached_property
+    def layer(self) -> "ContactLayer | None":
+        """Return the law of the layer before the obstacle, if there is one."""
+        made: ContactLayer | None = self._made("layer")
+        return made
+
+    def _scheme(self) -> Scheme | None:
+        """Return the scheme: that of the layer, or of [scheme]; None for that of ``simulate``."""
+        if self.layer is not None:
+            from ...layer import BoundaryLayer  # late: other runs need none of it
+
+            return BoundaryLayer(law=self.layer)
+        made: Scheme | None = self._made("scheme")
+        return made
+
+    def _friction(self) -> FrictionLaw:
+        """Return the law of [friction], unless the body cannot slide."""
+        slides = self.body is None or self.body.slides
+        made: FrictionLaw | None = self._made("friction") if slides else None
+        return made or Frictionless()
+
+    def _own_problem(self, body: Body) -> ContactProblem:
+        """Return the problem of a body without a mesh, before its excitations."""
+        try:
+            return body.make(self._friction())
+        except InputError as error:
+            raise self.nodes[own_body(self.nodes)].spot.inside(f"{error}") from error
+
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
+        if self.body is not None:
+            refuse_ranks(self.path, own_body(self.nodes), comm.size)
+            own = self._own_problem(self.body)
+            parts = Parts(own.system, own.surface, Tags(), mass=own.mass)
+        else:
+            parts = self._meshed_parts(comm)
+        if self.layer is None:
+            return parts
+        surface = self.layer.set_back(parts.surface)
+        return replace(parts, surface=surface, mass=ConsistentMass())
+
+    def _meshed_parts(self, comm: Any) -> Parts:
+        """Return the parts of a body with a mesh; collective."""
         mesh, tags = self.meshed(comm)
         # else they need the system
         early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])
@@ -335,9 +394,9 @@ class Case:
         return ContactProblem(
             parts.system,
             parts.surface,
-            friction=self._made("friction") or Frictionless(),
+            friction=self._friction(),
             impact=self._made("impact"),
-            mass=self._made("mass"),
+            mass=self._made("mass") or parts.mass,
             excitation=() if parts.moved else self.excitations(system=parts.system),
         )
 
@@ -388,9 +447,18 @@ def _read(
                 f"{path}: the table [{name}] is unknown: "
                 f"{nearest(name, ('format', *TABLES, 'stage'))}"
             )
-    if "mesh" not in tables:
-        raise InputError(f"{path}: the table [mesh] is missing: give the mesh of the body")
+    if "mesh" not in tables and not own_body(tables):
+        raise InputError(
+            f"{path}: the table [mesh] is missing: give the mesh of the body, or [beam] or "
+            "[particle] in its place"
+        )
+    refuse_mixed(path, tables)
     whole = Case(path, tables, tuple(settings), {}, allowed)
+    own = _nodes(tables, str(path), known) if own_body(tables) else {}
+    for one in (one for node in own.values() for one in nodes_in(node) if isinstance(one, Group)):
+        raise one.spot.wrong(
+            f"is '{one.name}', and [{own_body(tables)}] has no mesh with groups: leave it out"
+        )
     stages = tuple(
         replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
         for one in split(path, tables)
@@ -425,7 +493,7 @@ def _unread_in(
 
 
 def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:
-    given = {"run": {}, "system": {}} | dict(tables)
+    given = {"run": {}} | ({} if own_body(tables) else {"system": {}}) | dict(tables)
     return {
         name: _node(name, given, Spot(source, "", name), known) for name in TABLES if name in given
     }

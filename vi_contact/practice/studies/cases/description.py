@@ -25,6 +25,7 @@ from ....run.loose_bodies import judge_loose_bodies
 from ....run.sampling import sampling_warning
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
+from .bodies import Body
 from .table_calls import Call, Group, build, nodes_in
 from .unread_choices import left_over
 from .vocabulary import Parts
@@ -33,6 +34,7 @@ ELEMENTS = (
     8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
 )
 STEPS = 20.0  # in a period
+PASSAGE = 10.0  # steps in the time b/V of a layer (CHOSEN; the demos take 20)
 COARSER = (
     1.2  # edges of side 2 over those of side 1: more points than a softer side can follow (CHOSEN)
 )
@@ -52,29 +54,60 @@ class _Part:
         text: filled in with the model, or with each entry of its list ``key``.
         key: a list of the model, None for the model itself.
         heading: the line before the first entry of the list.
-        needs: the key without which the part is left out; "" for none.
+        needs: a key without which the model, or an entry, is left out; "" for none.
+        without: a key with which it is left out; "" for none.
     """
 
     text: str
     key: str | None = None
     heading: str = ""
     needs: str = ""
+    without: str = ""
+
+    def fits(self, entry: Mapping[str, Any]) -> bool:
+        """Say whether the part is about such an entry."""
+        return (not self.needs or self.needs in entry) and self.without not in entry
 
 
 # What the description of a model says, line by line.
 PARTS = (
-    _Part(text="{title}\n{dimension}D, {unknowns} unknowns of degree {degree}, {mass:.4g} kg"),
+    _Part(
+        needs="degree",
+        text="{title}\n{dimension}D, {unknowns} unknowns of degree {degree}, {mass:.4g} kg",
+    ),
+    _Part(without="degree", text="{title}\n{dimension}D, {unknowns} unknown, {mass:.4g} kg"),
     _Part(key="groups", heading="groups of the mesh:", text="  {name} ({kind})"),
     _Part(
-        key="bodies", heading="bodies:", text="  {name}: {cells} cells, {mass:.4g} kg; {material}"
+        key="bodies",
+        needs="cells",
+        heading="bodies:",
+        text="  {name}: {cells} cells, {mass:.4g} kg; {material}",
+    ),
+    _Part(
+        key="bodies",
+        without="cells",
+        heading="bodies:",
+        text="  {name}: {mass:.4g} kg, {material}",
     ),
     _Part(key="supports", heading="supports:", text="  {groups}: {kind} along {components}"),
     _Part(
         key="contact",
+        needs="size",
         heading="contact:",
         text="  {name}: {points} points on {size:.4g} m²; {friction}",
     ),
-    _Part(key="contact", heading="contact nodes:", text="  {name}: {nodes}"),
+    _Part(
+        key="contact",
+        needs="gap",
+        heading="contact:",
+        text="  {name}: one point, {gap:.4g} m before the wall; {friction}",
+    ),
+    _Part(
+        key="layers",
+        heading="layer before the obstacle:",
+        text="  {width:.4g} m wide, passed in b/V = {passage:.4g} s at {speed:.4g} m/s",
+    ),
+    _Part(key="contact", needs="size", heading="contact nodes:", text="  {name}: {nodes}"),
     _Part(
         key="waves",
         heading="shear waves:",
@@ -110,37 +143,41 @@ def describe(
 
     Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass,
     material); supports (kind, groups, components); contact (name, points, size [m²], friction,
-    nodes: a sentence, places, others: kind -> places, sides: name, h and G of both); periods,
-    damping_ratios of their modes and rigid_motions with the contact closed where it touches at the
-    start, and sticking where there is friction; periods_open, the first one with it open, where it
-    touches; damping: in words, "none" without; waves (body, c_s, h: the longest edge over the
-    degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale, dt, duration, pga,
-    f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
-    defects and warnings: sentences.
+    nodes: a sentence, places, others: kind -> places, sides: name, h and G of both; of a body
+    without mesh gap [m] in the place of a size); layers (width [m], speed [m/s], passage: their
+    quotient [s]); periods, damping_ratios of their modes and rigid_motions with the contact closed
+    where it touches at the start, and sticking where there is friction; periods_open, the first one
+    with it open, where it touches; damping: in words, "none" without; waves (body, c_s, h: the
+    longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
+    dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group,
+    lines), on rank 0; defects and warnings: sentences.
 
     parts: those of the case, when they are known; most: unknowns beyond which periods are left out.
     The same on any number of ranks. InputError as of a run. Collective.
     """
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
-    space = space_of("describe", problem.system)
-    volumes = cell_volumes(space.mesh)
-    bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
+    told = _meshed(problem, tags) if case.body is None else case.body.told
+    bodies = told["bodies"]
     run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
     model = {
         "title": case.tables.get("title") or case.path.stem,
-        "dimension": space.dimension,
-        "unknowns": space.unknowns,
-        "degree": space.degree,
-        "mass": sum(one["mass"] for one in bodies),
+        "dimension": problem.system.space.dimension,
+        "unknowns": problem.system.space.unknowns,
+        **({"degree": told["degree"]} if "degree" in told else {}),
+        "mass": told["mass"],
         "groups": [
             {"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()
         ],
         "bodies": [
-            {key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies
+            {key: one[key] for key in ("name", "cells", "mass", "material") if key in one}
+            for one in bodies
         ],
-        "supports": list(_supports(space)),
-        "contact": list(_contact(case, problem, tags)),
+        "supports": told["supports"],
+        "contact": list(
+            _contact(case, problem, tags) if case.body is None else _point(case.body, problem)
+        ),
+        "layers": [] if case.layer is None else [_layer(case.layer)],
         "waves": [
             {
                 "body": one["name"],
@@ -150,10 +187,11 @@ def describe(
                 "dt_ratio": run["dt"] * one["c_s"] / one["h"],
             }
             for one in bodies
+            if "c_s" in one
         ],
         "records": _records(case, parts.system),
         "run": run,
-        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+        "outline": told["outline"],
     } | _modes(case, problem, most)
     model |= {
         "defects": list(_defects(model)),
@@ -171,14 +209,26 @@ def describe(
     )
 
 
+def _meshed(problem: ContactProblem, tags: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is told of bodies with a mesh, as ``Body.told`` has it of others."""
+    space = space_of("describe", problem.system)
+    volumes = cell_volumes(space.mesh)
+    bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
+    return {
+        "degree": space.degree,
+        "mass": sum(one["mass"] for one in bodies),
+        "bodies": bodies,
+        "supports": list(_supports(space)),
+        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+    }
+
+
 def in_words(model: Mapping[str, Any]) -> str:
     """Return what ``describe`` found, as lines of text."""
     lines = []
     for part in PARTS:
-        if part.key is not None:
-            entries = model[part.key]
-        else:
-            entries = [model] if not part.needs or part.needs in model else []
+        entries = [model] if part.key is None else model[part.key]
+        entries = [entry for entry in entries if part.fits(entry)]
         if entries and part.heading:
             lines.append(part.heading)
         for entry in entries:
@@ -284,6 +334,26 @@ def _contact(
         }
 
 
+def _point(body: Body, problem: ContactProblem) -> Iterator[dict[str, Any]]:
+    """Yield the contact point of a body without a mesh, at which pressures are forces."""
+    yield {
+        "name": body.point,
+        "points": 1,
+        "gap": float(problem.surface.gap0[0]),
+        "friction": repr(problem.friction),
+        "nodes": "",
+        "places": problem.surface.whole().points,
+        "others": {},
+        "sides": [],
+    }
+
+
+def _layer(law: Any) -> dict[str, float]:
+    """Return what there is to tell of a layer; its speed is V, at which restitution is wanted."""
+    width, speed = law.layer.width, law.layer.v
+    return {"width": width, "speed": speed, "passage": width / speed}
+
+
 def _sides(
     space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array
 ) -> list[dict[str, Any]]:
@@ -316,7 +386,7 @@ def _records(case: Any, system: Any) -> list[dict[str, Any]]:
     """
     calls = (
         one
-        for one in nodes_in(case.nodes["system"])
+        for one in nodes_in(case.nodes.get("system", ()))
         if isinstance(one, Call) and one.callee.name == "upgoing"
     )
     rising = (build(one.arguments.get("motion", ()), {"system": system}) for one in calls)
@@ -356,7 +426,7 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
     """
     few = problem.system.space.unknowns <= most
     found: dict[str, Any] = {}
-    if few:
+    if few and problem.system.space.unknowns > 1:  # a particle has no periods
         modes = first_modes(problem)
         found = {"periods": list(modes.periods), "rigid_motions": modes.rigid_motions}
         opened = first_open_period(problem)
@@ -365,6 +435,8 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
     if "strain_compatible" in case.nodes:  # the system has the damping of other cells only
         words = "that of the curves of [strain_compatible], which the run finds"
         return {**found, "damping_ratios": [], "damping": words}
+    if problem.system.C is None and "periods" not in found and few:
+        return {**found, "damping_ratios": [], "damping": "none"}
     unknown = "" if few else f"{NOT_COMPUTED}, as the model has more than {most} unknowns"
     return {**found, "damping": damping_in_words(problem, unknown=unknown)}
 
@@ -395,6 +467,12 @@ def _defects(model: Mapping[str, Any]) -> Iterator[str]:
 
 def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
     """Yield what an engineer should look at, a sentence each."""
+    yield from _coarse_meshes(model)
+    yield from _long_steps(model)
+
+
+def _coarse_meshes(model: Mapping[str, Any]) -> Iterator[str]:
+    """Tell of elements that are too long."""
     # Elements too long for the shear waves of the record with the highest frequencies.
     for record in sorted(model["records"], key=lambda record: float(record["f_95"]))[-1:]:
         for wave in model["waves"]:
@@ -416,6 +494,18 @@ def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
                 f"'{two['name']}', the softer side, has edges of {two['h']:.3g} m: points open "
                 f"there and pressures zigzag, so mesh '{two['name']}' as finely, or exchange "
                 "facets1 and facets2"
+            )
+
+
+def _long_steps(model: Mapping[str, Any]) -> Iterator[str]:
+    """Tell of time steps that are too long."""
+    # Time steps too long for the passage of a layer.
+    for layer in model["layers"]:
+        if model["run"]["dt"] > layer["passage"] / PASSAGE:
+            yield (
+                f"the time step of {model['run']['dt']:.3g} s is longer than a tenth of the time "
+                f"in which a body passes the layer, b/V = {layer['passage']:.3g} s: shorten [run] "
+                "dt, or widen the layer"
             )
 
     # Time steps too long for the first period, of the model with the contact closed or open.

@@ -60,6 +60,8 @@ def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
         node = _scalar(value, member, spot, words)
         if node is not None:
             return node
+    if HISTORY in members and isinstance(value, int | float) and not isinstance(value, bool):
+        value = repr(float(value))  # the same at all times
     text = text_node(value, members, spot) if isinstance(value, str) else None
     if text is not None:
         return text

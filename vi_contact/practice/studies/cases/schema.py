@@ -12,6 +12,7 @@ from typing import Any, get_args, get_origin
 
 from ....core.quantities import Between
 from ....laws.materials import LinearElastic
+from .bodies import OWN
 from .case import TABLES
 from .own_classes import is_protocol
 from .parsing import Words, choices_of, is_list, is_path, members_of
@@ -26,7 +27,7 @@ _PLAIN: Mapping[Any, Any] = {
     int: {"type": ["integer", "string"]},
     bool: {"type": "boolean"},
     str: {"type": "string"},
-    HISTORY: {"type": "string"},
+    HISTORY: {"type": ["number", "string"]},
     Expression: {"type": "string"},
     FIELD: {"type": ["string", "array"]},
     AT_START: {"type": "array"},
@@ -56,7 +57,7 @@ def text() -> str:
         "title": "A case file of vi_contact",
         "type": "object",
         "additionalProperties": False,
-        "required": ["mesh"],
+        "anyOf": [{"required": [body]} for body in ("mesh", *OWN)],
     }
     definitions = dict(sorted(found.definitions.items()))
     inside = {"properties": {"format": {"const": 1}, **properties}, "definitions": definitions}

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError
+from .bodies import OWN
 from .stage_tables import OF_MOTION, WHOLE
 from .table_calls import Call, Node, nodes_in
 
@@ -27,7 +28,14 @@ BLIND_TO_RATIOS = (
     "Rayleigh.from_frequencies",
     "KelvinVoigt",
 )
-OF_CONTACT = {"friction": "rubs", "impact": "strikes", "mass": "touches"}  # what does not happen
+OF_CONTACT = {  # what does not happen
+    "friction": "rubs",
+    "impact": "strikes",
+    "mass": "touches",
+    "layer": "touches",
+}
+# bodies that have no direction across
+STRAIGHT = {"rod_problem": "the tip of a rod", "particle_problem": "a particle"}
 MASSES = ("ConsistentMass", "Redistributed")
 WITHOUT_RATES = ("Coulomb", "Tresca")
 SUPPORTS = ("clamped", "prescribed", "tied", "dashpots")
@@ -56,7 +64,9 @@ class Part:
     @property
     def system(self) -> Mapping[str, Node]:
         """Return the arguments of [system]."""
-        arguments: Mapping[str, Node] = self.nodes["system"].arguments
+        arguments: Mapping[str, Node] = (
+            self.nodes["system"].arguments if "system" in self.nodes else {}
+        )
         return arguments
 
 
@@ -162,7 +172,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
 
     It yields them too where there is none that they act on, or another before them.
     """
-    surfaces = part.calls("contact")
+    surfaces = [one for key in ("contact", *OWN) for one in part.calls(key)]
+    yield from _without_slip(part)
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
         # may change all masses
@@ -200,6 +211,19 @@ def _without_contact(part: Part) -> Iterator[Finding]:
                 "the two out"
             ),
         )
+
+
+def _without_slip(part: Part) -> Iterator[Finding]:
+    """Yield friction of a body that cannot slide."""
+    for body in (one for key in OWN for one in part.calls(key)):
+        if part.calls("friction") and body.callee.name in STRAIGHT:
+            yield (
+                "friction",
+                (
+                    f"{part.label}: [friction] has no effect, as {STRAIGHT[body.callee.name]} "
+                    "moves along its normal only: leave it out"
+                ),
+            )
 
 
 def _of_solvers(part: Part) -> Iterator[Finding]:

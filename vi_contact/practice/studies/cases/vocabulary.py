@@ -12,7 +12,8 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Annotated, Any, get_origin, get_type_hints
 
-from .... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, soil, solvers
+from .... import core, fem, laws, layer, meshes, run, schemes, solvers
+from ....beam import Start
 from ....core import (
     ContactSurface,
     Excitation,
@@ -51,10 +52,13 @@ from ....solvers.condensed import SmallMethod
 from ....solvers.friction.extrapolation import Extrapolation
 from ....solvers.friction.problem import FrictionMethod
 from ....solvers.volume.route import Method
+from ... import engineering, ground_motion, soil
 from ...engineering import checks
 from ...engineering.checks.comparison import Check
 from ...ground_motion.record import LARGEST_PEAK, Record
 from ...soil import SoilCurves, UpgoingVelocity
+from . import bodies
+from .bodies import BeamBody, LayerLaw, ParticleBody
 from .expressions import Expression, Places
 from .own_classes import defect, is_protocol
 from .parsing import Words
@@ -276,7 +280,8 @@ class Parts:
     """Hold what a problem is made of.
 
     tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium;
-    moved: the excitations come up through its base, and are no inertia load.
+    moved: the excitations come up through its base, and are no inertia load; mass: the law of a
+    body without a mesh, or with a layer.
     """
 
     system: SemiDiscreteSystem
@@ -284,6 +289,7 @@ class Parts:
     tags: Any
     weighted: bool = False
     moved: bool = False
+    mass: MassLaw | None = None
 
     @property
     def steady(self) -> bool:
@@ -305,6 +311,16 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
     Obstacle: {"AnalyticGap": lambda: analytic_gap},
     Recorder: {"Resultants": lambda: resultants},
+    BeamBody: {
+        name: lambda name=name: getattr(bodies, name)  # type: ignore[misc]
+        for name in ("rod_problem", "beam_problem", "rubbing_problem")
+    },
+    ParticleBody: {"particle_problem": lambda: bodies.particle_problem},
+    Start: {"Start": lambda: bodies.start},
+    LayerLaw: {
+        "contact_layer": lambda: bodies.contact_layer,
+        "ContactLayer": lambda: layer.ContactLayer,
+    },
 }
 
 
@@ -395,6 +411,7 @@ def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
         Traction: "Traction",
         Dashpots: "Dashpots",
         FieldWriter: "XDMF",
+        LayerLaw: "contact_layer",
     }
     return Words(
         folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
