@@ -306,13 +306,13 @@ def test_many_records_share_the_static_stages(
     compliant base, which is assembled for each, and in the frame of the ground, where all share one
     body."""
     found = []
-    solve = static.Equilibria.after
+    solve = static.Equilibria.solve
 
     def counted(self: Any, old: Any, t: float) -> Any:
         found.append(t)
         return solve(self, old, t)
 
-    monkeypatch.setattr(static.Equilibria, "after", counted)
+    monkeypatch.setattr(static.Equilibria, "solve", counted)
     base = HOUSE.split('[[stage]]\nname = "aftershock"')[0]
     frame = base.replace("release = true", "").replace(
         'dashpots = [{type = "CompliantBase", facets = "lower_bottom", motion = {dt = 0.002}}]',

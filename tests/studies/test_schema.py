@@ -16,7 +16,7 @@ from vi_contact.practice.studies.cases.toml_file import read_toml, with_settings
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
-STUDIES = ROOT / "vi_contact" / "studies"
+STUDIES = ROOT / "vi_contact" / "practice" / "studies"
 WALL = ROOT / "demos" / "cases" / "wall.toml"
 
 

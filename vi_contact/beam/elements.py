@@ -26,10 +26,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array
-from ..core.arguments import check_fields
+from ..core.arguments import check_fields, checked
 from ..core.checks import counted, number
 from ..core.errors import InputError
-from ..core.quantities import Between
+from ..core.quantities import Between, Positive
 from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements
@@ -79,6 +79,7 @@ class Elements:
         )[1:]
 
 
+@checked
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the beam: ½ wᵀMw and ½ yᵀSy are its energies [J], and C = a2 S.
 
@@ -124,7 +125,8 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     return M, stiffness, load
 
 
-def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
+@checked
+def rod_matrices(rod: Rod, count: Annotated[int, Positive]) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the rod: ½ wᵀMw and ½ vᵀKv are its energies [J], and C = a1 K.
 
     Returns:

@@ -18,6 +18,8 @@ the boundary are unchanged.
 
 from enum import Enum
 
+from ..core.checks import shown
+from ..core.errors import InputError
 from .layer import Layer
 
 
@@ -41,6 +43,12 @@ class Metric(Enum):
     FULL = "full"
     BLENDED = "blended"
     FLAT = "flat"
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Metric":
+        """Raise InputError for a value that names no metric."""
+        known = ", ".join(repr(metric.value) for metric in cls)
+        raise InputError(f"Metric: value is {shown(value)}; give one of {known}")
 
     def reaction(self, layer: Layer, g: float, rho: float, rate: float, free: float) -> float:
         """Return lambda [N] of g ρ̈ = g ``free`` + lambda, positive away from the obstacle.

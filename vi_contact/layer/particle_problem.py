@@ -18,7 +18,7 @@ from ..core.problem import ContactProblem
 from ..core.quantities import Finite, NotNegative, Positive, Unit
 from ..core.system import Load
 from ..fem.contact.points import contact_points
-from ..fem.own_matrices import system_from_arrays
+from ..fem.matrices.own_matrices import system_from_arrays
 from ..laws.mass import ConsistentMass
 
 

@@ -63,7 +63,7 @@ from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
 if TYPE_CHECKING:
-    from ...layer import ContactLayer
+    from ....layer import ContactLayer
 
 # in the order in which they are read: type of what a table makes, or the one call it is
 TABLES: dict[str, Any] = {
@@ -315,7 +315,7 @@ class Case:
     def _scheme(self) -> Scheme | None:
         """Return the scheme: that of the layer, or of [scheme]; None for that of ``simulate``."""
         if self.layer is not None:
-            from ...layer import BoundaryLayer  # late: other runs need none of it
+            from ....layer import BoundaryLayer  # late: other runs need none of it
 
             return BoundaryLayer(law=self.layer)
         made: Scheme | None = self._made("scheme")
