@@ -13,8 +13,8 @@ from newmark_block import SlidingBlock
 from rigid_wall import RigidWall
 from scipy.integrate import solve_ivp
 
-from demos.exact.housner import HousnerBlock
 from vi_contact.core.errors import InputError
+from vi_contact.exact.housner import HousnerBlock
 from vi_contact.practice.engineering.checks import (
     CoulombWedge,
     Housner,

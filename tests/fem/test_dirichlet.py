@@ -16,7 +16,7 @@ from mpi4py import MPI
 from own_meshes import OWN, at, own_mesh
 
 import vi_contact as vc
-from demos.problems.geometric_stiffness import geometric_stiffness
+from demos.parts.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem

@@ -14,10 +14,10 @@ import sliding_block as sliding
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.housner import HousnerBlock
-from demos.problems import rocking_block as rocking
+from demos.parts.problems import rocking_block as rocking
 from vi_contact import Resultants, fem, ground_motion
 from vi_contact.core.algebra import Array
+from vi_contact.exact.housner import HousnerBlock
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.practice.engineering.checks import (
     AtRest,
