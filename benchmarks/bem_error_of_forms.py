@@ -9,8 +9,8 @@ The slope is measured as well.
 
 The examples are the pressed square under a step and the concrete box under its slow load. c_P dt /
 h is fixed, and a side has k elements. The base is on rollers, clamped, or in contact with friction.
-Every level is compared with the finest symmetric solution. demos/problems/error_of_forms.py defines
-errors, slopes and the error of the reference.
+Every level is compared with the finest symmetric solution.
+demos/parts/problems/error_of_forms.py defines errors, slopes and the error of the reference.
 
 --json FILE writes rows with the keys case, form, k, finest, error_squared, energy_difference,
 slope, local_slopes, settled, reference_error, cosine and certificate. Rows of other cases that the
@@ -31,8 +31,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from demos.pictures.errors import plot_errors  # noqa: E402
-from demos.problems.error_of_forms import EXAMPLES, measure  # noqa: E402
+from demos.parts.pictures.errors import plot_errors  # noqa: E402
+from demos.parts.problems.error_of_forms import EXAMPLES, measure  # noqa: E402
 
 
 def table(rows: list[dict[str, Any]]) -> str:

@@ -38,7 +38,7 @@ from plane_waves import MATERIAL, pulse  # noqa: E402
 from test_energetic import echoes, rod, smooth_integral, smooth_load  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.problems.boundary_elements import square_problem  # noqa: E402
+from demos.parts.problems.boundary_elements import square_problem  # noqa: E402
 from vi_contact import bem  # noqa: E402
 from vi_contact.bem.energetic import marched  # noqa: E402
 

@@ -9,7 +9,7 @@ with Tresca's threshold 0.05. H/h and DT/dt are 1, 2, 3, 4 and 8, in space alone
 in both. Contact is tested at the ends of intervals or in the mean. "degree" is the degree of lambda
 on a patch, and "sigma" belongs to the weight of the means.
 
-* inf_sup: the constant of the pairing, space times time (demos/problems/inf_sup.py);
+* inf_sup: the constant of the pairing, space times time (demos/parts/problems/inf_sup.py);
 * step: the smallest eigenvalue of the normal flexibility of one interval per length, over DT/(rho
   c_P).
 
@@ -42,9 +42,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
 
-from demos.pictures.multiplier import plot_multiplier  # noqa: E402
-from demos.problems.boundary_elements import square_problem  # noqa: E402
-from demos.problems.inf_sup import space_constant, time_constant  # noqa: E402
+from demos.parts.pictures.multiplier import plot_multiplier  # noqa: E402
+from demos.parts.problems.boundary_elements import square_problem  # noqa: E402
+from demos.parts.problems.inf_sup import space_constant, time_constant  # noqa: E402
 from vi_contact import Frictionless, LinearElastic, Tresca, bem  # noqa: E402
 from vi_contact.core.errors import StepFailure  # noqa: E402
 

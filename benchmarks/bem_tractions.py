@@ -5,8 +5,8 @@
 
 The unit square has c_P = 1, c_S = 1/2 and a unit pressure on its top from t = 0 to 5; c_P dt = h
 for both methods. Forces on the nodes of the finite elements are collected on those of the boundary
-elements (demos/problems/compare_tractions.py), on the whole contact boundary with its ends. The
-numbers are relative L2 differences. "0.2 s" compares means over windows of time, and "patches"
+elements (demos/parts/problems/compare_tractions.py), on the whole contact boundary with its ends.
+The numbers are relative L2 differences. "0.2 s" compares means over windows of time, and "patches"
 compares means over hat functions 0.1 wide too. "early" is until t = 3, at nodes two elements or
 more from the ends. "late" is the same from t = 3 to 5.
 """
@@ -24,9 +24,9 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.boundary_elements import square_problem
-from demos.problems.compare_tractions import Tractions, compared
-from demos.problems.square import Square, build
+from demos.parts.problems.boundary_elements import square_problem
+from demos.parts.problems.compare_tractions import Tractions, compared
+from demos.parts.problems.square import Square, build
 from vi_contact import bem
 
 LAWS = {"none": vc.Frictionless(), "Tresca 0.05": vc.Tresca(0.05), "Coulomb 0.5": vc.Coulomb(0.5)}

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from step_cost import SCHEME, Factors, Linear, StepsWithContact, wall_cells
 
 import vi_contact as vc
-from demos.problems.wall import Wall, build
+from demos.parts.problems.wall import Wall, build
 from vi_contact import solvers
 from vi_contact.solvers.friction.extrapolation import Anderson
 

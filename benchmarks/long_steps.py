@@ -24,10 +24,9 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.bar import PeriodicBar
-from demos.exact.bouncing_bar import BouncingBar
-from demos.problems.bar import Bar, build
+from demos.parts.problems.bar import Bar, build
 from vi_contact import fem, ground_motion
+from vi_contact.exact import BouncingBar, PeriodicBar
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.wall import WallMesh
 

@@ -31,7 +31,7 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.problems.wall import Wall, build  # noqa: E402
+from demos.parts.problems.wall import Wall, build  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 SIZES = (216, 2e3, 2e4)

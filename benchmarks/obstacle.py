@@ -30,7 +30,7 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from demos.problems.membrane import Posed, build  # noqa: E402
+from demos.parts.problems.membrane import Posed, build  # noqa: E402
 from vi_contact import vi  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 

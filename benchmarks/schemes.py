@@ -35,9 +35,9 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.exact.bar import PeriodicBar, ThrownBar  # noqa: E402
-from demos.problems.bar import Bar, build  # noqa: E402
+from demos.parts.problems.bar import Bar, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
+from vi_contact.exact import PeriodicBar, ThrownBar  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 
 CONSISTENT = vc.ConsistentMass()

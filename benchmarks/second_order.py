@@ -41,10 +41,10 @@ from mpi4py import MPI  # noqa: E402
 from scipy.sparse.linalg import eigsh  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.exact.bar import ThrownBar  # noqa: E402
-from demos.problems.bar import Bar, build  # noqa: E402
+from demos.parts.problems.bar import Bar, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core.system import SemiDiscreteSystem  # noqa: E402
+from vi_contact.exact import ThrownBar  # noqa: E402
 from vi_contact.fem.petsc_algebra import as_petsc  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 

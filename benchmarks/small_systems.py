@@ -41,7 +41,7 @@ from scipy.linalg import lapack  # noqa: E402
 from scipy.sparse.linalg import splu  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.problems.wall import Wall, build  # noqa: E402
+from demos.parts.problems.wall import Wall, build  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)

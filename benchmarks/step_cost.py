@@ -45,8 +45,8 @@ from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.problems import channel  # noqa: E402
-from demos.problems.wall import Wall, build  # noqa: E402
+from demos.parts.problems import channel  # noqa: E402
+from demos.parts.problems.wall import Wall, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core import contact_last  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402

@@ -23,8 +23,8 @@ from pathlib import Path
 # run from the source tree without installing
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from demos.pictures.beam_statements import plot_statements
-from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, row
+from demos.parts.pictures.beam_statements import plot_statements
+from demos.parts.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, row
 from vi_contact.cli import status_of
 
 # Parameters
@@ -63,6 +63,6 @@ def main(quick: bool = False, as_json: bool = False, out: Path = OUT) -> list[Ro
     return rows
 
 
-# Things to try: NEGLIGIBLE = 1 or EPS = 1e-4 in demos/problems/beam_statements.py.
+# Things to try: NEGLIGIBLE = 1 or EPS = 1e-4 in demos/parts/problems/beam_statements.py.
 if __name__ == "__main__":
     raise SystemExit(status_of(lambda: main(as_json="--json" in sys.argv)))

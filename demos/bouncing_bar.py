@@ -26,10 +26,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.bar import PeriodicBar
-from demos.pictures.bars import plot_bounces
-from demos.problems.bar import Bar, build
+from demos.parts.pictures.bars import plot_bounces
+from demos.parts.problems.bar import Bar, build
 from vi_contact.cli import status_of
+from vi_contact.exact import PeriodicBar
 
 # Parameters
 # --------------------------------------------------------------------------------------------------
@@ -99,8 +99,8 @@ def table(numbers: dict[str, float]) -> str:
     return "\n".join(lines)
 
 
-# Things to try: dimension=2 or 3 in BAR; ThrownBar() or BouncingBar() of demos.exact as its case;
-# COURANT = 4: the default gains a little there and HHT does not; dt=vc.HalvedAtImpact(dt);
+# Things to try: dimension=2 or 3 in BAR; ThrownBar() or BouncingBar() of vi_contact.exact as its
+# case; COURANT = 4: the default gains a little there and HHT does not; dt=vc.HalvedAtImpact(dt);
 # impact=vc.Inelastic() with consistent mass.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

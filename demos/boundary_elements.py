@@ -29,16 +29,23 @@ from matplotlib.path import Path as Outline
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
-from demos.problems import disk, embedded, square
-from demos.problems.boundary_elements import (
+from demos.parts.pictures.boundary import (
+    SHEAR,
+    Curve,
+    Panel,
+    Shot,
+    plot_boundary_snapshots,
+    plot_panels,
+)
+from demos.parts.problems import disk, embedded, square
+from demos.parts.problems.boundary_elements import (
     disk_contact,
     disk_problem,
     embedded_problem,
     square_problem,
 )
-from demos.problems.compare_tractions import Tractions, compared
-from demos.problems.interior import interior_displacement
+from demos.parts.problems.compare_tractions import Tractions, compared
+from demos.parts.problems.interior import interior_displacement
 from vi_contact import bem
 from vi_contact.cli import status_of
 
@@ -380,7 +387,7 @@ def table(numbers: dict[str, float]) -> str:
 
 
 # Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend
-# on rho; compare_runs(problem, [Reference.of(run)], ...) of demos/problems/whole_runs.py beside
-# finite elements.
+# on rho; compare_runs(problem, [Reference.of(run)], ...) of demos/parts/problems/whole_runs.py
+# beside finite elements.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

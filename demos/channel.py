@@ -30,12 +30,12 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures import channel_interface as pictures
-from demos.pictures.channel import plot_beside, plot_layout, plot_moments
-from demos.pictures.channel_mesh import animate
-from demos.pictures.friction import plot_states
-from demos.pictures.histories import plot_energy, plot_excitation
-from demos.problems.channel import REFERENCE, Channel, build
+from demos.parts.pictures import channel_interface as pictures
+from demos.parts.pictures.channel import plot_beside, plot_layout, plot_moments
+from demos.parts.pictures.channel_mesh import animate
+from demos.parts.pictures.friction import plot_states
+from demos.parts.pictures.histories import plot_energy, plot_excitation
+from demos.parts.problems.channel import REFERENCE, Channel, build
 from vi_contact import fem
 from vi_contact.cli import main as command
 from vi_contact.cli import status_of

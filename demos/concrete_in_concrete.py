@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.deformed import plot_snapshots
-from demos.pictures.runs import plot_runs
-from demos.problems.embedded import Embedded, build
-from demos.problems.square import concrete
+from demos.parts.pictures.deformed import plot_snapshots
+from demos.parts.pictures.runs import plot_runs
+from demos.parts.problems.embedded import Embedded, build
+from demos.parts.problems.square import concrete
 from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import History

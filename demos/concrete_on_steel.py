@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.deformed import plot_snapshots, plot_tractions
-from demos.pictures.runs import plot_runs
-from demos.problems.square import Square, build, concrete
+from demos.parts.pictures.deformed import plot_snapshots, plot_tractions
+from demos.parts.pictures.runs import plot_runs
+from demos.parts.problems.square import Square, build, concrete
 from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import History

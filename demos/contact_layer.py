@@ -27,12 +27,11 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.bar import ThrownBar
-from demos.exact.bouncing_bar import BouncingBar
-from demos.pictures.layer import plot_layered_bar, plot_thin_limit
-from demos.problems import wall
-from demos.problems.bar import Bar, build
+from demos.parts.pictures.layer import plot_layered_bar, plot_thin_limit
+from demos.parts.problems import wall
+from demos.parts.problems.bar import Bar, build
 from vi_contact.cli import status_of
+from vi_contact.exact import BouncingBar, ThrownBar
 from vi_contact.layer import BoundaryLayer, Metric, contact_layer
 
 # Parameters

@@ -27,8 +27,8 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from demos.exact.crack import critical, homogeneous
-from demos.pictures.bounds import gathered, plot_crack
+from demos.parts.exact.crack import critical, homogeneous
+from demos.parts.pictures.bounds import gathered, plot_crack
 from vi_contact import vi
 from vi_contact.cli import status_of
 from vi_contact.fem import compat

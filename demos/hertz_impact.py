@@ -24,8 +24,8 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.impact import ImpactCurves, plot_impact
-from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
+from demos.parts.pictures.impact import ImpactCurves, plot_impact
+from demos.parts.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from vi_contact.cli import status_of
 
 # Parameters

@@ -22,11 +22,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from mpi4py import MPI
 
-from demos.exact.membrane import HALF, Membrane
-from demos.pictures.bounds import gathered, plot_membrane
-from demos.problems.membrane import build
+from demos.parts.pictures.bounds import gathered, plot_membrane
+from demos.parts.problems.membrane import build
 from vi_contact import vi
 from vi_contact.cli import status_of
+from vi_contact.exact.membrane import HALF, Membrane
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

@@ -35,8 +35,8 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures import raft as pictures
-from demos.pictures.histories import plot_certificate, plot_energy
+from demos.parts.pictures import raft as pictures
+from demos.parts.pictures.histories import plot_certificate, plot_energy
 from meshes.raft import RaftMesh
 from vi_contact import engineering, fem, ground_motion, soil
 from vi_contact.cli import status_of

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 
-from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
+from demos.parts.pictures.layer import plot_bounces_of_body, plot_thin_limit
 from vi_contact.cli import status_of
 from vi_contact.layer import Ellipsoid, Layer, RigidBody, layer_for, layer_motion
 

@@ -26,12 +26,12 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.housner import HousnerBlock
-from demos.pictures.histories import plot_certificate, plot_energy
-from demos.pictures.rocking import plot_pulses, plot_rocking
-from demos.problems import rocking_block as rocking
+from demos.parts.pictures.histories import plot_certificate, plot_energy
+from demos.parts.pictures.rocking import plot_pulses, plot_rocking
+from demos.parts.problems import rocking_block as rocking
 from vi_contact import fem
 from vi_contact.cli import status_of
+from vi_contact.exact import HousnerBlock
 
 # Parameters
 # --------------------------------------------------------------------------------------------------

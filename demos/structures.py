@@ -24,9 +24,9 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.structures import arm_flexibility, stop_force
-from demos.pictures.structures import Shown, plot_structures
-from demos.problems import structures as posed
+from demos.parts.exact.structures import arm_flexibility, stop_force
+from demos.parts.pictures.structures import Shown, plot_structures
+from demos.parts.problems import structures as posed
 from vi_contact.cli import status_of
 
 # Parameters

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 import vi_contact as vc
-from demos.pictures.beam import (
+from demos.parts.pictures.beam import (
     plot_beam_energies,
     plot_regularisation,
     plot_rubbing,

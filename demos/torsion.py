@@ -26,8 +26,14 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from demos.exact.torsion import DISK_LIMIT, SQUARE_LIMIT, disk_function, disk_torque, square_elastic
-from demos.pictures.bounds import gathered, plot_torsion
+from demos.parts.exact.torsion import (
+    DISK_LIMIT,
+    SQUARE_LIMIT,
+    disk_function,
+    disk_torque,
+    square_elastic,
+)
+from demos.parts.pictures.bounds import gathered, plot_torsion
 from vi_contact import vi
 from vi_contact.cli import status_of
 from vi_contact.fem import compat

@@ -26,7 +26,7 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.histories import plot_certificate, plot_energy
+from demos.parts.pictures.histories import plot_certificate, plot_energy
 from vi_contact import fem, soil
 from vi_contact.cli import status_of
 from vi_contact.meshes.block import BlockMesh

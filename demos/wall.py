@@ -28,11 +28,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.histories import draw_histories
-from demos.pictures.runs import plot_runs
-from demos.pictures.wall import plot_data, plot_decomposition, plot_frames
-from demos.problems import wall as wall_model
-from demos.problems.decomposition import split
+from demos.parts.pictures.histories import draw_histories
+from demos.parts.pictures.runs import plot_runs
+from demos.parts.pictures.wall import plot_data, plot_decomposition, plot_frames
+from demos.parts.problems import wall as wall_model
+from demos.parts.problems.decomposition import split
 from vi_contact import fem
 from vi_contact.cli import main as command
 from vi_contact.cli import status_of

@@ -28,7 +28,7 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.warming import plot_warming
+from demos.parts.pictures.warming import plot_warming
 from vi_contact import core, fem, meshes
 from vi_contact.cli import status_of
 from vi_contact.core.surfaces import empty_surface

@@ -2,8 +2,8 @@
 
 The names most runs need, imported when they are first used: ``import vi_contact`` needs numpy and
 scipy only. All else has a room: ``vi_contact.fem`` (meshes, assembly, surfaces), ``solvers``,
-``laws``, ``ground_motion``, ``soil``, ``engineering``, ``bem``, ``layer``, ``beam``, ``vi``,
-``studies``, ``plots``.
+``laws``, ``ground_motion``, ``soil``, ``engineering``, ``bem``, ``layer``, ``beam``,
+``exact``, ``vi``, ``studies``, ``plots``.
 """
 
 from .core.lazy import lazy

@@ -213,7 +213,7 @@ def bar_reference() -> Any:
     It has force(t) [Pa], displacement(x, t) [m] and energy [J/m²].
     """
     sys.path.insert(0, str(HERE.parents[1]))
-    from demos.exact.bouncing_bar import BouncingBar
+    from vi_contact.exact import BouncingBar
 
     return BouncingBar(**{key: BAR[key] for key in ("length", "E", "rho", "gravity", "height")})
 

@@ -29,10 +29,13 @@ import numpy as np  # noqa: E402
 import scipy.sparse as sp  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
-from demos.exact.bar import PeriodicBar, ThrownBar  # noqa: E402
-from demos.exact.bouncing_bar import BouncingBar  # noqa: E402
 from vi_contact import solvers  # noqa: E402
 from vi_contact.core import kkt_residual  # noqa: E402
+from vi_contact.exact import (  # noqa: E402
+    BouncingBar,
+    PeriodicBar,
+    ThrownBar,
+)
 from vi_contact.plots.histories import canvas, save  # noqa: E402
 
 BLUE, RED, GREEN, GREY = "tab:blue", "tab:red", "tab:green", "0.7"

@@ -11,8 +11,8 @@ import pytest
 from demo_runs import ROOT, demo
 from kept_figures import keep_figures
 
-from demos.pictures import beam_statements as pictures
-from demos.problems.beam_statements import FACTORS, HEAD, Row, row, turning_points
+from demos.parts.pictures import beam_statements as pictures
+from demos.parts.problems.beam_statements import FACTORS, HEAD, Row, row, turning_points
 
 pytestmark = pytest.mark.serial
 # with all forces, as in the table; the others with the whole force alone

@@ -11,7 +11,6 @@ import pytest
 from energy_checks import rounded
 
 import vi_contact as vc
-from demos.exact.bar import PeriodicBar
 from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
 from vi_contact.beam.contact_problems import beam_problem, rod_forces, rod_problem, rubbing_problem
 from vi_contact.beam.elements import Elements
@@ -20,6 +19,7 @@ from vi_contact.beam.tip import ExactFriction, RegularisedFriction
 from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
+from vi_contact.exact import PeriodicBar
 
 pytestmark = pytest.mark.serial
 MU, PUSH = 0.3, 100.0

@@ -10,7 +10,7 @@ from bem_rod import smooth_load
 from plane_waves import MATERIAL, SQUARE
 
 import vi_contact as vc
-from demos.problems.boundary_elements import pressed, steklov, unloaded
+from demos.parts.problems.boundary_elements import pressed, steklov, unloaded
 from vi_contact.bem import polygon
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from demos.problems.loose_segments import from_segments
+from demos.parts.problems.loose_segments import from_segments
 from vi_contact.bem import BoundaryMesh, circle, polygon
 from vi_contact.core.errors import InputError
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from plane_waves import MATERIAL, SQUARE
 
-from demos.problems.loose_segments import from_segments
+from demos.parts.problems.loose_segments import from_segments
 from vi_contact.bem import (
     BoundaryContact,
     BoundaryMesh,

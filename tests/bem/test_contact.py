@@ -11,9 +11,9 @@ import pytest
 from convolution_operator import convolution_operator
 
 import vi_contact as vc
-from demos.problems.boundary_elements import pressed, square_problem, steklov, unloaded
-from demos.problems.contact_ledger import ledger
-from demos.problems.whole_runs import Reference, compare_runs
+from demos.parts.problems.boundary_elements import pressed, square_problem, steklov, unloaded
+from demos.parts.problems.contact_ledger import ledger
+from demos.parts.problems.whole_runs import Reference, compare_runs
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
@@ -364,7 +364,7 @@ def test_a_third_opinion(law):
     refused."""
     from mpi4py import MPI
 
-    from demos.problems.square import Square, build
+    from demos.parts.problems.square import Square, build
 
     problem = build(Square(cells=20, pressure=1.0), MPI.COMM_WORLD).problem(friction=LAWS[law])
     references = [Reference.of(run(law)), Reference.of(run("Coulomb"))]

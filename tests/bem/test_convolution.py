@@ -14,7 +14,7 @@ from plane_waves import MATERIAL, SQUARE, pulse
 from radial_table import RadialTable
 from scipy.linalg import expm
 
-from demos.problems.contact_ledger import ledger
+from demos.parts.problems.contact_ledger import ledger
 from vi_contact import LinearElastic, Tresca
 from vi_contact.bem import (
     BoundaryProblem,

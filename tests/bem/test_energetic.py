@@ -11,8 +11,8 @@ import pytest
 from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
-from demos.problems.loose_segments import from_segments
-from demos.problems.stored_blocks import stored_blocks
+from demos.parts.problems.loose_segments import from_segments
+from demos.parts.problems.stored_blocks import stored_blocks
 from vi_contact import LinearElastic
 from vi_contact.bem import (
     BoundaryMesh,

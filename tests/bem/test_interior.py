@@ -8,7 +8,7 @@ import pytest
 from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
-from demos.problems.interior import interior_displacement
+from demos.parts.problems.interior import interior_displacement
 from vi_contact.bem import (
     BoundaryProblem,
     PoincareSteklov,

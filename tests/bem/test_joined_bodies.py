@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
-from demos.problems.boundary_elements import pressed, steklov, unloaded
+from demos.parts.problems.boundary_elements import pressed, steklov, unloaded
 from vi_contact.bem import (
     BoundaryContact,
     BoundaryProblem,

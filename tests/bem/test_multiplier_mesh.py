@@ -13,8 +13,8 @@ import pytest
 from pictures import is_drawn
 
 import vi_contact as vc
-from demos.problems.boundary_elements import pressed, square_problem, steklov
-from demos.problems.inf_sup import space_constant, time_constant
+from demos.parts.problems.boundary_elements import pressed, square_problem, steklov
+from demos.parts.problems.inf_sup import space_constant, time_constant
 from vi_contact.bem import (
     BoundaryContact,
     BoundaryProblem,

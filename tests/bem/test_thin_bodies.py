@@ -10,7 +10,7 @@ from convolution_operator import convolution_operator
 from plane_waves import MATERIAL, SQUARE
 from thin_slab import H, slab
 
-from demos.problems.interior import interior_displacement
+from demos.parts.problems.interior import interior_displacement
 from vi_contact.bem import (
     BoundaryMesh,
     BoundaryProblem,

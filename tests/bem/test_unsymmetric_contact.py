@@ -14,8 +14,8 @@ from plane_waves import MATERIAL
 from thin_slab import slab
 
 import vi_contact as vc
-from demos.problems.boundary_elements import pressed, square_problem, steklov
-from demos.problems.square import concrete as square_of_concrete
+from demos.parts.problems.boundary_elements import pressed, square_problem, steklov
+from demos.parts.problems.square import concrete as square_of_concrete
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryContact,

@@ -19,7 +19,7 @@ from fem_problems import block
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.geometric_stiffness import geometric_stiffness
+from demos.parts.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem, soil
 from vi_contact.core.algebra import Array, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure

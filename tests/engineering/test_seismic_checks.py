@@ -13,7 +13,6 @@ from newmark_block import SlidingBlock
 from rigid_wall import RigidWall
 from scipy.integrate import solve_ivp
 
-from demos.exact.housner import HousnerBlock
 from vi_contact.core.errors import InputError
 from vi_contact.engineering.checks import (
     Coulomb,
@@ -26,6 +25,7 @@ from vi_contact.engineering.checks import (
 )
 from vi_contact.engineering.checks.earth_pressure_seismic import smooth_wall
 from vi_contact.engineering.checks.earth_pressure_static import wedge
+from vi_contact.exact import HousnerBlock
 
 pytestmark = pytest.mark.serial
 DEGREE, G = math.pi / 180.0, 9.80665

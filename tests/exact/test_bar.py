@@ -5,8 +5,8 @@ import pytest
 from exact_checks import derivative_defect, energies, wave_defect
 from exact_columns import reflected
 
-from demos.exact.bar import PeriodicBar, ThrownBar
 from vi_contact.core.errors import InputError
+from vi_contact.exact import PeriodicBar, ThrownBar
 
 pytestmark = pytest.mark.serial
 STEEL = ThrownBar(length=0.2, E=2e11, rho=8000.0, height=2e-3, speed=100.0)  # Code_Aster SDNV100

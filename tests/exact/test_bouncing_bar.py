@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from exact_checks import derivative_defect, energies, wave_defect
 
-from demos.exact.bouncing_bar import BouncingBar
 from vi_contact.core.errors import InputError
+from vi_contact.exact import BouncingBar
 
 pytestmark = pytest.mark.serial
 BAR = BouncingBar()

@@ -8,13 +8,13 @@ import pytest
 from hertz_line import HertzLine, StripPunch
 from scipy.integrate import quad, solve_ivp
 
-from demos.exact.hertz import (
+from vi_contact.core.errors import InputError
+from vi_contact.exact import (
     HertzImpact,
     HertzPoint,
     contact_modulus,
     contact_radius,
 )
-from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 RIGID_PLANE = contact_modulus((1.0, 0.3))

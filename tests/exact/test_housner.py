@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from demos.exact.housner import HousnerBlock
 from vi_contact.core.errors import InputError
+from vi_contact.exact import HousnerBlock
 
 pytestmark = pytest.mark.serial
 BLOCK = HousnerBlock(width=0.4, height=2.0)

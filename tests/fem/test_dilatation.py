@@ -12,7 +12,7 @@ from fem_problems import BODIES, block, linear, max_over_ranks, nodal
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.geometric_stiffness import initial_stress_matrix
+from demos.parts.problems.geometric_stiffness import initial_stress_matrix
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.fem.petsc_algebra import PetscMatrix, as_petsc

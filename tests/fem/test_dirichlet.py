@@ -15,7 +15,7 @@ from mesh_tools import refusal
 from mpi4py import MPI
 from own_meshes import OWN, at, own_mesh
 
-from demos.problems.geometric_stiffness import geometric_stiffness
+from demos.parts.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem

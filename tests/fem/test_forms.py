@@ -19,7 +19,7 @@ from own_meshes import own_mesh
 from petsc4py import PETSc
 
 import vi_contact as vc
-from demos.problems.geometric_stiffness import geometric_stiffness
+from demos.parts.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem, soil
 from vi_contact.core.errors import InputError
 from vi_contact.core.verify import energy_balance

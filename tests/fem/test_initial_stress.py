@@ -14,7 +14,7 @@ from fem_problems import CONCRETE, block, dense, held_by, linear, max_over_ranks
 from mpi4py import MPI
 from standing import COLUMN, G, standing
 
-from demos.problems.geometric_stiffness import geometric_stiffness, initial_stress_matrix
+from demos.parts.problems.geometric_stiffness import geometric_stiffness, initial_stress_matrix
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace

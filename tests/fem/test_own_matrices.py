@@ -2,7 +2,7 @@
 made by hand.
 
 Chains and bars have displacements only; Euler–Bernoulli beams and frames
-(demos/problems/frame_elements.py) rotations too, and their cubic elements give static forms
+(demos/parts/problems/frame_elements.py) rotations too, and their cubic elements give static forms
 exactly. V2 of a user who brings matrices of his own.
 """
 
@@ -19,7 +19,7 @@ from bar import bar_matrices
 from chain import chain_problem
 
 import vi_contact as vc
-from demos.problems.frame_elements import frame, line
+from demos.parts.problems.frame_elements import frame, line
 from vi_contact import fem, plots
 from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import vi_contact as vc
-from demos.problems.frame_elements import frame, line
+from demos.parts.problems.frame_elements import frame, line
 from vi_contact import fem, meshes
 from vi_contact.core.errors import InputError
 from vi_contact.fem.petsc_algebra import PetscMatrix

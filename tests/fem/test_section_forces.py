@@ -10,7 +10,7 @@ import pytest
 from fem_problems import CONCRETE, block, linear
 
 import vi_contact as vc
-from demos.problems.channel import Channel, build
+from demos.parts.problems.channel import Channel, build
 from vi_contact import engineering, fem, solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError

@@ -12,8 +12,8 @@ import pytest
 from demo_runs import demo
 from pictures import is_drawn
 
-from demos.pictures import deformed
-from demos.pictures.boundary import SHEAR, plot_panels
+from demos.parts.pictures import deformed
+from demos.parts.pictures.boundary import SHEAR, plot_panels
 
 pytestmark = pytest.mark.serial
 
@@ -72,7 +72,7 @@ def test_the_shear_of_histories_is_drawn_on_the_body(
     run = SimpleNamespace(
         contact=contact, history={name: np.array(values) for name, values in history.items()}
     )
-    monkeypatch.setattr("demos.pictures.tractions.read_run", lambda folder: run)
+    monkeypatch.setattr("demos.parts.pictures.tractions.read_run", lambda folder: run)
     deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
     axis = shown[0].axes[1]
     assert axis.get_ylabel() == "shear $p_t$ on the body,\nalong +x [Pa]"

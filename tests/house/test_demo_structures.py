@@ -12,8 +12,8 @@ from demo_runs import demo
 from pictures import is_drawn
 
 import vi_contact as vc
-from demos.exact.structures import DiskOnGround, LiftedBeam, disk_on_ground, square_plate
-from demos.problems.structures import plate_on_a_stop, residual
+from demos.parts.exact.structures import DiskOnGround, LiftedBeam, disk_on_ground, square_plate
+from demos.parts.problems.structures import plate_on_a_stop, residual
 
 
 @pytest.mark.serial

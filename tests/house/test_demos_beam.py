@@ -9,7 +9,7 @@ from demo_runs import demo
 from kept_figures import keep_figures
 from pictures import is_drawn
 
-from demos.pictures import beam as plotting_beam
+from demos.parts.pictures import beam as plotting_beam
 from vi_contact import beam
 from vi_contact.beam.published import published_start
 

@@ -10,9 +10,9 @@ import pytest
 from demo_runs import demo
 from pictures import is_drawn
 
-from demos.exact.crack import critical
-from demos.exact.membrane import Membrane
-from demos.exact.torsion import disk_torque, square_elastic
+from demos.parts.exact.crack import critical
+from demos.parts.exact.torsion import disk_torque, square_elastic
+from vi_contact.exact import Membrane
 
 
 def test_the_membrane_over_a_ball(comm: Any, shared_tmp: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from demo_runs import demo
 from pictures import is_drawn
 
-from demos.pictures.layer import plot_thin_limit
+from demos.parts.pictures.layer import plot_thin_limit
 
 serial = pytest.mark.serial
 

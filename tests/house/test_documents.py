@@ -171,6 +171,7 @@ ROOMS = [
     "bem",
     "beam",
     "layer",
+    "exact",
     "studies",
     "plots",
 ]

@@ -10,8 +10,8 @@ import pytest
 from kept_figures import keep_figures
 from rubbing import rubbing_block
 
-from demos.pictures import friction as plotting_friction
-from demos.pictures.friction import plot_hysteresis, plot_states
+from demos.parts.pictures import friction as plotting_friction
+from demos.parts.pictures.friction import plot_hysteresis, plot_states
 from vi_contact.core.errors import InputError
 from vi_contact.laws.friction import Coulomb
 from vi_contact.plots.deformed import contact_states

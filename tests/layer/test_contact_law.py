@@ -12,10 +12,10 @@ import pytest
 from bar import bar, bouncing, energy, run, thrown
 from chain import chain_problem
 
-from demos.exact.bar import ThrownBar
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
+from vi_contact.exact import ThrownBar
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import Inelastic
@@ -317,7 +317,7 @@ def test_a_gap_lost_to_rounding_is_named():
 @pytest.mark.slow
 def test_a_stiff_block_of_finite_elements(comm):
     """A 2D block of nine cells falls flat on a plane: rebound e, 1 %, on any number of ranks."""
-    from demos.problems.bar import Bar, build
+    from demos.parts.problems.bar import Bar, build
 
     case = ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0)
     model = build(Bar(case, elements=3, dimension=2), comm)
@@ -335,7 +335,7 @@ def test_a_stiff_block_of_finite_elements(comm):
 def test_wall_tends_to_the_exact_inequality(comm):
     """The wall of seed 000, case b, in the layer: contact points within O(b) of the midpoint rule
     with gap >= 0."""
-    from demos.problems.wall import Wall, build
+    from demos.parts.problems.wall import Wall, build
 
     model = build(Wall(), comm)
     exact = model.problem("b", impact=None, mass=ConsistentMass())

@@ -7,7 +7,7 @@ import pytest
 from fem_problems import block
 from mpi4py import MPI
 
-from demos.problems.boundary_curve import boundary_curve
+from demos.parts.problems.boundary_curve import boundary_curve
 from vi_contact.core.errors import InputError
 from vi_contact.fem.mesh import node_numbers
 

@@ -12,8 +12,8 @@ from channel_runs import CHANNEL, DT, FRICTION, SCHEME, follow, model
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.channel import BODIES, REFERENCE, Channel, SoilProbe, build, staged
-from demos.problems.channel_sides import (
+from demos.parts.problems.channel import BODIES, REFERENCE, Channel, SoilProbe, build, staged
+from demos.parts.problems.channel_sides import (
     DashpotSides,
     Fixed,
     FreeFieldSides,

@@ -13,7 +13,7 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems import rocking_block as rocking
+from demos.parts.problems import rocking_block as rocking
 from vi_contact.core.errors import InputError
 
 COMM = MPI.COMM_WORLD

@@ -10,7 +10,7 @@ import pytest
 from fem_problems import field, max_over_ranks
 from mpi4py import MPI
 
-from demos.problems.wall import CASES, Wall, build
+from demos.parts.problems.wall import CASES, Wall, build
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.engineering.modal import lowest_frequency

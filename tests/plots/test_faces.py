@@ -23,7 +23,7 @@ from plain_pictures import plain_pictures
 from two_bodies import SOFT, two_blocks
 
 import vi_contact as vc
-from demos.pictures.rendered import render_deformed
+from demos.parts.pictures.rendered import render_deformed
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import open_hdf5

@@ -12,7 +12,7 @@ import pytest
 from kept_figures import keep_figures
 from plain_pictures import plain_pictures
 
-from demos.pictures import histories as plotting
+from demos.parts.pictures import histories as plotting
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")

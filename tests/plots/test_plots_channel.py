@@ -13,10 +13,10 @@ from kept_figures import keep_figures
 from plain_pictures import plain_pictures
 
 import vi_contact as vc
-from demos.pictures import channel as own_pictures
-from demos.pictures import channel_interface as pictures
-from demos.pictures.channel import plot_beside, plot_layout, plot_moments
-from demos.pictures.channel_interface import (
+from demos.parts.pictures import channel as own_pictures
+from demos.parts.pictures import channel_interface as pictures
+from demos.parts.pictures.channel import plot_beside, plot_layout, plot_moments
+from demos.parts.pictures.channel_interface import (
     SHOWN,
     Outline,
     opening,
@@ -25,9 +25,9 @@ from demos.pictures.channel_interface import (
     plot_openings,
     plot_rocking,
 )
-from demos.pictures.channel_mesh import animate, read_bodies
-from demos.pictures.histories import draw_histories
-from demos.problems.channel import Channel, ChannelModel, build
+from demos.parts.pictures.channel_mesh import animate, read_bodies
+from demos.parts.pictures.histories import draw_histories
+from demos.parts.problems.channel import Channel, ChannelModel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh

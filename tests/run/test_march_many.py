@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.wall import Wall, build
+from demos.parts.problems.wall import Wall, build
 from vi_contact import fem
 from vi_contact.core import contact_last
 from vi_contact.meshes.block import BlockMesh

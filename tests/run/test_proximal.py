@@ -12,7 +12,7 @@ from chain import chain_problem
 from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
-from demos.problems.channel import Channel, build
+from demos.parts.problems.channel import Channel, build
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.certificate import Certificate
 from vi_contact.core.errors import InputError, StepFailure

@@ -14,7 +14,7 @@ from at_step import AtStep, failing
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.wall import Wall, build
+from demos.parts.problems.wall import Wall, build
 
 MODEL = build(Wall(divisions=(4, 6)), MPI.COMM_WORLD)
 DT = MODEL.time_step()

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from standing import standing
 
 import vi_contact as vc
-from demos.problems.channel import Channel, build
+from demos.parts.problems.channel import Channel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace

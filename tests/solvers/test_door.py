@@ -16,7 +16,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.boundary_elements import square_problem
+from demos.parts.problems.boundary_elements import square_problem
 from vi_contact import fem, meshes
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact

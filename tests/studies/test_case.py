@@ -15,7 +15,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.wall import Wall, build
+from demos.parts.problems.wall import Wall, build
 from vi_contact import engineering, fem, ground_motion, laws, meshes, schemes, solvers
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
@@ -231,7 +231,8 @@ def test_the_wall_with_other_values(shared_tmp: Path) -> None:
 def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
     """Keys of its mesh; a recorder that stands with the demo, its weight and static stage."""
     text = located("channel").read_text("utf-8") + (
-        '\n[[record]]\ntype = "demos.problems.channel:SoilProbe"\npoints = {1_soil = [10.0, 5.0]}\n'
+        '\n[[record]]\ntype = "demos.parts.problems.channel:SoilProbe"\n'
+        "points = {1_soil = [10.0, 5.0]}\n"
     )
     path = write(shared_tmp, text)
     given = ("mesh.size=1.0", "mesh.wall=1.0", "mesh.slab=1.0", "run.steps=2", "fields=")

@@ -21,12 +21,12 @@ from gathered import gathered
 from half_space import under_hertz
 from mpi4py import MPI
 
-from demos.exact.hertz import HertzPoint, contact_modulus, contact_radius
 from vi_contact.core.algebra import Array
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
 from vi_contact.core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
+from vi_contact.exact import HertzPoint, contact_modulus, contact_radius
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair

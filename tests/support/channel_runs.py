@@ -8,7 +8,7 @@ from typing import Any
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.channel import Channel, ChannelModel, build
+from demos.parts.problems.channel import Channel, ChannelModel, build
 from vi_contact.run.simulate import Solution
 from vi_contact.soil.moving_base import base_motion
 

@@ -1,9 +1,9 @@
 """Solve Hertz contact of cylinders, and a flat rigid punch on a half-space, in plane strain
 (Johnson 1985, ch. 2, 4).
 
-E* and R are those of ``demos.exact.hertz``. Pressures are positive in compression; under the punch
-they are infinite at the edge, where they grow with the power -1/2 of the distance. Lengths [m],
-pressures and moduli [Pa], forces [N/m], or any consistent units.
+E* and R are those of ``vi_contact.exact.hertz``. Pressures are positive in compression; under the
+punch they are infinite at the edge, where they grow with the power -1/2 of the distance. Lengths
+[m], pressures and moduli [Pa], forces [N/m], or any consistent units.
 """
 
 from __future__ import annotations

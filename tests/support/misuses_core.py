@@ -22,7 +22,7 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.boundary_curve import boundary_curve
+from demos.parts.problems.boundary_curve import boundary_curve
 from vi_contact import core, engineering, fem, ground_motion, soil, solvers
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.solvers.volume.route import Volume

@@ -28,16 +28,16 @@ from misuses_core import (
 )
 
 import vi_contact as vc
-from demos.problems.boundary_elements import (
+from demos.parts.problems.boundary_elements import (
     disk_contact,
     disk_problem,
     embedded_problem,
     square_problem,
 )
-from demos.problems.disk import Disk, Push
-from demos.problems.embedded import Embedded
-from demos.problems.loose_segments import from_segments
-from demos.problems.square import Square
+from demos.parts.problems.disk import Disk, Push
+from demos.parts.problems.embedded import Embedded
+from demos.parts.problems.loose_segments import from_segments
+from demos.parts.problems.square import Square
 from vi_contact import beam, bem
 from vi_contact.beam.contact_problems import (
     StepForces,

@@ -13,12 +13,12 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from demos.exact.bouncing_bar import first_root
 from vi_contact.core.algebra import Array
 from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import array
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import NotNegative, Positive, Unit
+from vi_contact.exact.bouncing_bar import first_root
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,10 @@ theta_z x - theta_x z >= 0, and
 
 for a uniform block of 2a x 2h x 2c and of mass one. g h theta is the second-order effect of the
 weight, as geometric stiffness has it: on an edge this is the slender block of
-``demos.problems.rocking_block``. Impacts are inelastic: the velocity after one is the nearest, in
-the norm of M, at which no closed corner goes on down. From one edge or corner to the next that is
-the conservation of angular momentum about the new one (Housner, Bull. Seism. Soc. Am. 53, 1963).
+``demos.parts.problems.rocking_block``. Impacts are inelastic: the velocity after one is the
+nearest, in the norm of M, at which no closed corner goes on down. From one edge or corner to the
+next that is the conservation of angular momentum about the new one (Housner, Bull. Seism. Soc. Am.
+53, 1963).
 """
 
 from __future__ import annotations

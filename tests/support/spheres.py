@@ -15,10 +15,10 @@ from caps import Cap, Caps, Contact
 from half_space import Lubkin, Mindlin, turned
 from mpi4py import MPI
 
-from demos.exact.hertz import HertzPoint, contact_radius
 from vi_contact.core.algebra import Array
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import State
+from vi_contact.exact import HertzPoint, contact_radius
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.run.static import Equilibria, quasi_static

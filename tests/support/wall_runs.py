@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from demos.problems.wall import Wall, WallModel, build
+from demos.parts.problems.wall import Wall, WallModel, build
 from vi_contact.core.algebra import Array, Mask
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State

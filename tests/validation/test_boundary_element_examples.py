@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
-from demos.problems.boundary_elements import (
+from demos.parts.problems.boundary_elements import (
     disk_contact,
     disk_problem,
     embedded_problem,
     square_problem,
 )
-from demos.problems.compare_tractions import Tractions, compared, shares
-from demos.problems.contact_ledger import ContactLedger, ledger
-from demos.problems.disk import Push
+from demos.parts.problems.compare_tractions import Tractions, compared, shares
+from demos.parts.problems.contact_ledger import ContactLedger, ledger
+from demos.parts.problems.disk import Push
 from vi_contact.bem import BoundaryProblem, PoincareSteklov
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import ContactRun, march_contact
@@ -122,7 +122,7 @@ def test_square_tractions_beside_finite_elements(law, early, late):
     has passed, to 25 % (160 cells and why: pressed_blocks.md)."""
     from mpi4py import MPI
 
-    from demos.problems.square import Square, build
+    from demos.parts.problems.square import Square, build
 
     model = build(Square(cells=40, pressure=1.0), MPI.COMM_WORLD)
     problem = model.problem(friction=LAWS[law])

@@ -15,7 +15,7 @@ import pytest
 from channel_runs import CHANNEL, DT, EXACT, FRICTION, SCHEME, follow, model, moved, shaken
 
 import vi_contact as vc
-from demos.problems.channel import REFERENCE
+from demos.parts.problems.channel import REFERENCE
 from vi_contact.core.algebra import Array
 
 pytestmark = pytest.mark.serial  # whole runs; test_channel.py shows that ranks do not matter

@@ -14,8 +14,7 @@ import sliding_block as sliding
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.housner import HousnerBlock
-from demos.problems import rocking_block as rocking
+from demos.parts.problems import rocking_block as rocking
 from vi_contact import fem, ground_motion
 from vi_contact.core.algebra import Array
 from vi_contact.engineering import Resultants
@@ -28,6 +27,7 @@ from vi_contact.engineering.checks import (
     VeletsosYounan,
     Wood,
 )
+from vi_contact.exact import HousnerBlock
 from vi_contact.meshes.block import BlockMesh
 
 pytestmark = pytest.mark.serial

@@ -19,8 +19,8 @@ from mpi4py import MPI
 from two_bodies import relative
 
 import vi_contact as vc
-from demos.problems.embedded import CONTACT, Embedded, EmbeddedModel, build
-from demos.problems.square import concrete
+from demos.parts.problems.embedded import CONTACT, Embedded, EmbeddedModel, build
+from demos.parts.problems.square import concrete
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem

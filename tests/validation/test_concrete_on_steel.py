@@ -14,7 +14,7 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.square import Square, build, concrete
+from demos.parts.problems.square import Square, build, concrete
 from vi_contact.core.algebra import Array
 
 pytestmark = pytest.mark.slow

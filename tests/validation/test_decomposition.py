@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
-from demos.pictures.wall import plot_data, plot_decomposition
-from demos.problems.decomposition import split
-from demos.problems.wall import CASES, Wall, build
+from demos.parts.pictures.wall import plot_data, plot_decomposition
+from demos.parts.problems.decomposition import split
+from demos.parts.problems.wall import CASES, Wall, build
 
 
 @pytest.mark.serial

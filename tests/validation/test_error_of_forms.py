@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from demos.pictures.errors import plot_errors
-from demos.problems.error_of_forms import (
+from demos.parts.pictures.errors import plot_errors
+from demos.parts.problems.error_of_forms import (
     EXAMPLES,
     Differences,
     EnergyNorm,
@@ -58,7 +58,7 @@ def test_a_large_reference_is_solved_on_the_circle_of_frequencies(monkeypatch):
     """Errors of both forms are those against the marched reference; the forms are not compared on
     the last level."""
     marched = measure("square", (1, 2, 4), "no friction")
-    monkeypatch.setattr("demos.problems.error_of_forms.MARCHED", 2)
+    monkeypatch.setattr("demos.parts.problems.error_of_forms.MARCHED", 2)
     circled = measure("square", (1, 2, 4), "no friction")
     places = [[(row["form"], row["k"]) for row in rows] for rows in (marched, circled)]
     assert places[0] == [*places[1], ("unsymmetric", 4)]

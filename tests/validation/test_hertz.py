@@ -23,10 +23,10 @@ from graded import Pressed, even_then_growing, growing, pressed_half
 from hertz_line import HertzLine
 from mpi4py import MPI
 
-from demos.exact.hertz import HertzPoint, contact_modulus
 from meshes.ball import BallMesh
 from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
+from vi_contact.exact import HertzPoint, contact_modulus
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction

@@ -16,9 +16,9 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 from spheres import hertz
 
-from demos.exact.hertz import HertzPoint, contact_modulus
 from meshes.ball import BallMesh
 from vi_contact.core.problem import ContactProblem
+from vi_contact.exact import HertzPoint, contact_modulus
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair

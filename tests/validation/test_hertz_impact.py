@@ -17,14 +17,14 @@ import pytest
 from inertia import inertia
 from mpi4py import MPI
 
-from demos.exact.hertz import HertzPoint
-from demos.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
+from demos.parts.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
 from meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace, Touching
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.verify import energy_balance
+from vi_contact.exact import HertzPoint
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh import build_mesh

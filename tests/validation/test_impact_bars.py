@@ -17,10 +17,9 @@ from bar import bouncing, energy, period_three
 from bar import run as serial_run
 from mpi4py import MPI
 
-from demos.exact.bar import PeriodicBar, ThrownBar
-from demos.exact.bouncing_bar import BouncingBar
-from demos.problems.bar import Bar, build
+from demos.parts.problems.bar import Bar, build
 from vi_contact.core.algebra import Array
+from vi_contact.exact import BouncingBar, PeriodicBar, ThrownBar
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.march import march
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark

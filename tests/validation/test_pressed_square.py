@@ -13,8 +13,8 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.pictures.tractions import read_tractions
-from demos.problems.square import Square, SquareModel, build
+from demos.parts.pictures.tractions import read_tractions
+from demos.parts.problems.square import Square, SquareModel, build
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.plots.deformed import read_frames

@@ -17,8 +17,8 @@ from bar import thrown
 from chain import chain_problem
 from mpi4py import MPI
 
-from demos.exact.bar import ThrownBar
-from demos.problems.bar import Bar, build
+from demos.parts.problems.bar import Bar, build
+from vi_contact.exact import ThrownBar
 from vi_contact.laws.impact import ComponentReset, Elastic, ImpulseUpdate, Inelastic, Newton
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march

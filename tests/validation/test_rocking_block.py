@@ -15,9 +15,9 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.housner import HousnerBlock
-from demos.problems import rocking_block as rocking
+from demos.parts.problems import rocking_block as rocking
 from vi_contact.core.algebra import Array
+from vi_contact.exact import HousnerBlock
 from vi_contact.run.time_steps import TimeSteps
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it

@@ -21,12 +21,12 @@ from scipy.linalg import expm
 from two_bodies import per_body, relative
 
 import vi_contact as vc
-from demos.exact.housner import HousnerBlock
-from demos.problems import rocking_block
-from demos.problems.geometric_stiffness import geometric_stiffness
+from demos.parts.problems import rocking_block
+from demos.parts.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import State
+from vi_contact.exact import HousnerBlock
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 

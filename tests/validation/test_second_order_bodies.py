@@ -22,11 +22,10 @@ from mesh_tools import integral
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.exact.bar import PeriodicBar, ThrownBar
-from demos.exact.bouncing_bar import BouncingBar
-from demos.problems.bar import Bar, build
+from demos.parts.problems.bar import Bar, build
 from vi_contact import fem
 from vi_contact.core.algebra import Array
+from vi_contact.exact import BouncingBar, PeriodicBar, ThrownBar
 from vi_contact.meshes.block import BlockMesh
 
 COMM = MPI.COMM_WORLD

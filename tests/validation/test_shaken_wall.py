@@ -16,7 +16,7 @@ from fem_problems import dense, spread
 from mpi4py import MPI
 from wall_runs import POINTS, SCHEME, follow, history, model, problem
 
-from demos.problems.wall import Wall
+from demos.parts.problems.wall import Wall
 from vi_contact.core.algebra import Array, EffectiveMatrix
 from vi_contact.core.problem import ContactProblem
 from vi_contact.engineering.modal import lowest_frequency

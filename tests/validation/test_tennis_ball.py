@@ -14,7 +14,7 @@ from demo_runs import demo
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.disk import Disk, DiskModel, Momentum, Push, build
+from demos.parts.problems.disk import Disk, DiskModel, Momentum, Push, build
 from meshes.disk import DiskMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from demos.problems.wall import Wall, WallModel, build
+from demos.parts.problems.wall import Wall, WallModel, build
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.recorders import Contact, Energy, Probe

@@ -17,10 +17,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Positive, Unit
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.errors import InputError
+from ..core.quantities import Positive, Unit
 
 
 def contact_modulus(*bodies: tuple[float, float]) -> float:

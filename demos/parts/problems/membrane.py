@@ -12,7 +12,7 @@ import dolfinx
 import numpy as np
 import ufl
 
-from demos.exact.membrane import HALF, Membrane
+from vi_contact.exact.membrane import HALF, Membrane
 from vi_contact.fem import compat
 
 

@@ -29,8 +29,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from demos.problems import square
-from demos.problems.boundary_elements import BOTTOM, TOP, pressed
+from demos.parts.problems import square
+from demos.parts.problems.boundary_elements import BOTTOM, TOP, pressed
 from vi_contact.bem.boundary_mesh import polygon
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import vi_contact as vc
-from demos.exact.structures import (
+from demos.parts.exact.structures import (
     DiskOnGround,
     LiftedBeam,
     clamped_disk,

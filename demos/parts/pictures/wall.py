@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from demos.pictures.tractions import read_tractions
-from demos.problems.decomposition import Decomposition
-from demos.problems.wall import Wall
+from demos.parts.pictures.tractions import read_tractions
+from demos.parts.problems.decomposition import Decomposition
+from demos.parts.problems.wall import Wall
 from vi_contact.plots.deformed import nearest, read_frames
 from vi_contact.plots.histories import canvas, save, scale
 

@@ -6,7 +6,7 @@ The mesh of these is the same on all ranks.
 import numpy as np
 import numpy.typing as npt
 
-from demos.problems.loose_segments import from_segments
+from demos.parts.problems.loose_segments import from_segments
 from vi_contact.bem.boundary_mesh import BoundaryMesh
 from vi_contact.core.errors import InputError
 from vi_contact.fem import compat

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from demos.exact.structures import DiskOnGround, LiftedBeam
+from demos.parts.exact.structures import DiskOnGround, LiftedBeam
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import canvas, plain_numbers, save
 

@@ -1,6 +1,6 @@
 """Draw the pictures of docs/guide/practice.md from runs of the cases.
 
-    python3 demos/pictures/practice.py RESULTS [NAMES]
+    python3 demos/parts/pictures/practice.py RESULTS [NAMES]
 
 RESULTS holds the run folders wall, dam, pier, pounding and culvert, or those that are named; the
 pictures are written beside them.
@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 # run from the source tree without installing
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 import vi_contact as vc
 from vi_contact.core.units import STANDARD_GRAVITY as G

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from demos.exact.membrane import HALF, Membrane
+from vi_contact.exact.membrane import HALF, Membrane
 from vi_contact.plots.histories import canvas, plain_numbers, save
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from demos.pictures.tractions import Tractions, read_tractions
+from demos.parts.pictures.tractions import Tractions, read_tractions
 from vi_contact.core.algebra import Array
 from vi_contact.plots.deformed import StoredFrames, read_frames
 from vi_contact.plots.histories import canvas, save, scale, scaled

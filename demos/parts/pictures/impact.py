@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from demos.exact.hertz import HertzImpact
 from vi_contact.core.algebra import Array
+from vi_contact.exact import HertzImpact
 from vi_contact.plots.histories import canvas, save
 
 

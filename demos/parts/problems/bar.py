@@ -3,7 +3,7 @@
 It is a finite element body in 1, 2 or 3 dimensions.
 
 In 2D and 3D it is a strip or a column with nu = 0 and free sides, in which the 1D solutions are
-exact. Forces and energies divided by ``section`` compare with those of ``demos.exact``.
+exact. Forces and energies divided by ``section`` compare with those of ``demos.parts.exact``.
 """
 
 from dataclasses import dataclass, field
@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from demos.exact.bar import PeriodicBar, ThrownBar
-from demos.exact.bouncing_bar import BouncingBar
 from vi_contact.core.algebra import Array
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import ImpactLaw, MassLaw
 from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.exact import BouncingBar, PeriodicBar, ThrownBar
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce

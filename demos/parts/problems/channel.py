@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from demos.problems.channel_sides import RockBelow, Rollers, Sides
+from demos.parts.problems.channel_sides import RockBelow, Rollers, Sides
 from vi_contact.core.algebra import Array, Indices, Mask, from_each
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem

@@ -23,14 +23,14 @@ from typing import Any
 
 import numpy as np
 
-from demos.exact.housner import HousnerBlock
-from demos.problems.geometric_stiffness import geometric_stiffness
+from demos.parts.problems.geometric_stiffness import geometric_stiffness
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Excitation
 from vi_contact.core.step import Columns, Report, Row, State
+from vi_contact.exact import HousnerBlock
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from demos.pictures.tractions import Tractions, read_tractions
+from demos.parts.pictures.tractions import Tractions, read_tractions
 from vi_contact.core.algebra import Array, Indices, Mask
 from vi_contact.core.errors import InputError
 from vi_contact.plots.deformed import StoredFrames, read_frames

@@ -18,10 +18,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Positive, Unit
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.errors import InputError
+from ..core.quantities import Positive, Unit
 
 REST = 1e-30  # phi below which the rest of the motion lasts less than round-off of what has passed
 

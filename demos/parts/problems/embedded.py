@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from demos.problems.square import Square, concrete
+from demos.parts.problems.square import Square, concrete
 from vi_contact.core.checks import instance, optional
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem

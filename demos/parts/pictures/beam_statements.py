@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from demos.problems.beam_statements import EPS, FACTORS, NEGLIGIBLE, Row
+from demos.parts.problems.beam_statements import EPS, FACTORS, NEGLIGIBLE, Row
 from vi_contact.plots.histories import canvas, plain_numbers, save
 
 COLOURS = {"A": "tab:blue", "B": "tab:orange", "C": "tab:green"}

@@ -25,34 +25,34 @@ CONE = 0.9
 
 @dataclass(frozen=True)
 class Membrane:
-    """Hold the solution with all heights times ``unit``."""
+    """Hold the solution with all heights times ``unit`` [m]; places are in metres too."""
 
     unit: float = 1.0
 
     @property
     def radius(self) -> float:
-        """Return the contact radius a, 0.69797."""
+        """Return the contact radius a, 0.69797 [m]."""
         return float(brentq(lambda a: a**2 * (1.0 - np.log(a / 2.0)) - 1.0, 0.1, 0.9, xtol=1e-15))
 
     @property
     def factor(self) -> float:
-        """Return A, times the unit."""
+        """Return A, times the unit [m]."""
         return self.unit * self.radius**2 / float(np.sqrt(1.0 - self.radius**2))
 
     @property
     def force(self) -> float:
-        """Return what the ball pushes, 2 pi A."""
+        """Return what the ball pushes, 2 pi A, over the tension of the membrane [m]."""
         return 2.0 * np.pi * self.factor
 
     def obstacle(self, x: Any) -> Any:
-        """Return psi at points (3, n)."""
+        """Return psi [m] at points (3, n) [m], shape (n,)."""
         r = np.hypot(x[0], x[1])
         edge = np.sqrt(1.0 - CONE**2)
         ball = np.sqrt(np.maximum(1.0 - r**2, 0.0))
         return self.unit * np.where(r < CONE, ball, edge - (r - CONE) * CONE / edge)
 
     def height(self, x: Any) -> Any:
-        """Return u at points (3, n)."""
+        """Return u [m] at points (3, n) [m], shape (n,)."""
         r = np.hypot(x[0], x[1])
         off = -self.factor * np.log(np.maximum(r, self.radius) / HALF)
         return np.where(r < self.radius, self.obstacle(x), off)

@@ -23,11 +23,11 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from demos.exact.bar import UprightBar
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Positive, Unit
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.errors import InputError
+from ..core.quantities import Positive, Unit
+from .bar import UprightBar
 
 # events and piece ends closer than this, relative to the problem's own scales, are the same
 COINCIDENT = 1e-12

@@ -21,7 +21,7 @@ COLUMNS = (
 def plot_bounces(
     histories: Mapping[str, History], exact: Any, section: float, path: str | Path
 ) -> Path:
-    """Draw a row per scheme: foot, force, energy; ``exact`` (of demos.exact) in grey behind each.
+    """Draw a row per scheme: foot, force, energy; ``exact`` (of vi_contact.exact) in grey behind.
 
     histories: name -> history with u_?_foot, contact_resultant, energy_kinetic and energy_strain of
     a bar of that section; all of the same times. Forces beyond three times the exact one leave the

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from demos.pictures.channel_interface import LEGEND, RUNS, unit_of
-from demos.pictures.channel_mesh import (
+from demos.parts.pictures.channel_interface import LEGEND, RUNS, unit_of
+from demos.parts.pictures.channel_mesh import (
     AROUND,
     CONCRETE,
     CONTACT,

@@ -17,9 +17,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields
-from vi_contact.core.quantities import NotNegative, Positive, Unit
+from ..core.algebra import Array
+from ..core.arguments import check_fields
+from ..core.quantities import NotNegative, Positive, Unit
 
 # of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
 _PERIOD_THREE = 0.5 * np.array(

@@ -4,7 +4,7 @@ It is a quarter of tetrahedra with two planes of symmetry.
 
 It flies down along -y without gravity and strikes the plane with its lowest point. Forces, masses
 and energies of the model are a quarter of the ball's: times ``QUARTERS`` they compare with those of
-``demos.exact.hertz``.
+``vi_contact.exact.hertz``.
 """
 
 import math
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
-from demos.exact.hertz import HertzImpact, contact_modulus
 from meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
@@ -23,6 +22,7 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import MassLaw
 from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.exact import HertzImpact, contact_modulus
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed

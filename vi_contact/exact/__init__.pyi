@@ -1,0 +1,10 @@
+from .bar import PeriodicBar as PeriodicBar
+from .bar import ThrownBar as ThrownBar
+from .bar import UprightBar as UprightBar
+from .bouncing_bar import BouncingBar as BouncingBar
+from .hertz import HertzImpact as HertzImpact
+from .hertz import HertzPoint as HertzPoint
+from .hertz import contact_modulus as contact_modulus
+from .hertz import contact_radius as contact_radius
+from .housner import HousnerBlock as HousnerBlock
+from .membrane import Membrane as Membrane
