@@ -17,9 +17,9 @@ from .collective import Parts, agree
 from .corners import refuse_rubbing
 from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
-from .stages import stage
 from .surfaces import ContactSurface
 from .system import Load, SemiDiscreteSystem, history_value
+from .timing import report_time
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class ContactProblem:
         )
 
     @cached_property
-    @stage("mass")
+    @report_time("mass")
     def unshaken(self) -> SemiDiscreteSystem:
         """Return the system in the rotated basis, with the mass law in it, without excitation."""
         system = self.turned

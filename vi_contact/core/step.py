@@ -435,7 +435,7 @@ class Report:
 
     @cached_property
     def balance(self) -> Balance:
-        """Return the equation of motion that the step satisfied; it is made when it is asked for."""
+        """Return the equation of motion of the step; it is made when somebody asks."""
         return self.averages()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.problem import ContactProblem
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.step import Report, State, StepProblem
 from ..core.system import Load, history_value
 
@@ -55,7 +55,7 @@ def joined(states: Sequence[State]) -> State:
         np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active")
     )
     memory = {
-        name: frozen(np.stack([one.memory[name] for one in states]))
+        name: freeze(np.stack([one.memory[name] for one in states]))
         if value.shape == first.u.shape
         else value
         for name, value in first.memory.items()
@@ -64,7 +64,7 @@ def joined(states: Sequence[State]) -> State:
     r_t = (
         None if rubs is None else np.stack([rubs if one.r_t is None else one.r_t for one in states])
     )
-    return State(first.t, first.k, frozen(u), frozen(v), r_n, active, memory, r_t)
+    return State(first.t, first.k, freeze(u), freeze(v), r_n, active, memory, r_t)
 
 
 def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, ViContactError
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
@@ -224,7 +224,7 @@ class Group:
         problems, scheme, dt, old = self._problems, self._scheme, self._dt, self._states
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
-            frozen(vector)  # what is known of them stays true
+            freeze(vector)  # what is known of them stays true
         free = own_states(self._problem, problems, rows)
         self._many, self._states = self._struck(rows, free)
         system, loads = (
@@ -258,7 +258,7 @@ class Group:
             return rows, free
         if getattr(problem.impact, "by_rows", False) and not rows.memory:
             new = after_impact(problem, scheme, self._many, rows, dt)
-            struck, problems = (frozen(new.v) != rows.v).any(axis=1), self._problems
+            struck, problems = (freeze(new.v) != rows.v).any(axis=1), self._problems
 
             def moved(row: int) -> State:
                 if not struck[row]:

@@ -17,9 +17,9 @@ from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
-from ...core.stages import stage
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
+from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
@@ -36,7 +36,7 @@ from .watching import Watched, clamped_or_prescribed, watched_nodes
 log = logging.getLogger(__name__)
 
 
-@stage("contact")
+@report_time("contact")
 def contact_surface(
     system: SemiDiscreteSystem,
     facets: Facets,
