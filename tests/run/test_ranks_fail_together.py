@@ -415,7 +415,7 @@ def test_a_frame_goes_on_and_tells_at_its_end() -> None:
         done.append(2)
     with (
         pytest.raises(vc.StepFailure, match="too far"),
-        together(Two(0, (False, 1, "too far", ""))),
+        together(Two(0, _RankError(False, 1, "too far", ""))),
     ):
         done.append(3)
     assert done == [1, 2, 3]

@@ -16,7 +16,7 @@ from ...core.checks import array, at, flag, optional, provides, several
 from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
 from ...core.errors import InputError
-from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
+from ...core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
@@ -214,7 +214,7 @@ def _obstacle(
         if not len(points):  # users' functions need not cope with none
             return np.zeros_like(points), np.zeros(0)
         way = Touching() if obstacle is None else obstacle
-        directions, gap = facing(
+        directions, gap = locate_obstacle(
             way, points, normals, name=name, angle=angle, alone=len(points) == count
         )
         return snapped(directions), admissible_gap(gap, points, size)
@@ -250,7 +250,7 @@ def _looking(
         directions, gap = np.zeros_like(points), np.zeros(len(points))
         try:
             found = (
-                facing(Touching() if obstacle is None else obstacle, points, normals)
+                locate_obstacle(Touching() if obstacle is None else obstacle, points, normals)
                 if len(points)
                 else None
             )
