@@ -10,7 +10,7 @@ import pytest
 from marched_chain import chain
 
 from vi_contact.core.algebra import SerialMatrix
-from vi_contact.core.products import Remembered, frozen
+from vi_contact.core.products import Remembered, freeze
 from vi_contact.run.recorders import Energy
 from vi_contact.run.simulate import simulate
 from vi_contact.schemes.contact_stabilised import ContactStabilisedNewmark
@@ -97,13 +97,13 @@ def test_only_vectors_that_nobody_writes_to_are_remembered():
     assert remembered(x).tolist() == [2.0, 4.0]
     x[0] = 5.0
     assert remembered(x).tolist() == [10.0, 4.0]  # made anew
-    frozen(x)
+    freeze(x)
     first = remembered(x)
     assert remembered(x) is first and asked == [1.0, 5.0, 5.0]
     with pytest.raises(ValueError, match="read-only"):
         first[0] = 0.0
-    remembered(frozen(np.zeros(2)))
-    remembered(frozen(np.ones(2)))
+    remembered(freeze(np.zeros(2)))
+    remembered(freeze(np.ones(2)))
     assert remembered(x) is not first  # only so many are kept
     told = remembered.know(np.array([7.0]), lambda: np.array([0.5]))
     assert remembered(told).tolist() == [0.5]

@@ -8,7 +8,13 @@ from chain import chain_surface
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError
-from vi_contact.core.obstacles import AnalyticGap, HalfSpace, Touching, admissible_gap, facing
+from vi_contact.core.obstacles import (
+    AnalyticGap,
+    HalfSpace,
+    Touching,
+    admissible_gap,
+    locate_obstacle,
+)
 from vi_contact.core.surfaces import empty_surface, nodal_frames
 
 pytestmark = pytest.mark.serial
@@ -44,7 +50,7 @@ def test_half_space_along_a_whole_side_is_refused():
             InputError,
             match=r"is along the boundary at 90 degrees to its mean outward normal \(1, ",
         ):
-            facing(HalfSpace((0.0, 0.0), (0.0, 1.0)), POINTS, side)
+            locate_obstacle(HalfSpace((0.0, 0.0), (0.0, 1.0)), POINTS, side)
 
 
 @pytest.mark.parametrize(
@@ -53,12 +59,18 @@ def test_half_space_along_a_whole_side_is_refused():
         (lambda: HalfSpace((0.0, 0.0), (0.0, 0.0)), "nonzero normal"),
         (lambda: HalfSpace((0.0, 0.0), (0.0, np.nan)), "give finite numbers"),
         (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)), "same number"),
-        (lambda: facing(HalfSpace((0.0, 0.0), (0.0, -1.0)), POINTS, DOWN), "turn its sign"),
         (
-            lambda: facing(HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), POINTS, DOWN),
+            lambda: locate_obstacle(HalfSpace((0.0, 0.0), (0.0, -1.0)), POINTS, DOWN),
+            "turn its sign",
+        ),
+        (
+            lambda: locate_obstacle(HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), POINTS, DOWN),
             "numbers of shape",
         ),
-        (lambda: facing(AnalyticGap(lambda x: 0.5), POINTS, DOWN), "one real gap per point"),
+        (
+            lambda: locate_obstacle(AnalyticGap(lambda x: 0.5), POINTS, DOWN),
+            "one real gap per point",
+        ),
     ],
 )
 def test_wrong_obstacles_are_refused(obstacle, word):

@@ -24,7 +24,7 @@ from own_forms import space, square
 
 import vi_contact as vc
 from vi_contact import fem, vi
-from vi_contact.core.collective import Parts, agree, together, users
+from vi_contact.core.collective import Parts, _RankError, agree, call_user, together
 from vi_contact.core.obstacles import AnalyticGap
 
 PATIENCE = 120  # seconds for a test of about one, on a machine with other work
@@ -401,13 +401,13 @@ class Two:
 def test_a_frame_goes_on_and_tells_at_its_end() -> None:
     done = []
     with pytest.raises(vc.InputError, match="f ended in ZeroDivisionError"), together(Two(0, None)):
-        assert users("f", lambda: 1 / 0, 3) == 3
+        assert call_user("f", lambda: 1 / 0, 3) == 3
         done.append(1)
     assert done == [1]
     # without a frame at once
     with pytest.raises(vc.InputError, match="f ended in ZeroDivisionError"):
-        users("f", lambda: 1 / 0, 3)
-    other = (False, None, "", "KeyError('a')")
+        call_user("f", lambda: 1 / 0, 3)
+    other = _RankError(False, None, "", "KeyError('a')")
     with (
         pytest.raises(vc.ViContactError, match=r"rank 1: KeyError\('a'\)"),
         together(Two(0, other)),
@@ -415,7 +415,7 @@ def test_a_frame_goes_on_and_tells_at_its_end() -> None:
         done.append(2)
     with (
         pytest.raises(vc.StepFailure, match="too far"),
-        together(Two(0, (False, 1, "too far", ""))),
+        together(Two(0, _RankError(False, 1, "too far", ""))),
     ):
         done.append(3)
     assert done == [1, 2, 3]

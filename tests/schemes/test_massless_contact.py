@@ -25,7 +25,7 @@ from vi_contact.laws.mass import Redistributed
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.run.simulate import simulate
-from vi_contact.schemes.consistent_data import equilibrated
+from vi_contact.schemes.consistent_data import equilibrate
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
@@ -124,7 +124,7 @@ def test_only_contact_rows_are_factorised(name: str, factorised: Rows) -> None:
     state = disturbed(problem)
     u, r_n = with_the_whole_matrix(problem, state)
     factorised.clear()
-    found = equilibrated(problem, state)
+    found = equilibrate(problem, state)
     massless = problem.equations.massless
     assert massless is not None
     assert (
@@ -144,10 +144,10 @@ def test_a_large_layer_is_not_factorised(
     """The same equilibrium by conjugate gradients, to 1e-11."""
     problem = PROBLEMS[name]()
     state = disturbed(problem)
-    small = equilibrated(problem, state)
+    small = equilibrate(problem, state)
     monkeypatch.setattr(sizes, "OWN_UNKNOWNS", 0)
     factorised.clear()
-    large = equilibrated(replace(problem), state)
+    large = equilibrate(replace(problem), state)
     assert not factorised and np.array_equal(large.active, small.active)
     assert max_over_ranks(COMM, large.u - small.u) < 1e-11 * max_over_ranks(COMM, small.u)
     assert max_over_ranks(COMM, large.r_n - small.r_n) < 1e-11 * max_over_ranks(COMM, small.r_n)

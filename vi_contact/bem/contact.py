@@ -35,7 +35,7 @@ from ..core.algebra import (
 from ..core.checks import array, at, flag, function, instance, integers, optional, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
-from ..core.obstacles import Obstacle, Touching, admissible_gap, facing
+from ..core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import StepProblem
 from ..core.surfaces import ContactSurface, nodal_frames
@@ -218,7 +218,7 @@ class BoundaryContact:
     def _facing(self) -> tuple[Array, Array]:
         """Return contact directions (c, 2) and gaps (c,)."""
         rows = self._rows
-        return facing(self.obstacle, self.compliance.points[rows.nodes], rows.normals)
+        return locate_obstacle(self.obstacle, self.compliance.points[rows.nodes], rows.normals)
 
     @cached_property
     def _second(self) -> Mask:

@@ -16,22 +16,20 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-AT_ONCE = 10_000  # nodes whose rows are stored in blocks: bounds the memory
+BATCH = 10_000  # nodes whose rows are put into blocks at a time: bounds the memory
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
 
 def max_abs(x: Array) -> float:
-    """Return max |x| over the entries given, 0 for none; NaN stays NaN.
-
-    The places are found faster than the values.
-    """
+    """Return max |x| over the entries of this rank, 0 for none; NaN stays NaN."""
+    # numpy finds the places of the extremes faster than the extremes themselves
     return float(max(x.item(x.argmax()), -x.item(x.argmin()))) if x.size else 0.0
 
 
 def lowest(x: Array) -> float:
-    """Return the size of the smallest negative entry, 0 for none; NaN stays NaN."""
+    """Return how far the smallest entry is below zero, 0 if it is not; NaN stays NaN."""
     return -min(x.item(x.argmin()), 0.0) if x.size else 0.0
 
 
@@ -55,7 +53,7 @@ class Comm(Protocol):
 
 
 def largest(comm: Comm, value: SupportsFloat) -> float:
-    """Return the largest of the ranks' values, the same on every rank.
+    """Return the largest of the ranks' values, the same on every rank. Collective.
 
     Of truth values it is 1 where one rank says True.
     """
@@ -63,34 +61,38 @@ def largest(comm: Comm, value: SupportsFloat) -> float:
 
 
 def total(comm: Comm, value: SupportsFloat) -> float:
-    """Return the sum of the ranks' values, the same on every rank."""
+    """Return the sum of the ranks' values, the same on every rank. Collective."""
     return float(value) if comm.size == 1 else float(comm.sum(np.array([float(value)]))[0])
 
 
 def from_each(comm: Comm, value: Any) -> list[Any]:
-    """Return the values of all ranks, in their order, on every rank."""
+    """Return the values of all ranks, in their order, on every rank. Collective."""
     return comm.bcast(comm.gather(value))
 
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:
-    """Return the rows (m, …) of all ranks on rank 0, in the places of their numbers.
+    """Return the rows of all ranks, by their numbers, on rank 0. Collective.
 
-    Other ranks get none. Collective.
+    Args:
+        comm: the ranks.
+        numbers: (m,) those of the rows of this rank, among all from 0 on.
+        rows: (m, …) the rows of this rank.
+
+    Returns:
+        On rank 0 an array (total, …); on the others one without rows.
     """
     parts = comm.gather((numbers, rows))
     if parts is None:
         return rows[:0]
-    every, found = (np.concatenate(part) for part in zip(*parts, strict=True))
-    placed = np.empty_like(found)
-    placed[every] = found
-    return placed
+    all_numbers = np.concatenate([part[0] for part in parts])
+    all_rows = np.concatenate([part[1] for part in parts])
+    in_order = np.empty_like(all_rows)
+    in_order[all_numbers] = all_rows
+    return in_order
 
 
 class Matrix(Protocol):
-    """Provide products with a square sparse matrix.
-
-    Its rows are distributed like the vectors it multiplies.
-    """
+    """Provide products with a square sparse matrix, distributed like the vectors it multiplies."""
 
     @property
     def rows(self) -> int:
@@ -113,17 +115,24 @@ class Factor(Protocol):
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
-        """Return the columns A^-1 e_j for m unit vectors.
+        """Return the columns A⁻¹ e_j of m unit vectors, one for each contact condition. Collective.
 
-        e_{slots[k]} has its one in row ``owned[k]`` of the owning rank. Returned are the owned
-        rows, shape (rows, m), or only those of them that are named: the whole may not fit.
+        Args:
+            owned: (k,) rows of this rank in which unit vectors have their ones.
+            slots: (k,) the numbers j of these vectors.
+            m: number of the vectors on all ranks.
+            rows: which owned rows to return, for the whole may not fit the memory; None for all.
+
+        Returns:
+            The owned rows (rows, m) of the columns, or those that were asked for.
         """
 
 
 class Algebra(Protocol):
-    """Make matrices out of matrices.
+    """Make matrices out of M, C, K and their combinations.
 
-    These are M, C, K and their combinations, all of them ``symmetric`` or not.
+    Attributes:
+        symmetric: whether all of them are.
     """
 
     symmetric: bool
@@ -139,43 +148,55 @@ class Algebra(Protocol):
         """Return Tᵀ K T."""
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of entries between the n unknowns of one rank.
+        """Return the matrix of entries between unknowns of one rank.
 
-        Entries that are given twice add up.
+        Args:
+            rows: (k,) the rows of the entries, from 0 to n - 1.
+            columns: (k,) their columns.
+            values: (k,) their values; entries that are given twice add up.
+            n: number of unknowns that this rank owns.
         """
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
-        """Return A with the rows and columns of masked unknowns replaced by the identity's."""
+        """Return A with the rows and columns of masked unknowns (n,) replaced by the identity's."""
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
-        """Return the rows and columns of A of the masked unknowns, which their ranks own."""
+        """Return the rows and columns of A of the masked unknowns (n,), which their ranks own."""
 
     def first(self, n: int) -> int:
-        """Return the number of the first of the n unknowns that this rank owns.
-
-        It is the number among the unknowns of all ranks.
-        """
+        """Return the number, over all ranks, of the first of the n unknowns of this rank."""
 
     def entries(self, A: Matrix, rows: Indices) -> sp.csr_matrix:
-        """Return these owned rows of A, ascending, their columns numbered over all ranks.
+        """Return rows of A that this rank owns. Collective.
 
-        Collective.
+        Args:
+            A: the matrix.
+            rows: (k,) the owned rows, ascending.
+
+        Returns:
+            The rows (k, n of all ranks), their columns numbered over all ranks.
         """
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        """Return the identity of n owned rows with some of them replaced.
+        """Return the identity with some of its rows replaced.
 
-        Columns are numbered over all ranks.
+        Args:
+            n: number of rows that this rank owns.
+            rows: (k,) those that are replaced.
+            entries: what stands in them, columns numbered over all ranks.
         """
 
     def factor(self, A: Matrix) -> Factor:
         """Return a factor of A."""
 
     def contact_last(self, A: Matrix, last: Indices) -> Any:
-        """Return a factor with these unknowns last, a ``kernels.contact_last.ContactLast``.
+        """Return a factor with some unknowns last, a ``kernels.contact_last.ContactLast``.
 
-        The unknowns are numbered over all ranks and the same on every rank. The answer is None
-        where ``factor`` serves better or there is none. Collective.
+        Returns None where ``factor`` serves better, or where there is no such factor. Collective.
+
+        Args:
+            A: the matrix.
+            last: the unknowns, numbered over all ranks, and the same on every rank.
         """
 
     def dot(self, x: Array, y: Array) -> float:
@@ -183,13 +204,15 @@ class Algebra(Protocol):
 
 
 class EffectiveMatrix:
-    """Hold the matrix A of a step and its factor.
+    """Hold the matrix A of a step and its factor, as long as dt stays the same.
 
-    A prepared solver belongs to one of these; it lives as long as dt.
-
-    ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k
-    K. None: not known. ``image(x)``: A x, made of products with M, C and K that others need too,
-    where that is told.
+    Attributes:
+        matrix: the matrix A.
+        algebra: that of its matrix.
+        space: what its unknowns mean (``core.system.Space``); None where that is not known.
+        inertia: (m, M) of A = m M + c C + k K; None where that is not known.
+        image: function x -> A x, made of products with M, C and K that others need too, where that
+            saves work.
     """
 
     def __init__(
@@ -203,25 +226,28 @@ class EffectiveMatrix:
     ) -> None:
         self.matrix = matrix
         self.algebra = algebra
-        self.space, self.inertia = space, inertia
+        self.space = space
+        self.inertia = inertia
         self.image = matrix.__matmul__ if image is None else image
-        self._last: tuple[Indices, Any] | None = None
+        self._last: tuple[Indices, Any] | None = None  # unknowns and the factor with them last
 
     def contact_last(self, last: Indices) -> Any:
-        """Return the factor with these unknowns last (see ``Algebra``).
+        """Return the factor with these unknowns last (see ``Algebra``). Collective.
 
-        It is then ``factor`` too. Collective.
+        Where there is one, it serves as ``factor`` too.
         """
         if self._last is None or not np.array_equal(self._last[0], last):
-            self._last = last, self.algebra.contact_last(self.matrix, last)
-            if self._last[1] is not None:
-                self.__dict__.setdefault("factor", self._last[1])
+            factor = self.algebra.contact_last(self.matrix, last)
+            self._last = (last, factor)
+            if factor is not None:
+                self.__dict__.setdefault("factor", factor)
         return self._last[1]
 
     def factorised_as(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
         """Return this matrix with the factors of another, whose entries are the same."""
         self._last = other._last
-        self.__dict__ |= {"factor": other.factor} if other.factorised else {}
+        if other.factorised:
+            self.__dict__["factor"] = other.factor
         return self
 
     @cached_property
@@ -292,7 +318,7 @@ class SerialMatrix:
 class SerialFactor:
     """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering.
 
-    Rows are exchanged where they must.
+    Rows are exchanged where a pivot is too small.
     """
 
     def __init__(self, matrix: SerialMatrix) -> None:
@@ -308,7 +334,14 @@ class SerialFactor:
     def solve_units(
         self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
     ) -> Array:
-        """Return the columns A⁻¹ e_j for m unit vectors, as ``Factor`` says."""
+        """Return the columns A⁻¹ e_j of m unit vectors.
+
+        Args:
+            owned: (k,) rows in which unit vectors have their ones.
+            slots: (k,) the numbers j of these vectors.
+            m: number of the vectors.
+            rows: which rows to return; None for all.
+        """
         units = np.zeros((self._rows, m))
         units[owned, slots] = 1.0
         columns = np.asarray(self._lu.solve(units)) if m else units
@@ -335,7 +368,14 @@ class SerialAlgebra:
         return SerialMatrix(basis.T @ serial(K).csr @ basis)
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
-        """Return the matrix of entries between the n unknowns of one rank."""
+        """Return the matrix of entries between unknowns.
+
+        Args:
+            rows: (k,) the rows of the entries.
+            columns: (k,) their columns.
+            values: (k,) their values; entries that are given twice add up.
+            n: number of unknowns.
+        """
         return SerialMatrix(sp.coo_matrix((values, (rows, columns)), shape=(n, n)))
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
@@ -356,7 +396,13 @@ class SerialAlgebra:
         return serial(A).csr[rows]
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        """Return the identity of n owned rows with some of them replaced."""
+        """Return the identity with some of its rows replaced.
+
+        Args:
+            n: number of rows.
+            rows: (k,) those that are replaced.
+            entries: (k, n) what stands in them.
+        """
         return SerialMatrix(identity_with(n, rows, entries, first=0))
 
     def factor(self, A: Matrix) -> Factor:
@@ -380,18 +426,24 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
-    """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows.
+    """Return the upper triangle of a symmetric matrix as blocks, in compressed rows.
 
-    The rows begin at ``first``.
+    Args:
+        rows: the rows of the matrix that this rank owns.
+        width: number of unknowns of a node, the size of a block.
+        first: number of the first row among those of all ranks.
+
+    Returns:
+        Where the blocks of each block row end (rows / width + 1,), their columns (k,) and their
+        values (k, width, width).
     """
-    counts, columns, values = (
-        [np.zeros(1, dtype=np.int64)],
-        [rows.indices[:0]],
-        [np.zeros((0, width, width))],
-    )
-    for start in range(0, rows.shape[0], AT_ONCE * width):
-        blocks = rows[start : start + AT_ONCE * width].tobsr((width, width))
-        # they come as the rows of a node name them; PETSc counts on their order on several ranks
+    counts = [np.zeros(1, dtype=np.int64)]
+    columns = [rows.indices[:0]]
+    values = [np.zeros((0, width, width))]
+    for start in range(0, rows.shape[0], BATCH * width):
+        blocks = rows[start : start + BATCH * width].tobsr((width, width))
+        # The blocks come in the order in which the rows of a node name them; PETSc counts on
+        # ascending columns on several ranks.
         blocks.sort_indices()
         row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
         upper = blocks.indices >= (first + start) // width + row
@@ -402,12 +454,16 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
 
 
 def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
-    """Return n rows of the identity, with these rows replaced by the entries.
+    """Return rows of the identity, some of them replaced.
 
-    The ones of the identity begin in column ``first``.
+    Args:
+        n: number of rows.
+        rows: (k,) those that are replaced.
+        entries: (k, columns) what stands in them.
+        first: column in which row 0 of the identity has its one.
     """
-    kept = np.setdiff1d(np.arange(n), rows)
-    where = np.concatenate([kept, np.repeat(rows, np.diff(entries.indptr))])
-    column = np.concatenate([first + kept, entries.indices])
-    values = np.concatenate([np.ones(len(kept)), entries.data])
-    return sp.coo_matrix((values, (where, column)), shape=(n, entries.shape[1]))
+    others = np.setdiff1d(np.arange(n), rows)
+    row = np.concatenate([others, np.repeat(rows, np.diff(entries.indptr))])
+    column = np.concatenate([first + others, entries.indices])
+    values = np.concatenate([np.ones(len(others)), entries.data])
+    return sp.coo_matrix((values, (row, column)), shape=(n, entries.shape[1]))

@@ -1,6 +1,4 @@
-"""Check the arguments of public functions against their types.
-
-A wrong argument is then a sentence and no traceback.
+"""Check the arguments of public functions against their types: a sentence, and no traceback.
 
 ``@checked`` is for functions that users call with their own values, and that look at these before
 any other function does; ``check_fields`` is for dataclasses. Both check the limits of numbers that
@@ -21,11 +19,11 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import called, real, shape_of, shown
+from .checks import real, shape_of, shown, suggest_object
 from .errors import InputError
 from .quantities import Between, Quantity, quantities
 
-_MANY: dict[Any, str] = {float: "real numbers", int: "whole numbers", str: "texts"}
+_PLURALS: dict[Any, str] = {float: "real numbers", int: "whole numbers", str: "texts"}
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -36,98 +34,127 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     The check raises InputError for an argument that is not of its type, or beyond the limits that
     its annotation marks (``core.quantities``).
     """
-    name, found = function.__qualname__, cache(lambda: _parameters(function))
+    owner = function.__qualname__
+    get_parameters = cache(lambda: _parameters(function))  # classes may follow
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        of, known = found()
-        for argument, value in of.bind(*args, **kwargs).arguments.items():
-            if argument in known:
-                _check(name, argument, value, known[argument])
+        own_signature, quantity_of = get_parameters()
+        for name, value in own_signature.bind(*args, **kwargs).arguments.items():
+            if name in quantity_of:
+                _check(owner, name, value, quantity_of[name])
         return function(*args, **kwargs)
 
     return call
 
 
 def _parameters(function: Callable[..., Any]) -> tuple[Signature, dict[str, Quantity]]:
-    """Return the signature, and what is asked of each argument of its own."""
-    of, said = signature(function), quantities(function)
-    several = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
-    return of, {
-        name: said[name]
-        for name, one in of.parameters.items()
-        if one.kind not in several and name in said
-    }
+    """Return the signature, and what the annotation of each parameter asks for.
+
+    Parameters that collect others, such as ``*args``, are left out.
+    """
+    own_signature = signature(function)
+    quantity_of = quantities(function)
+    collecting = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    names = [
+        name
+        for name, parameter in own_signature.parameters.items()
+        if parameter.kind not in collecting and name in quantity_of
+    ]
+    return own_signature, {name: quantity_of[name] for name in names}
 
 
-def check_fields(one: Any) -> None:
+def check_fields(value: Any) -> None:
     """Raise InputError for the first field of a dataclass that is wrong.
 
-    It is not of its type, or beyond the limits that its annotation marks (``core.quantities``).
-    Call it in ``__post_init__``.
+    A field is wrong that is not of its type, or beyond the limits that its annotation marks
+    (``core.quantities``). Call it in ``__post_init__``.
     """
-    kind: Any = type(one)
-    for name, asked in _fields(kind):
-        _check(kind.__name__, name, getattr(one, name), asked)
+    kind: Any = type(value)
+    for name, quantity in _fields(kind):
+        _check(kind.__name__, name, getattr(value, name), quantity)
 
 
 @cache
 def _fields(kind: Any) -> tuple[tuple[str, Quantity], ...]:
-    """Return what is asked of each field of a dataclass."""
-    said = quantities(kind)
-    return tuple((one.name, said[one.name]) for one in fields(kind) if one.name in said)
+    """Return what the annotation of each field of a dataclass asks for."""
+    quantity_of = quantities(kind)
+    names = [field.name for field in fields(kind) if field.name in quantity_of]
+    return tuple((name, quantity_of[name]) for name in names)
 
 
 def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
-    """Raise InputError unless the value is of this type, as annotations have it."""
+    """Raise InputError unless the value is of a type.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        kind: the type, as annotations have it.
+    """
     if not fits(value, kind):
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give {words(kind)}")
 
 
-def _check(owner: str, name: str, value: Any, asked: Quantity) -> None:
-    """Raise InputError unless the value is of its type and within its limits."""
-    kind, limit = asked.kind, asked.limit
+def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
+    """Raise InputError unless the value is of its type and within its limits.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        name: the argument or field.
+        value: what the user gave.
+        quantity: what the annotation asks for.
+    """
+    kind = quantity.kind
+    limit = quantity.limit
     if limit is not None and type(value) is float and limit.holds(value) and kind is float:
         return  # as most are: objects are built in loops
-    one = None if limit is None else _one_number(kind)
-    if one is None and not fits(value, kind):
-        told = limit.remedy if limit is not None and limit.remedy else f"give {words(kind)}"
-        told = told if asked.other is None else f"{called(value)}{asked.other.text}"
-        raise InputError(f"{owner}: {asked.named(name)} is {shown(value)}; {told}")
+
+    # Of a single number, type and limit are one question, with one sentence.
+    number_kind = None if limit is None else _single_number(kind)
+    if number_kind is None and not fits(value, kind):
+        remedy = f"give {words(kind)}"
+        if quantity.other is not None:
+            remedy = f"{suggest_object(value)}{quantity.other.text}"
+        elif limit is not None and limit.remedy:
+            remedy = limit.remedy
+        raise InputError(f"{owner}: {quantity.named(name)} is {shown(value)}; {remedy}")
     if limit is None or (value is None and type(None) in _members(kind)):
         return
-    if one is None:
-        place, wrong = _beyond(value, limit)
+
+    if number_kind is not None:
+        place = None if _holds(value, limit, number_kind) else ""
+        wrong = value
     else:
-        place, wrong = None if _holds(value, limit, one) else "", value
+        place, wrong = _locate_beyond(value, limit)
     if place is not None:
-        said = f"{asked.named(name)}{place} is {shown(wrong)}"
-        raise InputError(f"{owner}: {said}; {asked.remedy(one is int)}")
+        defect = f"{quantity.named(name)}{place} is {shown(wrong)}"
+        raise InputError(f"{owner}: {defect}; {quantity.remedy(number_kind is int)}")
 
 
 def _holds(value: Any, limit: Between, kind: type) -> bool:
-    """Return whether a value is a number, or whole one, within a limit."""
-    found = real(value)
-    return limit.holds(found) and (kind is float or found == math.floor(found))
+    """Return whether a value is a number, or a whole one where ``kind`` is int, within a limit."""
+    number = real(value)
+    return limit.holds(number) and (kind is float or number == math.floor(number))
 
 
 @cache
 def _members(kind: Any) -> tuple[Any, ...]:
-    """Return the types of a union, or the one type."""
+    """Return the types of a union, or the type itself."""
     return typing.get_args(kind) if _is_union(kind) else (kind,)
 
 
 @cache
-def _one_number(kind: Any) -> type | None:
-    """Return float or int where a value is one such number or None; else None."""
-    found = [one for one in _members(kind) if one is not type(None)]
-    return found[0] if len(found) == 1 and found[0] in (float, int) else None
+def _single_number(kind: Any) -> type | None:
+    """Return float or int where a value of this type is such a number or None; else None."""
+    members = [member for member in _members(kind) if member is not type(None)]
+    return members[0] if len(members) == 1 and members[0] in (float, int) else None
 
 
-def _beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
-    """Return the place of the first number of a list or array that is beyond a limit, and it.
+def _locate_beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
+    """Return the place of the first number that is beyond a limit, and that number.
 
-    The place of one number is ""; it is None where all are within.
+    The place is an index such as "[2]", "" for a single number, None where all are within.
     """
     if _is_number(value):
         return (None if limit.holds(real(value)) else ""), value
@@ -135,19 +162,22 @@ def _beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
         return "", value
     if not _is_sequence(value):
         return None, value
-    ends = (np.min(value), np.max(value)) if _are_numbers(value) and np.size(value) else ()
-    if ends and all(limit.holds(real(one)) for one in ends):
-        return None, value
-    for index, one in enumerate(value):
-        place, wrong = _beyond(one, limit)
+    # The two ends of many numbers are looked at first: most often both are within.
+    if _are_numbers(value) and np.size(value):
+        ends = (np.min(value), np.max(value))
+        if all(limit.holds(real(end)) for end in ends):
+            return None, value
+    for index, member in enumerate(value):
+        place, wrong = _locate_beyond(member, limit)
         if place is not None:
             return f"[{index}]{place}", wrong
     return None, value
 
 
 def fits(value: Any, kind: Any) -> bool:
-    """Return whether a value is of a type; of one that is not understood every value is."""
-    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    """Return whether a value is of a type; every value is of a type that is not understood."""
+    origin = typing.get_origin(kind)
+    inside = typing.get_args(kind)
     if kind is Any:
         return True
     if _is_union(kind):
@@ -165,8 +195,9 @@ def fits(value: Any, kind: Any) -> bool:
 
 def _fits_one_of(value: Any, kinds: tuple[Any, ...]) -> bool:
     """Return whether a value is of one of several types; a text beside a path is a path."""
-    is_path = any(_is_path(one) for one in kinds)
-    return any(_fits_path(value) if is_path and one is str else fits(value, one) for one in kinds)
+    if any(map(_is_path, kinds)) and str in kinds:
+        kinds = (Path, *(kind for kind in kinds if kind is not str))
+    return any(fits(value, kind) for kind in kinds)
 
 
 def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
@@ -175,17 +206,19 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
         return callable(value) and not isclass(value)
     protocol = kind if origin is None else origin  # without what stands in its brackets
     if getattr(protocol, "_is_protocol", False):
-        return not isclass(value) and all(hasattr(value, name) for name in _asked(protocol))
+        names = _names_asked(protocol)
+        return not isclass(value) and all(hasattr(value, name) for name in names)
     return isinstance(value, kind) if isclass(kind) and origin is None else True
 
 
 def words(kind: Any) -> str:
     """Return the words for a type in a sentence."""
-    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    origin = typing.get_origin(kind)
+    inside = typing.get_args(kind)
     if _is_union(kind):
-        is_path = any(_is_path(one) for one in inside)
-        said = [words(one) for one in inside if not (is_path and one is str)]
-        return " or ".join(dict.fromkeys(said))
+        is_path = any(map(_is_path, inside))
+        texts = [words(member) for member in inside if not (is_path and member is str)]
+        return " or ".join(dict.fromkeys(texts))
     if kind is None or kind is type(None):
         return "None"
     if _is_path(kind):
@@ -193,13 +226,12 @@ def words(kind: Any) -> str:
     if origin is np.ndarray:
         return "real numbers in a list or array"
     if origin is tuple:
-        alike = len({one for one in inside if one is not Ellipsis}) == 1
-        several = "" if inside[-1] is Ellipsis else f"{len(inside)} "
-        if alike:
-            return f"{several}{_MANY.get(inside[0], 'values')} in a tuple"
-        return f"a tuple of {', '.join(words(one) for one in inside)}"
+        count = "" if inside[-1] is Ellipsis else f"{len(inside)} "
+        if len(set(inside) - {Ellipsis}) == 1:
+            return f"{count}{_PLURALS.get(inside[0], 'values')} in a tuple"
+        return f"a tuple of {', '.join(map(words, inside))}"
     if origin in (Sequence, Iterable, list):
-        return f"{_MANY.get(inside[0], 'values')} in a list"
+        return f"{_PLURALS.get(inside[0], 'values')} in a list"
     if origin in (Mapping, dict):
         return "a mapping"
     if kind is Callable or origin is Callable:
@@ -229,17 +261,15 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_whole(value: Any) -> bool:
-    return _is_number(value) and (
-        isinstance(value, Integral) or real(value) == np.rint(real(value))
-    )
+    if not _is_number(value):
+        return False
+    return isinstance(value, Integral) or real(value) == np.rint(real(value))
 
 
 def _are_numbers(value: Any) -> bool:
-    return (
-        not isinstance(value, str | bytes)
-        and shape_of(value) != (-1,)
-        and np.asarray(value).dtype.kind in "iufb"
-    )
+    if isinstance(value, str | bytes) or shape_of(value) == (-1,):
+        return False
+    return np.asarray(value).dtype.kind in "iufb"
 
 
 def _is_sequence(value: Any) -> bool:
@@ -251,20 +281,19 @@ def _is_sequence(value: Any) -> bool:
 def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
     if not _is_sequence(value):
         return False
-    kinds = [inside[0]] * len(value) if inside[-1] is Ellipsis else list(inside)
-    return len(kinds) == len(value) and all(
-        fits(one, kind) for one, kind in zip(value, kinds, strict=True)
-    )
+    if inside[-1] is Ellipsis:
+        return all(fits(member, inside[0]) for member in value)
+    return len(inside) == len(value) and all(map(fits, value, inside))
 
 
 def _fits_sequence(value: Any, inside: tuple[Any, ...]) -> bool:
-    return _is_sequence(value) and all(fits(one, inside[0]) for one in value)
+    return _is_sequence(value) and all(fits(member, inside[0]) for member in value)
 
 
 def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
-    return isinstance(value, Mapping) and all(
-        fits(key, inside[0]) and fits(value[key], inside[1]) for key in value
-    )
+    if not isinstance(value, Mapping):
+        return False
+    return all(fits(key, inside[0]) and fits(value[key], inside[1]) for key in value)
 
 
 _SIMPLE: dict[Any, Callable[[Any], bool]] = {
@@ -285,12 +314,10 @@ _MADE_OF: dict[Any, Callable[[Any, tuple[Any, ...]], bool]] = {
 }
 
 
-def _asked(protocol: Any) -> list[str]:
-    """Return the attributes and methods that a protocol asks for."""
-    names = {
-        name
-        for one in protocol.__mro__
-        if getattr(one, "_is_protocol", False)
-        for name in (*vars(one), *getattr(one, "__annotations__", {}))
-    }
+def _names_asked(protocol: Any) -> list[str]:
+    """Return the attributes and methods that a protocol, and those it is made of, ask for."""
+    names: set[str] = set()
+    for base in protocol.__mro__:
+        if getattr(base, "_is_protocol", False):
+            names.update(vars(base), getattr(base, "__annotations__", {}))
     return sorted(name for name in names if not name.startswith("_"))

@@ -23,6 +23,7 @@ T = TypeVar("T")
 SHOWN = 60  # characters of a value in a sentence
 LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
 MOST_CELLS = 20_000_000  # of a mesh made here: Gmsh takes some kilobytes for each
+LARGEST_WHOLE = 2.0**53  # beyond it not every whole number is a float
 
 
 def number(
@@ -36,52 +37,63 @@ def number(
 ) -> float:
     """Return a finite real number as a float.
 
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        positive: whether it must be above zero.
+        not_negative: whether it must be zero or above.
+        unit: SI unit to name in the sentence, "" for none.
+
     Raises:
         InputError: texts, NaN, infinity, truth values and wrong signs.
     """
-    kind = "a finite number above zero" if positive else "zero or a positive finite number"
-    wanted = (kind if positive or not_negative else "a finite number") + (
-        f" in {unit}" if unit else ""
-    )
-    found = real(value)
-    if (
-        not math.isfinite(found)
-        or found < 0.0
-        and (positive or not_negative)
-        or found == 0.0
-        and positive
-    ):
+    wanted = "a finite number"
+    if positive:
+        wanted = "a finite number above zero"
+    elif not_negative:
+        wanted = "zero or a positive finite number"
+    if unit:
+        wanted += f" in {unit}"
+
+    result = real(value)
+    too_low = (positive and result <= 0.0) or (not_negative and result < 0.0)
+    if too_low or not math.isfinite(result):
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give {wanted}")
-    return found
+    return result
 
 
 def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | None = None) -> int:
-    """Return a whole number between ``least`` and ``most`` as an int.
+    """Return a whole number as an int; 3.0 counts as one, True does not.
 
-    3.0 counts as a whole number, True does not.
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        least: smallest number that is allowed.
+        most: largest number that is allowed; None for no limit.
+
+    Raises:
+        InputError: fractions, numbers beyond the limits, and what is no number.
     """
-    found = real(value)
-    if (
-        not math.isfinite(found)
-        or found != int(found)
-        or found < least
-        or (most is not None and found > most)
-    ):
-        upper = "" if most is None else f" and at most {most}"
+    result = real(value)
+    upper = math.inf if most is None else most
+    if not math.isfinite(result) or result != int(result) or not least <= result <= upper:
+        limit = "" if most is None else f" and at most {most}"
         raise InputError(
-            f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{upper}"
+            f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{limit}"
         )
     return int(value)
 
 
-def between(what: str, value: Any, low: float, high: float, remedy: str) -> None:
-    """Raise InputError unless it is a real number from ``low`` to ``high``, both included."""
-    if not low <= real(value) <= high:
-        raise InputError(f"{what} is {shown(value)}: {remedy}")
-
-
 def check_word(name: str, given: object, known: Sequence[str]) -> None:
-    """Raise InputError for a word that is not among those known."""
+    """Raise InputError for a word that is not among those known.
+
+    Args:
+        name: what the word chooses, for the sentence.
+        given: what the user gave.
+        known: the words to choose from.
+    """
     if not isinstance(given, str) or given not in known:  # an array compares element by element
         raise InputError(f"unknown {name} {shown(str(given))}: choose one of {', '.join(known)}")
 
@@ -91,30 +103,56 @@ def counted(
 ) -> int:
     """Return how many things an input asks for, before memory is taken for them.
 
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        asked: the argument that asks for so many, in words.
+        value: how many; a float is cut to an int.
+        things: what is counted, for the sentence.
+        most: largest number that is allowed.
+
     Raises:
         InputError: more than ``most``, and NaN.
     """
-    found = real(value)
-    if not found <= most:
+    count = real(value)
+    if not count <= most:
         raise InputError(
-            f"{owner}: {asked} asks for {found:.3g} {things}, and {most:.3g} are the most; ask for "
+            f"{owner}: {asked} asks for {count:.3g} {things}, and {most:.3g} are the most; ask for "
             "fewer"
         )
     return int(value)
 
 
 def flag(owner: str, meaning: str, value: Any) -> bool:
-    """Return True or False; InputError for anything else, 0 and 1 too."""
+    """Return True or False.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+
+    Raises:
+        InputError: anything else, 0 and 1 too.
+    """
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise InputError(f"{owner}: {meaning} is {shown(value)}; give True or False")
 
 
 def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
-    """Return what can be called; InputError for anything else, and for a class."""
+    """Return what can be called.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        remedy: what to give instead, the end of the sentence.
+
+    Raises:
+        InputError: anything else, and a class.
+    """
     if callable(value) and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
 
 
 def column_name(kind: str, name: Any) -> str:
@@ -131,14 +169,20 @@ def column_name(kind: str, name: Any) -> str:
 
 
 def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...]:
-    """Return the members of a list or tuple.
+    """Return the members of a list, a tuple or an array as a tuple.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        remedy: what to give instead, the end of the sentence.
 
     Raises:
         InputError: one object, a text or a mapping in its place.
     """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
 
 
 def instance(
@@ -146,12 +190,19 @@ def instance(
 ) -> Any:
     """Return an object of one of these types.
 
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        kinds: the type, or the types, that are allowed.
+        remedy: what to give instead, the end of the sentence.
+
     Raises:
         InputError: a class instead of an object, and anything else.
     """
     if isinstance(value, kinds):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
 
 
 def provides(
@@ -163,58 +214,78 @@ def provides(
     *,
     lacks: tuple[str, ...] = (),
 ) -> Any:
-    """Return an object with these attributes (a protocol's) and without those of other kinds.
+    """Return an object that has the attributes of a protocol, and none of another kind's.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        names: attributes that it must have.
+        remedy: what to give instead, the end of the sentence.
+        lacks: attributes that it must not have, as they tell another kind of object.
 
     Raises:
-        InputError: the object lacks an attribute, or has one of another kind.
+        InputError: the object lacks an attribute, or has one of another kind; a class.
     """
-    fits = all(hasattr(value, name) for name in names) and not any(
-        hasattr(value, name) for name in lacks
-    )
-    if fits and not isinstance(value, type):
+    has_all = all(hasattr(value, name) for name in names)
+    has_other = any(hasattr(value, name) for name in lacks)
+    if has_all and not has_other and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {called(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
 
 
 def array(
     owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *, unit: str = ""
 ) -> Array:
-    """Return finite real values as a float array of this shape.
+    """Return finite real values as a float array.
 
-    None in the shape stands for any length along an axis.
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the values are, in words.
+        value: what the user gave.
+        shape: the shape that it must have; None stands for any length along an axis.
+        unit: SI unit to name in the sentence, "" for none.
+
+    Raises:
+        InputError: other shapes, what are no real numbers, NaN and infinite values.
     """
+    lengths = ", ".join("any" if n is None else str(n) for n in shape)
+    wanted = f"({lengths},)" if len(shape) == 1 else f"({lengths})"
     unit = f" in {unit}" if unit else ""
-    wanted = (
-        "("
-        + ", ".join("any" if n is None else str(n) for n in shape)
-        + ("," if len(shape) == 1 else "")
-        + ")"
-    )
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "iuf":
             raise ValueError
-        found = raw.astype(float)
+        values = raw.astype(float)
     except (TypeError, ValueError):
         raise InputError(
             f"{owner}: {meaning} is {shown(value)}; give real numbers of shape {wanted}{unit}"
         ) from None
-    if found.ndim != len(shape) or any(
-        n is not None and n != m for n, m in zip(shape, found.shape, strict=True)
+    if values.ndim != len(shape) or any(
+        n is not None and n != m for n, m in zip(shape, values.shape, strict=True)
     ):
         raise InputError(
-            f"{owner}: {meaning} has shape {found.shape}; give numbers of shape {wanted}"
+            f"{owner}: {meaning} has shape {values.shape}; give numbers of shape {wanted}"
         )
-    if not np.all(np.isfinite(found)):
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(found))[0])
-        raise InputError(f"{owner}: {meaning} is {found[place]} at {place}; give finite numbers")
-    return found
+    if not np.all(np.isfinite(values)):
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
+        raise InputError(f"{owner}: {meaning} is {values[place]} at {place}; give finite numbers")
+    return values
 
 
 def optional(
     check: Callable[..., Any], owner: str, meaning: str, value: Any, *more: Any, **options: Any
 ) -> None:
-    """Check a value that may be left out: ``check(owner, meaning, value, …)`` unless it is None."""
+    """Check a value that may be left out: nothing is asked of None.
+
+    Args:
+        check: a check of this module, called as ``check(owner, meaning, value, …)``.
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the value is, in words.
+        value: what the user gave.
+        more: further positional arguments of the check.
+        options: keyword arguments of the check.
+    """
     if value is not None:
         check(owner, meaning, value, *more, **options)
 
@@ -222,7 +293,7 @@ def optional(
 def shape_of(value: Any) -> tuple[int, ...]:
     """Return the shape of numbers in lists or arrays.
 
-    Lists of different lengths have none: (-1,) stands for it.
+    Lists of different lengths have no shape; (-1,) stands for it.
     """
     try:
         return np.shape(value)
@@ -231,38 +302,63 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 
 def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]) -> Indices:
-    """Return whole numbers as an integer array of this shape; 3.0 counts as one."""
-    found = array(owner, meaning, value, shape)
-    if np.any(found != np.rint(found)) or np.any(np.abs(found) > 2.0**53):
+    """Return whole numbers as an integer array; 3.0 counts as one.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the values are, in words.
+        value: what the user gave.
+        shape: the shape that it must have; None stands for any length along an axis.
+
+    Raises:
+        InputError: fractions, numbers above 2^53, and what ``array`` refuses.
+    """
+    values = array(owner, meaning, value, shape)
+    if np.any(values != np.rint(values)) or np.any(np.abs(values) > LARGEST_WHOLE):
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give whole numbers")
-    return found.astype(np.int64)
+    return values.astype(np.int64)
 
 
 def mask(owner: str, meaning: str, value: Any, shape: tuple[int, ...]) -> Mask:
-    """Return truth values of this shape.
+    """Return truth values as a boolean array.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the values are, in words.
+        value: what the user gave.
+        shape: the shape that it must have.
 
     Raises:
         InputError: indices, numbers, texts and other shapes.
     """
     try:
-        found = np.asarray(value)
+        values = np.asarray(value)
     except ValueError:
-        found = np.empty(0)
-    if found.dtype != bool or found.shape != shape:
-        is_what = f"has shape {found.shape}" if found.dtype == bool else f"is {shown(value)}"
-        raise InputError(f"{owner}: {meaning} {is_what}; give a boolean mask of shape {shape}")
-    return found
+        values = np.empty(0)
+    if values.dtype == bool and values.shape == shape:
+        return values
+    defect = f"has shape {values.shape}" if values.dtype == bool else f"is {shown(value)}"
+    raise InputError(f"{owner}: {meaning} {defect}; give a boolean mask of shape {shape}")
 
 
 def path(owner: str, meaning: str, value: Any) -> Path:
-    """Return a path; InputError for what is none, and for an empty one."""
+    """Return a path.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        meaning: what the file is, in words.
+        value: what the user gave.
+
+    Raises:
+        InputError: what is no path, and an empty one.
+    """
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give the path of a file")
     return Path(value)
 
 
-def at(point: Array) -> str:
-    """Return a point as words for a sentence."""
+def place_in_words(point: Array) -> str:
+    """Return a point, or a direction, as words for a sentence: (1, 0.5)."""
     return f"({', '.join(f'{x:g}' for x in point)})"
 
 
@@ -273,13 +369,13 @@ def shown(value: Any) -> str:
     try:
         text = " ".join(repr(value).split())
     except Exception:
-        # of a foreign repr, which may raise anything; and numbers of more digits than Python prints
+        # A foreign repr may raise anything, and Python prints no number of very many digits.
         text = f"an object of type {type(value).__name__}"
     return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
 
 
-def called(value: Any) -> str:
-    """Return the remedy for a class in place of an object, as the start of another one."""
+def suggest_object(value: Any) -> str:
+    """Return the start of a remedy for a class that was given in place of an object, else ""."""
     return f"make an object of it, {value.__name__}(…), or " if isinstance(value, type) else ""
 
 
@@ -301,46 +397,63 @@ def real(value: Any) -> float:
 def refuse(defects: Iterable[str], comm: Comm) -> None:
     """Raise InputError on all ranks with the first text that is not empty.
 
-    It does not matter which rank found it. Collective.
+    It does not matter which rank has the text. Collective.
+
+    Args:
+        defects: texts of this rank, "" for no defect.
+        comm: the ranks that are asked.
     """
     mine = next((text for text in defects if text), "")
     if largest(comm, bool(mine)):
-        found = comm.bcast(comm.gather(mine))
-        raise InputError(next(text for text in found if text))
+        texts = comm.bcast(comm.gather(mine))
+        raise InputError(next(text for text in texts if text))
 
 
-def ended(name: str, error: Exception) -> str:
+def explain_error(name: str, error: Exception) -> str:
     """Return the sentence about an error in a user's function.
 
-    The package's own errors are told as they are, others with their line.
+    The package's own errors have their sentence; of others it names the kind and the line.
+
+    Args:
+        name: the function, in words.
+        error: what it has raised.
     """
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{Path(frame.filename).name}, line {frame.lineno}"
+    ending = f"{name} ended in {type(error).__name__}: {error} ({place})"
     if of_machine(error):
-        return f"{name} ended in {said}: the machine refused it"
-    return (
-        str(error)
-        if isinstance(error, ViContactError)
-        else f"{name} ended in {said}: correct its function"
-    )
+        return f"{ending}: the machine refused it"
+    if isinstance(error, ViContactError):
+        return str(error)
+    return f"{ending}: correct its function"
 
 
 def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
-    """Return what a call of a user's function returns.
+    """Return what a call of a user's function returns. Collective.
 
-    Collective.
+    Args:
+        comm: the ranks that call it together.
+        name: the function, in words.
+        call: calls it.
 
     Raises:
         InputError: on all ranks, where the call raises on one.
     """
-    found, defect, failure = [], "", None
+    results = []
+    failure = None
     try:
-        found.append(call())
+        results.append(call())
     except Exception as error:
         # A user's function may raise anything, and the others must not wait for this one.
-        defect, failure = ended(name, error), error
+        failure = error
+    defect = "" if failure is None else explain_error(name, failure)
     try:
         refuse([defect], comm)
-    except InputError as told:
-        raise told from failure  # whoever tells it sees what it came from, such as a lack of memory
-    return found[0]
+    except InputError as error:
+        # Whoever prints it sees what it came from, such as a lack of memory.
+        raise error from failure
+    return results[0]
+
+
+at = place_in_words
+ended = explain_error

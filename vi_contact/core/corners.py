@@ -5,14 +5,20 @@ Where the directions are oblique, with the cosines G_ij = n_i·n_j, a change of 
 normal changes the others' û too, Δû = G a, and a lumped mass m is m G⁻¹.
 """
 
-from itertools import permutations
+from itertools import chain, permutations
 
 import numpy as np
 
 from .algebra import Array, Indices, from_each
-from .checks import at
+from .checks import place_in_words
 from .errors import InputError
-from .surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
+from .surfaces import (
+    ContactSurface,
+    group_same_nodes,
+    nodal_blocks,
+    nodal_frames,
+    tangential_columns,
+)
 
 # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
 FEATURE_ANGLE = np.pi / 6
@@ -20,112 +26,141 @@ FEATURE_ANGLE = np.pi / 6
 PARALLEL = 1e-9
 
 
-def at_right_angles(directions: Array) -> bool:
-    """Say whether unit vectors (k, d) are orthogonal to one another, to round-off."""
-    return bool(
-        np.all(np.abs(directions @ directions.T)[np.triu_indices(len(directions), 1)] <= PARALLEL)
-    )
+def are_orthogonal(directions: Array) -> bool:
+    """Say whether unit vectors (k, d) are at right angles to one another, to round-off."""
+    pairs = np.triu_indices(len(directions), 1)
+    cosines = directions @ directions.T
+    return bool(np.all(np.abs(cosines)[pairs] <= PARALLEL))
 
 
-def corner_of(directions: Array) -> tuple[list[int], Array]:
-    """Return (columns, Q), the frame of a node with several contact directions.
+def corner_frame(directions: Array) -> tuple[list[int], Array]:
+    """Return the frame of a node with several contact directions.
 
-    These are two or three independent directions (k, d).
+    Args:
+        directions: two or three independent unit vectors (k, d).
+
+    Returns:
+        The columns (k,) in which the directions stand, and the frame (d, d).
     """
-    d, square = directions.shape[1], at_right_angles(directions)
+    d = directions.shape[1]
+    orthogonal = are_orthogonal(directions)
+
+    # Directions at right angles take, one after another, the column of their largest component
+    # that is still free.
     columns: list[int] = []
     for direction in directions:
         order = np.argsort(-np.abs(direction), kind="stable")
         columns.append(next(int(c) for c in order if c not in columns))
-    # columns in which no direction vanishes: components that are prescribed keep theirs
-    if not square:
+
+    # Oblique ones take those columns in which the product of their components is largest, so that
+    # none vanishes in its own: components that are prescribed keep their columns.
+    if not orthogonal:
         choices = list(permutations(range(d), len(directions)))
-        sizes = [
-            np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)])
-            for own in choices
-        ]
+        rows = range(len(directions))
+        sizes = [np.prod(np.abs(directions[rows, choice])) for choice in choices]
         columns = list(choices[int(np.argmax(sizes))])
+
     block = np.zeros((d, d))
     block[:, columns] = directions.T
     for c in set(range(d)) - set(columns):  # in space, one vector may be missing
         edge = np.cross(block[:, (c + 1) % 3], block[:, (c + 2) % 3])
-        block[:, c] = edge if square else edge / np.linalg.norm(edge)
+        block[:, c] = edge if orthogonal else edge / np.linalg.norm(edge)
     return columns, block
 
 
 def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
-    """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,).
+    """Return the tangents along which slip and r_t are measured, (m, d, d - 1).
 
-    Slip and r_t are along them.
+    Those of a node with several contact directions are the other vectors of its frame.
 
-    Of a node with several directions they are the other vectors of its frame. ``nodes``: None for
-    one each.
+    Args:
+        normals: contact directions (m, d).
+        nodes: numbers of their nodes (m,); None for one node each.
     """
     column, blocks = nodal_blocks(nodal_frames(normals))
-    for rows in () if nodes is None else same_node(nodes):
+    corners = () if nodes is None else group_same_nodes(nodes)
+    for rows in corners:
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
-            column[rows], blocks[rows] = corner_of(normals[rows])
-    return np.take_along_axis(
-        blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2
-    )
+            column[rows], blocks[rows] = corner_frame(normals[rows])
+    tangents = tangential_columns(column, normals.shape[1])
+    return np.take_along_axis(blocks, tangents[:, None, :], axis=2)
 
 
 def oblique_corners(surface: ContactSurface) -> list[Indices]:
     """Return the conditions of each node with directions that are not at right angles."""
     if surface.dual is None:
         return []
-    return [corner for corner in surface.corners if not at_right_angles(surface.normals[corner])]
+    return [corner for corner in surface.corners if not are_orthogonal(surface.normals[corner])]
 
 
 def refuse_rubbing(surface: ContactSurface) -> None:
     """Raise InputError for corners beside friction, unless they are allowed to slide freely."""
     if surface.frictionless_corners:
         return
+    # The number and the place of the first condition of each corner, on all ranks.
     first = [(surface.slots[corner[0]], surface.points[corner[0]]) for corner in surface.corners]
-    every = [one for part in from_each(surface.comm, first) for one in part]
-    if every:
-        where = at(min(every, key=lambda one: one[0])[1])
+    corners = list(chain.from_iterable(from_each(surface.comm, first)))
+    if corners:
+        _, point = min(corners, key=lambda corner: corner[0])
         raise InputError(
-            f"{len(every)} contact nodes, the first at {where}, have several contact directions, "
-            "and friction on two faces at once is not modelled: let them slide freely "
-            "(surface.with_frictionless_corners()), or treat the corner as smooth (a larger "
+            f"{len(corners)} contact nodes, the first at {place_in_words(point)}, have several "
+            "contact directions, and friction on two faces at once is not modelled: let them slide "
+            "freely (surface.with_frictionless_corners()), or treat the corner as smooth (a larger "
             "feature_angle=)"
         )
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
-    """Return the target normal velocities (m,), NaN for open faces.
+    """Return target normal velocities that oblique open faces have a share in.
 
-    Among them are those that oblique open faces get from the closed faces of their nodes, whose
-    velocity changes along the normals of these.
+    The velocity of a node changes along the normals of its closed faces. Where an open face of the
+    node is oblique to these, the velocity along its own normal changes with it.
+
+    Args:
+        surface: the contact conditions.
+        v: velocities (n,) [m/s] before the impact law, or rows (k, n).
+        target: normal velocities (m,) [m/s] of closed faces, NaN for open ones; or rows (k, m).
     """
     corners = oblique_corners(surface)
     if not corners:
         return target
     if v.ndim == 2:
-        return np.stack([with_open_faces(surface, *each) for each in zip(v, target, strict=True)])
-    v_n, target = surface.normal_values(v), target.copy()
+        return np.stack([with_open_faces(surface, *row) for row in zip(v, target, strict=True)])
+    v_n = surface.normal_values(v)
+    target = target.copy()
     for corner in corners:
-        closed = ~np.isnan(target[corner])
-        one, other = corner[closed], corner[~closed]
-        if len(one) and len(other):
+        is_closed = ~np.isnan(target[corner])
+        closed = corner[is_closed]
+        open_ = corner[~is_closed]
+        if len(closed) and len(open_):
+            # The impulses a of the closed faces give Δû = G a: solve for a, and apply it.
             cosines = surface.normals[corner] @ surface.normals[corner].T
-            jump = np.linalg.solve(cosines[np.ix_(closed, closed)], target[one] - v_n[one])
-            target[other] = v_n[other] + cosines[np.ix_(~closed, closed)] @ jump
+            wanted = target[closed] - v_n[closed]
+            impulse = np.linalg.solve(cosines[np.ix_(is_closed, is_closed)], wanted)
+            target[open_] = v_n[open_] + cosines[np.ix_(~is_closed, is_closed)] @ impulse
     return target
 
 
 def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
-    """Return (rows, columns, values) of the lumped masses ``nodal``.
+    """Return (rows, columns, values) of a lumped mass matrix.
 
-    The matrix is the diagonal, but m G⁻¹ at oblique corners.
+    It is diagonal, but m G⁻¹ at oblique corners.
+
+    Args:
+        surface: the contact conditions.
+        nodal: masses (n,) [kg] of the unknowns.
     """
-    rows = [np.arange(len(nodal))]
-    columns, values = [rows[0]], [nodal.copy()]
+    diagonal = np.arange(len(nodal))
+    own = nodal.copy()
+    rows = [diagonal]
+    columns = [diagonal]
+    values = [own]
     for corner in oblique_corners(surface):
-        own, cosines = surface.owned[corner], surface.normals[corner] @ surface.normals[corner].T
-        values[0][own] = 0.0
-        rows.append(np.repeat(own, len(own)))
-        columns.append(np.tile(own, len(own)))
-        values.append((np.sqrt(np.outer(nodal[own], nodal[own])) * np.linalg.inv(cosines)).ravel())
+        unknowns = surface.owned[corner]
+        cosines = surface.normals[corner] @ surface.normals[corner].T
+        masses = np.sqrt(np.outer(nodal[unknowns], nodal[unknowns]))
+        own[unknowns] = 0.0
+        rows.append(np.repeat(unknowns, len(unknowns)))
+        columns.append(np.tile(unknowns, len(unknowns)))
+        values.append((masses * np.linalg.inv(cosines)).ravel())
     return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

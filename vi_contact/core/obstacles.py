@@ -1,7 +1,4 @@
-"""Say where a rigid obstacle lies.
-
-It does so by contact directions and initial gaps; the module also checks what is asked of them.
-"""
+"""Say where a rigid obstacle lies: by contact directions and initial gaps, which are checked."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,12 +7,14 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from .algebra import Array, Indices, Mask
-from .checks import array, at, function
+from .checks import array, function, place_in_words
 from .errors import InputError
 from .quantities import Unit
 
-ROUND_OFF = 1e-9  # cosine of a right angle
+RIGHT_ANGLE = 1e-9  # its cosine, to round-off
 BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
+SAME_TURN = 1e-9  # relative; turns of normals that differ by less are one
+OVERLAP = 1e-12  # of the size of the body: gaps below zero that are round-off
 REMEDY = (
     "give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the "
     "body: turn its sign)"
@@ -23,24 +22,29 @@ REMEDY = (
 
 
 class Obstacle(Protocol):
-    """Say where a rigid support lies.
-
-    It gives the contact direction of each point of a boundary, and its initial gap.
-    """
+    """Say where a rigid support lies: contact direction and initial gap of points of a boundary."""
 
     def directions(self, points: Array, normals: Array) -> Array:
         """Return the unit contact directions (k, d), from the body to the obstacle.
 
-        ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d)
-        unit outward normals of the body there. Asked before ``gap``, with the same arrays;
-        InputError when body and support do not fit.
+        It is asked before ``gap``, with the same arrays.
+
+        Args:
+            points: (k, d) positions of contact nodes [m], each rank its own.
+            normals: (k, d) unit outward normals of the body there.
+
+        Raises:
+            InputError: body and support do not fit.
         """
 
     def gap(self, points: Array, normals: Array) -> Array:
         """Return the initial gaps (k,) [m] along these directions, >= 0 but for round-off.
 
-        ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the
-        point moves by u.
+        gap - u·direction is what is left when the point moves by u.
+
+        Args:
+            points: (k, d) positions of contact nodes [m], as in ``directions``.
+            normals: (k, d) unit outward normals of the body there.
         """
 
 
@@ -59,21 +63,22 @@ class Touching:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Describe a rigid half-space behind the plane through ``point``.
-
-    Its ``normal`` points towards the body.
+    """Describe a rigid half-space behind a plane.
 
     The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact
     direction is -normal.
+
+    Attributes:
+        point: a point (d,) [m] of the plane.
+        normal: its normal (d,), which points towards the body; of any length but zero.
     """
 
     point: Annotated[tuple[float, ...], Unit("m")]
     normal: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        point, normal = (
-            array("HalfSpace", name, getattr(self, name), (None,)) for name in ("point", "normal")
-        )
+        point = array("HalfSpace", "point", self.point, (None,))
+        normal = array("HalfSpace", "normal", self.normal, (None,))
         if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
             raise InputError(
                 f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero "
@@ -97,21 +102,20 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class AnalyticGap:
-    """Give the gap g0(x) as a function of points (k, d) -> (k,) [m].
+    """Give the gap g0(x) as a function of the points, along the body's outward normal.
 
-    It is measured along the body's outward normal. It is asked for the points of each rank by
-    themselves: let no gap depend on other points, as on their mean or lowest.
+    The function is asked for the points of each rank by themselves: let no gap depend on other
+    points, such as their mean or the lowest of them.
+
+    Attributes:
+        function: takes points (k, d) [m] and returns gaps (k,) [m].
     """
 
     function: Annotated[Callable[[Array], Array], Unit("m")]
 
     def __post_init__(self) -> None:
-        function(
-            "AnalyticGap",
-            "function",
-            self.function,
-            "give a function of points (k, d) that returns gaps (k,)",
-        )
+        remedy = "give a function of points (k, d) that returns gaps (k,)"
+        function("AnalyticGap", "function", self.function, remedy)
 
     def directions(self, points: Array, normals: Array) -> Array:
         """Return the outward normals of the body."""
@@ -122,12 +126,13 @@ class AnalyticGap:
         return self.function(points)
 
 
-def alike(points: Array) -> Indices:
-    """Return a number (k,) for every point, equal where points coincide."""
-    return np.asarray(np.unique(points, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
+def number_places(points: Array) -> Indices:
+    """Return a number (k,) for every point (k, d), equal where points coincide."""
+    _, numbers = np.unique(points, axis=0, return_inverse=True)
+    return np.asarray(numbers, dtype=np.int64).ravel()
 
 
-def facing(
+def locate_obstacle(
     obstacle: Obstacle,
     points: Array,
     normals: Array,
@@ -143,31 +148,29 @@ def facing(
     nothing of it can touch. A point whose normals all look away from the direction, on the far side
     of a round face, cannot touch either, and is let be: its gap is larger than that of every point
     which looks towards the obstacle, and the normals turn from theirs to its own by no more than
-    ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
+    ``angle`` at once. Other such points are of a face that the obstacle never reaches.
 
     Args:
-        obstacle: what is asked.
+        obstacle: the obstacle that is asked.
         points: (m, d) positions of the contact nodes [m].
         normals: (m, d) outward unit normals of the body there.
         name: of the boundary, for the sentence.
         angle: how much normals may turn at once [rad].
-        alone: whether these are all its points; some of them only are refused where others might
-            decide.
+        alone: whether these are all its points. If not, points on a far side are refused too, as
+            other points might decide.
 
     Raises:
         InputError: other shapes, what are no real numbers, directions of no length, along the
             boundary or into the body.
     """
-    owner, m = type(obstacle).__name__, len(points)
-    directions = array(
-        owner, "what directions returns", obstacle.directions(points, normals), points.shape
-    )
+    owner = type(obstacle).__name__
+    m = len(points)
+    answer = obstacle.directions(points, normals)
+    directions = array(owner, "what directions returns", answer, points.shape)
     length = np.linalg.norm(directions, axis=1)
     if not length.all():
-        raise InputError(
-            f"{owner}: the contact direction at {at(points[np.argmin(length)])} has no length; "
-            f"{REMEDY}"
-        )
+        place = place_in_words(points[np.argmin(length)])
+        raise InputError(f"{owner}: the contact direction at {place} has no length; {REMEDY}")
     _refuse_beside(owner, name, directions / length[:, None], normals)
     gap = np.asarray(obstacle.gap(points, normals))
     if gap.shape != (m,) or gap.dtype.kind not in "iuf":
@@ -175,17 +178,25 @@ def facing(
             f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one "
             "real gap per point"
         )
-    cosines, places = np.sum(directions * normals, axis=1) / length, alike(points)
-    towards = cosines >= -ROUND_OFF
-    beyond = (
-        gap > np.max(gap[cosines > BESIDE], initial=-np.inf) if alone else np.zeros(m, dtype=bool)
-    )
+
+    # A place looks away from the obstacle when all normals there do: a node at an edge has one for
+    # each of its faces.
+    cosines = np.sum(directions * normals, axis=1) / length
+    places = number_places(points)
+    towards = cosines >= -RIGHT_ANGLE
     away = ~np.isin(places, places[towards])
-    wrong = np.flatnonzero(away & ~(beyond & _turned_smoothly(cosines, angle)))
+
+    # It may do so on the far side of a round face alone: beyond all points that look towards the
+    # obstacle, and without a sharp edge on the way.
+    beyond = np.zeros(m, dtype=bool)
+    if alone:
+        beyond = gap > np.max(gap[cosines > BESIDE], initial=-np.inf)
+    wrong = np.flatnonzero(away & ~(beyond & _turn_smoothly(cosines, angle)))
     if len(wrong):
         turn = np.degrees(np.arccos(np.clip(cosines[wrong], -1.0, 1.0)).mean())
+        place = place_in_words(points[wrong[0]])
         raise InputError(
-            f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the "
+            f"{owner}: the contact direction at {place}{_of_boundary(name)} points into the "
             f"body at {turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} "
             f"points; leave the face there out of the boundary, or {REMEDY}"
         )
@@ -193,64 +204,77 @@ def facing(
 
 
 def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> None:
-    """Raise InputError for unit directions along the boundary or into the body.
+    """Raise InputError, once for a whole boundary, for directions along it or into the body.
 
-    It is raised once for a whole boundary.
+    Args:
+        owner: class of the obstacle.
+        name: of the boundary.
+        directions: (m, d) unit contact directions.
+        normals: (m, d) unit outward normals.
     """
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
-    reached = (
-        cosines >= -ROUND_OFF
-        if np.any(cosines >= -ROUND_OFF)
-        else np.ones(len(cosines), dtype=bool)
-    )
-    way, normal = (_unit(one[reached].mean(axis=0)) for one in (directions, normals))
-    angle = np.degrees(np.arccos(np.clip(way @ normal, -1.0, 1.0)))
+    reached = cosines >= -RIGHT_ANGLE
+    if not np.any(reached):
+        reached = np.ones(len(cosines), dtype=bool)
+    direction = _normalise(directions[reached].mean(axis=0))
+    normal = _normalise(normals[reached].mean(axis=0))
+    angle = np.degrees(np.arccos(np.clip(direction @ normal, -1.0, 1.0)))
     what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
     raise InputError(
-        f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} "
-        f"degrees to its mean outward normal {at(normal.round(6))}; choose the boundary that looks "
-        f"towards the obstacle, or {REMEDY}"
+        f"{owner}: the contact direction {place_in_words(direction.round(6))}{_of_boundary(name)} "
+        f"{what} at {angle:.4g} degrees to its mean outward normal "
+        f"{place_in_words(normal.round(6))}; choose the boundary that looks towards the obstacle, "
+        f"or {REMEDY}"
     )
 
 
-def _of(name: str) -> str:
+def _of_boundary(name: str) -> str:
     """Return the name of a boundary in a sentence."""
     return f" of '{name}'" if name else ""
 
 
-def _turned_smoothly(cosines: Array, angle: float) -> Mask:
-    """Return which normals (m,) are reached from the one that looks most in the direction.
+def _turn_smoothly(cosines: Array, angle: float) -> Mask:
+    """Return which normals are reached, by small turns, from that which looks most at the obstacle.
 
-    They are judged by their cosines with the direction, and reached by turns of no more than
-    ``angle`` from one normal to the next.
+    Args:
+        cosines: (m,) those of normals and contact directions.
+        angle: the largest turn [rad] from one normal to the next.
     """
     turns = np.arccos(np.clip(cosines, -1.0, 1.0))
     steps = np.unique(turns)
-    wide = np.flatnonzero(np.diff(steps) > angle * (1.0 + 1e-9))
-    return np.asarray(turns <= (steps[wide[0]] if len(wide) else np.inf))
+    wide = np.flatnonzero(np.diff(steps) > angle * (1.0 + SAME_TURN))
+    last = steps[wide[0]] if len(wide) else np.inf
+    return np.asarray(turns <= last)
 
 
-def _unit(vector: Array) -> Array:
+def _normalise(vector: Array) -> Array:
     """Return the vector with length one, zero as it is, without negative zeros."""
-    return np.asarray(vector / (np.linalg.norm(vector) or 1.0) + 0.0)
+    length = np.linalg.norm(vector) or 1.0
+    return np.asarray(vector / length + 0.0)
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:
-    """Return the initial gap without round-off (1e-12 of the body's size).
+    """Return the initial gap (m,) [m] without round-off below zero.
+
+    Args:
+        gap: (m,) what the obstacle gives [m].
+        points: (m, d) positions [m], for the sentence.
+        size: of the body [m], which round-off is measured by.
 
     Raises:
-        InputError: the body penetrates the obstacle.
+        InputError: the body penetrates the obstacle, or a gap is no finite number.
     """
     if not np.all(np.isfinite(gap)):
         raise InputError(
             "the initial gap contains NaN or infinite values: check the obstacle's gap function"
         )
-    if len(gap) and gap.min() < -1e-12 * size:
+    if len(gap) and gap.min() < -OVERLAP * size:
         worst = int(np.argmin(gap))
+        place = place_in_words(points[worst])
         raise InputError(
-            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} "
+            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {place} "
             "before the first step: move the obstacle or the mesh so that every initial gap is >= 0"
         )
     return np.maximum(gap, 0.0)

@@ -1,7 +1,4 @@
-"""State the problem that is marched.
-
-It is a semi-discrete system, its contact surface, and the laws of both.
-"""
+"""State the problem that is marched: a system, its contact surface, and the laws of both."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -17,23 +14,26 @@ from .collective import Parts, agree
 from .corners import refuse_rubbing
 from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
-from .stages import stage
 from .surfaces import ContactSurface
 from .system import Load, SemiDiscreteSystem, history_value
+from .timing import report_time
 
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Pose a problem of contact.
+    """Pose a problem of contact. Collective.
 
-    It is a semi-discrete system, its contact surface, its excitation, and the laws of friction and
-    impact.
+    The system is turned into the nodal frames of the surface here, once. InputError is raised on
+    all ranks for parts of the wrong kind or size, and for a surface of another system.
 
-    The system is turned into the nodal frames of the surface here, once. ``impact=None`` leaves
-    velocities unchanged. ``mass=None`` leaves the choice of the mass matrix to the time scheme.
-    InputError is raised on all ranks for parts of the wrong kind or size, and for a surface of
-    another system. A friction law that is a dataclass may hold tuples with a value for every
-    contact point: of this rank, or of all ranks by their numbers. Collective.
+    Attributes:
+        system: the semi-discrete system.
+        surface: its contact conditions.
+        friction: the law of friction. One that is a dataclass may hold tuples with a value for
+            every contact point: of this rank, or of all ranks by their numbers.
+        impact: the law that changes velocities after a step; None leaves them unchanged.
+        excitation: what shakes the ground, one excitation or several.
+        mass: the mass law; None leaves the choice to the time scheme.
     """
 
     system: SemiDiscreteSystem
@@ -48,113 +48,104 @@ class ContactProblem:
         if isinstance(self.surface, ContactSurface):
             agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
-        total, slots = self.surface.total, self.surface.slots
-        own = with_values(
-            self.friction,
-            self.surface,
-            lambda v: tuple(v[i] for i in slots) if len(v) == total else v,
-        )
-        object.__setattr__(self, "friction", own)
+        object.__setattr__(self, "friction", with_values(self.friction, self.surface, self._own))
+
+    def _own(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return those of this rank, of values for the contact points of all ranks."""
+        if len(values) != self.surface.total:
+            return values
+        return tuple(values[i] for i in self.surface.slots)
 
     def __repr__(self) -> str:
-        """Return unknowns, conditions and laws in a few lines, not the arrays.
-
-        They are those of all ranks.
-        """
-        laws = {
-            "friction": self.friction,
-            "impact": self.impact,
-            "mass": self.mass or "that of the time scheme",
-        }
-        parts = [
-            self.system,
-            self.surface,
-            *(f"{name}: {shown(one)}" for name, one in laws.items()),
+        """Return unknowns, conditions and laws of all ranks in a few lines, not the arrays."""
+        lines = [
+            f"ContactProblem with {self.surface.total} contact conditions",
+            str(self.system),
+            str(self.surface),
+            f"friction: {shown(self.friction)}",
+            f"impact: {shown(self.impact)}",
+            f"mass: {shown(self.mass or 'that of the time scheme')}",
         ]
-        parts += [f"excitation: {shown(one)}" for one in self.excitations]
-        return "\n  ".join(
-            [f"ContactProblem with {self.surface.total} contact conditions", *map(str, parts)]
-        )
+        lines += [f"excitation: {shown(excitation)}" for excitation in self.excitations]
+        return "\n  ".join(lines)
 
     @cached_property
     def excitations(self) -> tuple[Excitation, ...]:
         """Return the excitations as a tuple."""
-        return (
-            tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
-        )
+        if isinstance(self.excitation, Sequence):
+            return tuple(self.excitation)
+        return (self.excitation,)
 
     @cached_property
-    @stage("mass")
+    @report_time("mass")
     def unshaken(self) -> SemiDiscreteSystem:
         """Return the system in the rotated basis, with the mass law in it, without excitation."""
         system = self.turned
         if self.mass is not None:
             system = self.mass.apply(system, self.surface, tangential=self.frictional)
-        return self._relative(system)
+        return self._make_relative(system)
 
     @cached_property
     def equations(self) -> SemiDiscreteSystem:
-        """Return the system that schemes see.
+        """Return the system that schemes see: in the rotated basis, with its inertia loads.
 
-        It is in the rotated basis, with the inertia loads -M r a_g(t).
+        These are -M r a_g(t), of every excitation.
         """
         system = self.unshaken
-        ways = (
-            (np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations
-        )
-        shaken = system.with_load(
-            *((-system.inertia(direction), history) for direction, history in ways)
-        )
+        terms = []
+        for excitation in self.excitations:
+            direction = np.asarray(excitation.direction, dtype=float)
+            terms.append((-system.inertia(direction), excitation.acceleration))
+        shaken = system.with_load(*terms)
         return system.loaded(shaken.load)
 
     def beside(self, other: "ContactProblem") -> "ContactProblem | None":
-        """Return the same problem with the matrices of another one.
+        """Return the same problem with the matrices of another one, and the factors made of them.
 
-        It also has the factors made of them. It is None where these are not its own: for another
-        system, surface, mass or impact law, or friction where the other has none.
+        Returns None where these are not its own: for another system, surface, mass or impact law,
+        or friction where the other has none.
         """
-        ours, theirs = ((one.system, one.surface, one.frictional) for one in (self, other))
-        if any(a is not b for a, b in zip(ours, theirs, strict=True)):
+        same_parts = self.system is other.system and self.surface is other.surface
+        if not same_parts or self.frictional is not other.frictional:
             return None
         if (self.mass, self.impact) != (other.mass, other.impact):
             return None
         if self.__dict__.get("unshaken") is other.unshaken:
             return self
-        made = replace(self)
-        made.__dict__["unshaken"] = other.unshaken
-        return made
+        copy = replace(self)
+        copy.__dict__["unshaken"] = other.unshaken
+        return copy
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
-        """Return the system of the gravity stage.
-
-        It is in the basis of the equations, without excitation.
-        """
-        return self._relative(self.turned)
+        """Return the system of the gravity stage: in the basis of the equations, unshaken."""
+        return self._make_relative(self.turned)
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:
         """Return the system in the nodal frames, every body in its own unknowns.
 
-        There is one for all problems on a surface.
+        All problems on one surface share it.
         """
-        system, basis, dual = self.system, self.surface.basis, self.surface.dual
+        system = self.system
+        basis = self.surface.basis
+        dual = self.surface.dual
         if basis is None:
             return system
         known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.cached("turned", dict)
         if (basis, dual) not in known:
             known.clear()  # it takes as much memory as the system
-            known[basis, dual] = system.load, system.in_basis(basis, dual)
+            known[basis, dual] = (system.load, system.in_basis(basis, dual))
         load, turned = known[basis, dual]
         if load is system.load:
             return turned
-        # the matrices are shared with systems of other loads
+        # Systems of other loads share the matrices.
         return turned.loaded(system.load.in_basis(basis))
 
-    def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
-        return (
-            system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
-        )
+    def _make_relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
+        """Return the system in unknowns relative to the other side, where there is one."""
+        coupling = self.surface.coupling
+        return system if coupling is None else system.in_relative(coupling)
 
     @property
     def frictional(self) -> bool:
@@ -162,82 +153,71 @@ class ContactProblem:
         return not isinstance(self.friction, Frictionless)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
-        """Return B_t u plus what the obstacle slides; None without friction.
+        """Return where the slip of a step is zero, (m, d - 1) [m]; None without friction.
 
-        The slip of a step is zero there.
+        It is B_t u plus what the obstacle slides in the step.
+
+        Args:
+            u: displacement (n,) [m] at the beginning of the step.
+            start: time of the beginning [s].
+            end: time of the end [s].
         """
         return self.surface.slip_origin(u, start, end) if self.frictional else None
 
     def cartesian(self, x: Array) -> Array:
-        """Return T R x: unknowns of the equations back to the system's own."""
+        """Return T R x (n,): unknowns of the equations turned back to the system's own."""
         x = x if self.surface.coupling is None else self.surface.coupling @ x
         return x if self.surface.basis is None else self.surface.basis @ x
 
     def ground_acceleration(self, t: float) -> Array:
-        """Return the vector a_g(t) [m/s²] summed over the excitations."""
-        found = [0.0] * self.system.influence.shape[1]
-        for one in self.excitations:
-            a = float(history_value(one.acceleration, t))
-            found = [so_far + a * way for so_far, way in zip(found, one.direction, strict=True)]
-        return np.array(found)
+        """Return the vector a_g(t) (d,) [m/s²], the sum of all excitations."""
+        total = np.zeros(self.system.influence.shape[1])
+        for excitation in self.excitations:
+            a = float(history_value(excitation.acceleration, t))
+            total += a * np.array(excitation.direction, dtype=float)
+        return total
 
 
 def with_values(
     law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
 ) -> Any:
-    """Return the law with its tuples changed on several ranks.
+    """Return a law with other tuples on several ranks, and so the laws that it is made of.
 
-    So are those of the laws that it is made of.
+    Args:
+        law: a law; one that is no dataclass is returned as it is.
+        surface: the conditions, whose ranks count.
+        change: takes a tuple that a law holds, and returns the other one.
     """
     if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
-    found: dict[str, Any] = {}
-    for name, value in ((one.name, getattr(law, one.name)) for one in fields(law) if one.init):
-        new = change(value) if isinstance(value, tuple) else with_values(value, surface, change)
-        found |= {} if new is value else {name: new}
-    return replace(law, **found) if found else law
+    changes: dict[str, Any] = {}
+    for name in [part.name for part in fields(law) if part.init]:
+        old = getattr(law, name)
+        new = change(old) if isinstance(old, tuple) else with_values(old, surface, change)
+        if new is not old:
+            changes[name] = new
+    return replace(law, **changes) if changes else law
 
 
 def check_parts(problem: Any) -> None:
-    """Raise InputError, on all ranks, for parts of the wrong kind or size.
+    """Raise InputError, on all ranks, for parts of the wrong kind or size. Collective.
 
-    Parts that were made for another system are refused too. Collective.
-
-    Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems
-    of that space take it. Sizes are compared on all ranks together, so that all of them raise the
-    same sentence.
+    Parts that were made for another system are refused too. Identity counts: a surface that ``fem``
+    made carries the space it was made on, and only systems of that space take it. Sizes are
+    compared on all ranks together, so that all of them raise the same sentence.
     """
-    owner, system, surface, excitations = (
-        "ContactProblem",
-        problem.system,
-        problem.surface,
-        problem.excitations,
-    )
-    instance(
-        owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns"
-    )
-    instance(
-        owner,
-        "surface",
-        surface,
-        ContactSurface,
-        "give a contact surface, such as fem.contact_surface returns",
-    )
-    provides(
-        owner,
-        "friction",
-        problem.friction,
-        ("limit", "slope", "at"),
-        "give Coulomb(mu) or another friction law",
-    )
-    optional(
-        provides,
-        owner,
-        "impact",
-        problem.impact,
-        ("target", "apply"),
-        "give Inelastic() or another law, or None",
-    )
+    owner = "ContactProblem"
+    system = problem.system
+    surface = problem.surface
+    excitations = problem.excitations
+    remedy = "give a system, such as fem.assemble returns"
+    instance(owner, "system", system, SemiDiscreteSystem, remedy)
+    remedy = "give a contact surface, such as fem.contact_surface returns"
+    instance(owner, "surface", surface, ContactSurface, remedy)
+    remedy = "give Coulomb(mu) or another friction law"
+    provides(owner, "friction", problem.friction, ("limit", "slope", "at"), remedy)
+    remedy = "give Inelastic() or another law, or None"
+    optional(provides, owner, "impact", problem.impact, ("target", "apply"), remedy)
     if problem.mass is not None:
         remedy = "give Redistributed() or ConsistentMass(), or None"
         provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))
@@ -258,7 +238,9 @@ def check_parts(problem: Any) -> None:
             f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
             f"{system.algebra.comm.size}: make both on the same ranks"
         )
-    refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
+    total = surface.total  # collective
+    defects = (*_find_defects_of_system(system), *_find_defects_of_surface(surface, system, total))
+    refuse(defects, surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
     _refuse_repeated(excitations)
@@ -266,28 +248,29 @@ def check_parts(problem: Any) -> None:
 
 def _refuse_repeated(excitations: Sequence[Any]) -> None:
     """Raise InputError for an excitation that is named twice: it would shake twice."""
-    for one, other in combinations(excitations, 2):
-        if one is other:
+    for first, second in combinations(excitations, 2):
+        if first is second:
             raise InputError(
-                f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: "
+                f"ContactProblem: excitation names {shown(first)} twice, which would shake twice: "
                 "leave it out once, or scale it"
             )
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
+    """Raise InputError for what is no excitation, or shakes in other dimensions."""
     remedy = "give Harmonic(…), GroundMotion(record) or another excitation, or a list of them"
     provides("ContactProblem", "excitation", excitation, EXCITATION, remedy)
     array("ContactProblem", "the direction of an excitation", excitation.direction, (None,))
-    if len(excitation.direction) != system.influence.shape[1]:
+    d = system.influence.shape[1]
+    if len(excitation.direction) != d:
         raise InputError(
             f"excitation direction {excitation.direction} has {len(excitation.direction)} "
-            f"components but the body has {system.influence.shape[1]}: give one component per "
-            "dimension"
+            f"components but the body has {d}: give one component per dimension"
         )
 
 
-def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:
-    """Return what is wrong with the sizes of a system on this rank."""
+def _find_defects_of_system(system: SemiDiscreteSystem) -> Iterator[str]:
+    """Yield a sentence for each wrong size or value of a system on this rank."""
     n = system.rows
     d = system.influence.shape[1]
     for name in ("M", "K", "C"):
@@ -297,43 +280,62 @@ def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:
                 f"the system has {n} unknowns in u0 but {matrix.rows} rows in {name}: "
                 "give matrices of one system"
             )
-    shapes = {"v0": (n,), "influence": (n, d), "base_mass": (n, d), "massless": (n,), "tied": (n,)}
-    values = {name: getattr(system, name) for name in shapes} | {
-        "load.constant": system.load.constant
+    shapes: dict[str, tuple[int, ...]] = {
+        "v0": (n,),
+        "influence": (n, d),
+        "base_mass": (n, d),
+        "massless": (n,),
+        "tied": (n,),
     }
-    yield from _sizes("the system", values, shapes | {"load.constant": (n,)})
+    yield from _find_other_shapes("the system", system, shapes)
+    constant = np.shape(system.load.constant)
+    if constant != (n,):
+        yield f"the system has load.constant of shape {constant}: give one of shape {(n,)}"
     for name in ("u0", "v0"):
         if not np.isfinite(np.sum(getattr(system, name))):
             yield f"the system's {name} contains NaN or infinite values: give finite initial values"
 
 
-def _sizes(owner: str, values: dict[str, Any], shapes: dict[str, tuple[int, ...]]) -> Iterator[str]:
-    for name, shape in shapes.items():
-        if values[name] is not None and np.shape(values[name]) != shape:
-            yield f"{owner} has {name} of shape {np.shape(values[name])}: give one of shape {shape}"
+def _find_other_shapes(words: str, owner: Any, shapes: dict[str, tuple[int, ...]]) -> Iterator[str]:
+    """Yield a sentence for each array of another shape.
 
-
-def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int) -> Iterator[str]:
-    """Return what is wrong with a surface on this rank.
-
-    Its places in the unknowns of the system are looked at too.
+    Args:
+        words: the owner, in words.
+        owner: what has the arrays, some of which may be None.
+        shapes: name of an array -> its shape.
     """
-    m, d, n = surface.count, system.influence.shape[1], system.rows
+    for name, shape in shapes.items():
+        value = getattr(owner, name)
+        if value is not None and np.shape(value) != shape:
+            yield f"{words} has {name} of shape {np.shape(value)}: give one of shape {shape}"
+
+
+def _find_defects_of_surface(
+    surface: ContactSurface, system: SemiDiscreteSystem, total: int
+) -> Iterator[str]:
+    """Yield a sentence for each wrong size or value of a surface on this rank.
+
+    Args:
+        surface: the contact conditions.
+        system: whose unknowns the conditions bound.
+        total: number of the conditions of all ranks.
+    """
+    m = surface.count
+    n = system.rows
+    d = system.influence.shape[1]
     shapes: dict[str, tuple[int, ...]] = {
         "points": (m, d),
         "normals": (m, d),
         "tangents": (m, d - 1),
     }
     shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance", "owned", "slots"), (m,))
-    yield from _sizes(
-        "the contact surface", {name: getattr(surface, name) for name in shapes}, shapes
-    )
-    for name, least, most in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
+    yield from _find_other_shapes("the contact surface", surface, shapes)
+    for name, least, end in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
         values = getattr(surface, name)
-        if np.size(values) and not (least <= np.min(values) and np.max(values) < most):
+        if np.size(values) and not (least <= np.min(values) and np.max(values) < end):
             yield (
                 f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, "
-                f"outside {least} to {most - 1}: make the surface for this system, which has "
+                f"outside {least} to {end - 1}: make the surface for this system, which has "
                 "another size"
             )
     if np.any(np.diff(surface.slots) <= 0):

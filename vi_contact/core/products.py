@@ -1,9 +1,8 @@
-"""Make no product twice.
+"""Remember products, so that none is made twice.
 
-Several parts of a step ask for products with the same vectors, and for one load.
-
-Remembered are read-only vectors (``frozen``), each known as the object it is; what is handed out is
-read-only too.
+Several parts of a step ask for products with the same vectors, and for one load. Those with
+read-only vectors (``freeze``) are remembered, each by the identity of its vector; what is handed
+out is read-only too.
 """
 
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from typing import Any
 from .algebra import Array
 
 
-def frozen(x: Array) -> Array:
+def freeze(x: Array) -> Array:
     """Return the vector, which nobody can write to from now on."""
     x.flags.writeable = False
     return x
@@ -21,9 +20,16 @@ def frozen(x: Array) -> Array:
 class Remembered:
     """Hold the last few values of a function of a vector, or of a number."""
 
-    def __init__(self, function: Callable[[Any], Array], kept: int) -> None:
-        self._function, self._kept = function, kept
-        # with the vectors, so that ids are theirs
+    def __init__(self, function: Callable[[Any], Array], size: int) -> None:
+        """Begin with no value.
+
+        Args:
+            function: of a vector, or of a float.
+            size: how many values are remembered.
+        """
+        self._function = function
+        self._size = size
+        # Each entry keeps its vector alive, so that no other object gets the same id.
         self._known: dict[Any, tuple[Any, Array | Callable[[], Array]]] = {}
 
     def __call__(self, x: Any) -> Array:
@@ -35,17 +41,19 @@ class Remembered:
             return value() if callable(value) else value
         value = self._function(x)
         if is_number or not x.flags.writeable:
-            self._keep(x if is_number else id(x), x, frozen(value))
+            self._remember(x if is_number else id(x), x, freeze(value))
         return value
 
-    def _keep(self, key: Any, x: Any, value: Array | Callable[[], Array]) -> None:
-        if len(self._known) == self._kept:
-            del self._known[next(iter(self._known))]
-        self._known[key] = x, value
+    def _remember(self, key: Any, x: Any, value: Array | Callable[[], Array]) -> None:
+        """Add a value, and forget the oldest one where there are too many."""
+        if len(self._known) == self._size:
+            oldest = next(iter(self._known))
+            del self._known[oldest]
+        self._known[key] = (x, value)
 
     def know(self, x: Any, value: Callable[[], Array]) -> Any:
-        """Return x, frozen; ``value`` tells the value there when somebody asks for it."""
-        self._keep(x if type(x) is float else id(frozen(x)), x, value)
+        """Return x, made read-only; ``value`` makes the value there when somebody asks for it."""
+        self._remember(x if type(x) is float else id(freeze(x)), x, value)
         return x
 
     def numbers(self) -> list[float]:

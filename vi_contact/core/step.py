@@ -32,7 +32,7 @@ import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
-from .checks import at, on_all, shown
+from .checks import on_all, place_in_words, shown
 from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -41,13 +41,19 @@ from .surfaces import ContactSurface
 
 @dataclass(frozen=True)
 class State:
-    """Hold displacement u, velocity v and contact at time t = t_k [s].
+    """Hold the motion and the contact at the end of a step.
 
-    Both are vectors (n,), in [m] and [m/s], in the rotated basis.
-
-    ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here, mean or end
-    values as the scheme says. ``active`` (m,) are the closed conditions. ``memory`` holds what a
-    scheme carries besides u and v: vectors (n,), and arrays that are the same on every rank.
+    Attributes:
+        t: time [s].
+        k: number of the step.
+        u: displacement (n,) [m] in the rotated basis.
+        v: velocity (n,) [m/s] in the rotated basis.
+        r_n: normal reactions (m,) [N] of the step that led here, mean or end values as the scheme
+            says.
+        active: (m,) True for closed conditions.
+        memory: what a scheme carries besides u and v: vectors (n,), and arrays that are the same on
+            every rank.
+        r_t: tangential reactions (m, d - 1) [N] of that step, None without friction.
     """
 
     t: float
@@ -61,10 +67,12 @@ class State:
 
     def __repr__(self) -> str:
         """Return time, step and sizes on this rank: not the arrays."""
-        closed = (
-            f"{np.count_nonzero(self.active)} of {np.size(self.active)} contact conditions closed"
+        closed = np.count_nonzero(self.active)
+        conditions = np.size(self.active)
+        return (
+            f"State(t={self.t} s, k={self.k}, {np.size(self.u)} unknowns, {closed} of {conditions} "
+            "contact conditions closed)"
         )
-        return f"State(t={self.t} s, k={self.k}, {np.size(self.u)} unknowns, {closed})"
 
     def with_velocity(self, v: Array) -> "State":
         """Return the state with another velocity."""
@@ -75,11 +83,25 @@ class State:
 class StepProblem:
     """Pose one step, as every solver sees it.
 
-    ``guess`` (n,): predicted x; ``active`` (m,): predicted contact set.
+    The head of this module has the equations. x is a displacement or a velocity, as the scheme
+    says.
 
-    ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for
-    velocities, 0 in static problems, where friction is that of rest. ``lower`` (m,): bounds from
-    below too, which ``Volume`` alone knows (``vi``); None in the steps of a scheme.
+    Attributes:
+        A: matrix (n, n) of the step.
+        b: right-hand side (n,), ``scale`` times newtons.
+        bound: (m,) largest B_n x, infinite where nothing is in the way.
+        surface: the contact conditions.
+        scale: how many times newtons r_n and r_t are, constant as long as dt is.
+        guess: predicted x (n,).
+        active: predicted contact set (m,).
+        t: time [s] at the end of the step.
+        k: number of the step.
+        friction: the law of friction at rest.
+        slip0: B_t x (m, d - 1) where the slip is zero; None without friction.
+        rate_factor: slip rate [m/s] over B_t x - slip0: 1/dt for displacements, 1 for velocities, 0
+            in static problems, where friction is that of rest.
+        lower: (m,) bounds from below too, which ``Volume`` alone knows (``vi``); None in the steps
+            of a scheme.
     """
 
     A: EffectiveMatrix
@@ -97,12 +119,10 @@ class StepProblem:
     lower: Array | None = None
 
     def __post_init__(self) -> None:
-        rows, conditions = self.guess.shape[-1], self.surface.count
-        if (self.b.shape[-1], len(self.bound), self.active.shape[-1]) != (
-            rows,
-            conditions,
-            conditions,
-        ):
+        rows = self.guess.shape[-1]
+        conditions = self.surface.count
+        sizes = (self.b.shape[-1], len(self.bound), self.active.shape[-1])
+        if sizes != (rows, conditions, conditions):
             raise InputError(
                 f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} "
                 f"bounds and a contact set of {len(self.active)} for {conditions} conditions: give "
@@ -110,19 +130,25 @@ class StepProblem:
             )
 
     def friction_at(self, slip: Array) -> FrictionLaw:
-        """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1).
+        """Return the friction law at the rates of this slip. Collective.
 
-        Collective: what a law of the user's own raises on one rank is raised on all. InputError for
-        limits that are negative or no numbers.
+        What a law of the user's own raises on one rank is raised on all.
+
+        Args:
+            slip: B_t x - slip0 (m, d - 1).
+
+        Raises:
+            InputError: limits that are negative or no numbers.
         """
         speed = self.rate_factor * np.linalg.norm(slip, axis=1)
 
-        def law() -> FrictionLaw:
-            found = self.friction.at(speed)
-            refuse_limits(found, self.surface, self.scale, self.t)
-            return found
+        def ask_law() -> FrictionLaw:
+            law = self.friction.at(speed)
+            refuse_limits(law, self.surface, self.scale, self.t)
+            return law
 
-        return on_all(self.surface.comm, f"{type(self.friction).__name__} at t = {self.t:g} s", law)
+        name = f"{type(self.friction).__name__} at t = {self.t:g} s"
+        return on_all(self.surface.comm, name, ask_law)
 
 
 def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: float) -> None:
@@ -130,39 +156,53 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
 
     They are those of limit = cohesion + slope max(r_n, 0). Laws whose ``never_negative`` is true
     were checked when they were made.
+
+    Args:
+        law: the friction law at the rates of the step.
+        surface: the conditions.
+        scale: how many times newtons the reactions are.
+        t: time [s], for the sentence.
     """
     if getattr(law, "never_negative", False):
         return
+    owner = type(law).__name__
     weights = surface.weights
     parts = {
         "slope": law.slope(weights),
         "limit(0)": law.limit(np.zeros(surface.count), weights, scale),
     }
-    for name, values in parts.items():
-        found = np.asarray(values)
-        if found.dtype.kind not in "iuf" or found.shape != (surface.count,):
+    for name, part in parts.items():
+        values = np.asarray(part)
+        if values.dtype.kind not in "iuf" or values.shape != (surface.count,):
             raise InputError(
-                f"{type(law).__name__}: {name} is {shown(values)} at t = {t:g} s; return "
+                f"{owner}: {name} is {shown(part)} at t = {t:g} s; return "
                 f"{surface.count} real numbers, one for each contact condition"
             )
-        wrong = np.flatnonzero(~((found >= 0.0) & (found < np.inf)))
+        wrong = np.flatnonzero(~((values >= 0.0) & (values < np.inf)))
         if len(wrong):
+            first = wrong[0]
             raise InputError(
-                f"{type(law).__name__}: {name} is {found[wrong[0]]:g} at "
-                f"{at(surface.points[wrong[0]])} and t = {t:g} s; a friction limit is zero or a "
-                "positive finite number"
+                f"{owner}: {name} is {values[first]:g} at "
+                f"{place_in_words(surface.points[first])} and t = {t:g} s; a friction limit is "
+                "zero or a positive finite number"
             )
 
 
 @dataclass(frozen=True)
 class StepResult:
-    """Answer a step by x (n,), the reactions and the closed conditions (m,).
+    """Answer a step.
 
-    The reactions are r_n (m,) and r_t (m, d - 1), ``scale`` times newtons.
-
-    ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
-    ``history``: how the method converged, in a measure of its own. ``aim``: the residual at which
-    an iterative method stopped because it was told to, 0 for one that goes on to round-off.
+    Attributes:
+        x: the unknowns (n,).
+        r_n: normal reactions (m,), ``scale`` times newtons.
+        active: (m,) True for closed conditions.
+        iterations: number of changes of the active set, of sweeps or of Newton steps, as ``method``
+            says.
+        method: which method found the answer.
+        r_t: tangential reactions (m, d - 1), ``scale`` times newtons; None without friction.
+        history: how the method converged, in a measure of its own.
+        aim: the residual at which an iterative method stopped because it was told to, 0 for one
+            that goes on to round-off.
     """
 
     x: Array
@@ -179,9 +219,11 @@ class StepResult:
 class Answers:
     """Answer a step of several runs.
 
-    ``rows`` holds x (k, n), r_n, active (k, m) and r_t (k, m, d - 1). Of each run there are
-    ``iterations`` and, with friction, ``histories``. ``failed`` is what those runs raise that have
-    no answer.
+    Attributes:
+        rows: x (k, n), r_n and active (k, m) and r_t (k, m, d - 1), a row for each of the k runs.
+        iterations: those of each run.
+        failed: what a run without an answer raises, by its row.
+        histories: with friction, that of each run.
     """
 
     rows: StepResult
@@ -191,10 +233,15 @@ class Answers:
 
     def own(self, row: int) -> StepResult:
         """Return the answer of one run."""
-        rows, history = self.rows, self.histories[row] if self.histories else ()
-        r_t, count = None if rows.r_t is None else rows.r_t[row], self.iterations[row]
+        rows = self.rows
         return StepResult(
-            rows.x[row], rows.r_n[row], rows.active[row], count, rows.method, r_t, history
+            x=rows.x[row],
+            r_n=rows.r_n[row],
+            active=rows.active[row],
+            iterations=self.iterations[row],
+            method=rows.method,
+            r_t=None if rows.r_t is None else rows.r_t[row],
+            history=self.histories[row] if self.histories else (),
         )
 
 
@@ -205,7 +252,8 @@ class Balance:
         M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
     Multiplying it by the displacement increment gives the energy ledger of any scheme
-    (verify.energy_balance).
+    (``core.ledger.energy_balance``). u [m], v [m/s], a [m/s²] and f [N] are (n,), r_n (m,) and r_t
+    (m, d - 1) [N].
     """
 
     u: Array
@@ -219,60 +267,71 @@ class Balance:
 class Scheme(Protocol):
     """Turn a state into a StepProblem, and the answer into the next state: a time scheme.
 
-    One whose contact condition is on velocities says ``penetrates = True``: states of its own runs
-    may lie inside the obstacle, and it goes on from them. A scheme is a value without state of its
-    own: what it carries from step to step is in ``State.memory``, so that a checkpoint holds all of
-    it. One that says ``by_rows = True`` steps several runs at once: ``step`` and ``finish`` then
-    also get vectors as rows, (k, n) and (k, m), and return them.
+    A scheme is a value without state of its own. What it carries from step to step is in
+    ``State.memory``, so that a checkpoint holds all of it. Two class variables, both False where
+    they are missing, say more:
+
+    - ``penetrates = True``: the contact condition is on velocities, so that states of its own runs
+      may lie inside the obstacle, and the scheme goes on from them.
+    - ``by_rows = True``: it steps several runs at once. ``step`` and ``finish`` then also get
+      vectors as rows, (k, n) and (k, m), and return rows.
     """
 
     @property
     def mass(self) -> MassLaw:
-        """Return the mass matrix that it takes when the problem does not say which."""
+        """Return the mass law that the scheme takes when the problem does not say which."""
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError unless ``problem`` suits the scheme.
 
-        Called before anything is computed, on all ranks.
+        The loop calls it before anything is computed, on all ranks.
         """
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return ``state`` with the memory that steps of ``dt`` [s] need.
+        """Return a state with the memory that the next steps need, such as accelerations.
 
-        This is accelerations or earlier levels, for example.
+        The loop calls it with the first state of a run, on a restart, and whenever dt changes. It
+        may bring initial data into equilibrium.
 
-        Called with the first state of a run of ``problem``, on a restart, and whenever dt changes;
-        what is in ``state.memory`` already was put there by this scheme, or by none. It may bring
-        initial data into equilibrium.
+        Args:
+            problem: the problem that is marched.
+            state: the state to go on from. What is in its memory already was put there by this
+                scheme, or by none.
+            dt: size of the next steps [s].
         """
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return ``state`` with the velocity ``v`` that the impact law of ``problem`` gave.
+        """Return a state with the velocity that the impact law gave.
 
-        ``v`` is (n,) [m/s]; u and t stay the same.
+        What the scheme remembers of accelerations has to fit the new velocity before the next step.
 
-        What the scheme remembers of accelerations has to fit the new velocity before the next step
-        of ``dt`` [s].
+        Args:
+            problem: the problem that is marched.
+            state: the state before the impact, whose u and t stay the same.
+            v: velocity after the impact (n,) [m/s].
+            dt: size of the next step [s].
         """
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A (n rows) of ``problem`` for all steps of ``dt`` [s].
 
-        As a rule it is ``problem.equations.effective(…)``.
-
-        A is symmetric positive definite; nothing in it depends on time or state. It is made once
-        for every dt.
+        As a rule it is ``problem.equations.effective(…)``. It is symmetric positive definite, and
+        nothing in it depends on time or state. It is made once for every dt.
         """
 
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the problem of the step of ``problem`` from ``state`` to state.t + dt.
+        """Return the one-step problem from ``state`` to state.t + dt.
 
-        ``A`` is the matrix of the step.
+        The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and ``scale`` fit it, and
+        ``scale`` is the same in all steps of one dt.
 
-        ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and
-        ``scale`` fit it, and ``scale`` is the same in all steps of one dt.
+        Args:
+            problem: the problem that is marched.
+            state: the state at the beginning of the step.
+            A: the effective matrix of this dt.
+            dt: size of the step [s].
         """
 
     def finish(
@@ -283,38 +342,45 @@ class Scheme(Protocol):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state of ``problem`` at the end of a step of ``dt`` [s].
+        """Return the state at the end of a step, before the impact law.
 
-        It is that before the impact law.
-
-        ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and
-        ``result`` its certified answer: reactions in it are ``scale`` times newtons, those of the
-        new state are newtons.
+        Args:
+            problem: the problem that is marched.
+            state: the state that the step began with.
+            step: what ``step()`` returned for it.
+            result: the certified answer. Reactions in it are ``scale`` times newtons; those of the
+                new state are newtons.
+            dt: size of the step [s].
         """
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new`` met.
+        """Return the equation of motion that a step satisfied, for the energy ledger.
 
-        The ledger needs it.
+        The loop calls it when a recorder asks.
 
-        ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a
-        recorder asks.
+        Args:
+            problem: the problem that is marched.
+            old: the state that the step began with.
+            new: what ``finish`` returned, before the impact law.
+            dt: size of the step [s].
         """
 
 
 class PreparedSolver(Protocol):
-    """Solve steps with one effective matrix and one surface; what ``Solver.prepare`` returns.
+    """Solve steps with one effective matrix and one surface; ``Solver.prepare`` returns it.
 
-    One with ``solve_many`` answers several at once (``solvers.condensed``).
+    A prepared solver that also has ``solve_many`` answers several steps at once
+    (``solvers.condensed``).
     """
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return x, reactions and closed conditions of ``step``.
+        """Return x, reactions and closed conditions of ``step``. Collective.
 
-        The A, surface and scale of ``step`` are those that the solver was made for.
+        A, surface and scale of ``step`` are those that the solver was made for. The answer is
+        judged by its certificate, so the method may stop where it finds best.
 
-        The answer is judged by its certificate, so the method may stop where it finds best.
-        StepFailure, on all ranks, when there is none. Collective.
+        Raises:
+            StepFailure: on all ranks, when the method finds no answer.
         """
 
 
@@ -325,18 +391,18 @@ class Solver(Protocol):
     """
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError unless the solver can treat ``problem``.
-
-        Its friction law, supports and matrices are looked at.
-        """
+        """Raise InputError unless the solver can treat friction law, supports and matrices."""
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
-        """Return a solver of steps with the matrix ``A`` on ``surface``.
+        """Return a solver of steps with one matrix. Collective.
 
-        Reactions of these steps are ``scale`` times newtons.
+        The loop calls it once for every dt; factors and whatever else depends on A alone belong
+        here.
 
-        Called once for every dt; factors and whatever else depends on A alone belong here.
-        Collective.
+        Args:
+            A: the effective matrix of these steps.
+            surface: their contact conditions.
+            scale: how many times newtons their reactions are.
         """
 
 
@@ -344,10 +410,17 @@ class Solver(Protocol):
 class Report:
     """Tell recorders what happened in one step.
 
-    ``new.v`` is after the impact law, ``v_minus`` before it.
-
-    ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was
-    given.
+    Attributes:
+        problem: the problem that was solved, with the mass law that the scheme chose when none was
+            given.
+        old: the state before the step.
+        new: the state after the impact law.
+        v_minus: the velocity (n,) [m/s] before the impact law.
+        step: the one-step problem.
+        result: its answer.
+        certificate: how well the answer satisfies the conditions of the step.
+        averages: makes ``balance``.
+        escalated: whether the solver had to go on to another method.
     """
 
     problem: ContactProblem
@@ -362,7 +435,7 @@ class Report:
 
     @cached_property
     def balance(self) -> Balance:
-        """Return the equation of motion that the step satisfied; made when somebody asks."""
+        """Return the equation of motion of the step; it is made when somebody asks."""
         return self.averages()
 
 
@@ -375,29 +448,27 @@ class Recorder(Protocol):
     def columns(self) -> Mapping[str, tuple[str, str]]:
         """Return what ``start`` and ``row`` fill in: name -> (unit, meaning).
 
-        Called after ``start``, always the same.
-
-        Names are made of letters, digits and underscores; no two recorders of a run have one in
-        common.
+        The loop calls it after ``start``, and always gets the same. Names are made of letters,
+        digits and underscores; no two recorders of a run have one in common.
         """
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Mapping[str, Any]:
-        """Return the row of the initial ``state`` of ``problem``.
+        """Return the row of the initial state, and forget whatever an earlier run has left.
 
-        Whatever an earlier run has left is forgotten.
-
-        ``resumed``: the last row of the run that a restart continues, from which sums over time go
-        on; else None.
+        Args:
+            problem: the problem that is marched.
+            state: the state that the run begins with.
+            resumed: the last row of the run that a restart continues, from which sums over time go
+                on; else None.
         """
 
     def row(self, report: Report) -> Mapping[str, Any]:
-        """Return the row of the step that ``report`` tells of.
+        """Return the row of a step: numbers, or arrays of one shape (to HDF5 only).
 
-        It holds numbers, or arrays of one shape (to HDF5 only).
-
-        Called once a step, in order, on all ranks: collective operations are allowed here.
+        The loop calls it once a step, in order, on all ranks: collective operations are allowed
+        here.
         """
 
 

@@ -21,24 +21,33 @@ from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on
 from .arguments import checked
 from .census import Census
 from .checks import function, shown
-from .collective import users
+from .collective import call_user
 from .errors import InputError
-from .products import frozen
+from .products import freeze
 from .quantities import Positive, Unit
 from .system import Companion
 
 log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]
+# Arrays of a surface that a caller may hold too, and which are kept as read-only copies.
+COPIES = (
+    "points",
+    "normals",
+    "weights",
+    "gap0",
+    "bilateral",
+    "compliance",
+    "owned",
+    "slots",
+    "tangents",
+)
 
 
 class WatchedNodes(Protocol):
-    """Say where nodes of a contact boundary are that have no condition.
-
-    They move as they are prescribed.
-    """
+    """Watch the nodes of a contact boundary without a condition, which move as prescribed."""
 
     def smallest(self, t: float) -> float:
-        """Return their smallest gap at time t [m]. Collective."""
+        """Return their smallest gap [m] at time t [s]. Collective."""
 
     def refuse_driven(self, t: float) -> None:
         """Raise InputError, on all ranks, for a node that is in what it faces at time t.
@@ -122,24 +131,15 @@ class ContactSurface:
 
     def __post_init__(self) -> None:
         """Keep copies that nobody can write to: what is made of them once stays true."""
-        for name in (
-            "points",
-            "normals",
-            "weights",
-            "gap0",
-            "bilateral",
-            "compliance",
-            "owned",
-            "slots",
-            "tangents",
-        ):
+        for name in COPIES:
             value = getattr(self, name)
             if isinstance(value, np.ndarray) and value.flags.writeable:
-                object.__setattr__(self, name, frozen(value.copy()))
+                object.__setattr__(self, name, freeze(value.copy()))
 
     def __repr__(self) -> str:
-        """Return how many conditions this rank has, and of which kind: not the arrays."""
-        springs, held = np.count_nonzero(self.compliance), np.count_nonzero(self.bilateral)
+        """Return how many conditions of each kind this rank has, not the arrays."""
+        springs = np.count_nonzero(self.compliance)
+        held = np.count_nonzero(self.bilateral)
         moves = "" if self.motion is None and self.slide is None else ", on a moving obstacle"
         return (
             f"{type(self).__name__}({self.count} conditions here: {springs} on springs, {held} "
@@ -171,10 +171,12 @@ class ContactSurface:
         return bool(self.rigid.all() and not self.bilateral.any())
 
     def everywhere(self, values: NDArray[Any]) -> Any:
-        """Return (total, …) the values (m, …) of all conditions, by their numbers.
+        """Return the values (total, …) of all conditions, by their numbers, on every rank.
 
-        They are the same on every rank, and of one type. Collective; for output, and for small
-        problems that every rank solves.
+        It is for output, and for small problems that every rank solves. Collective.
+
+        Args:
+            values: (m, …) those of this rank, of one type on all ranks.
         """
         if self.comm.size == 1:
             return np.asarray(values)
@@ -183,35 +185,35 @@ class ContactSurface:
         return self.comm.sum(whole).astype(np.asarray(values).dtype)
 
     def mine(self, whole: NDArray[Any]) -> NDArray[Any]:
-        """Return the rows (m, …) of these conditions, of what is known of all (total, …)."""
+        """Return the rows (m, …) of the conditions of this rank, out of all rows (total, …)."""
         return whole if self.comm.size == 1 else whole[self.slots]
 
     def on_first(self, values: NDArray[Any]) -> Any:
-        """Return the values (total, …) on rank 0, and none, (0, …), on the others.
+        """Return the values (total, …) of all conditions on rank 0, and (0, …) on the others.
 
-        Collective; for output.
+        It is for output. Collective.
         """
         return on_first(self.comm, self.slots, values)
 
     @cached_property
     def corners(self) -> tuple[Indices, ...]:
         """Return the conditions of each node that has several, in the order of the nodes."""
-        return () if self.nodes is None else same_node(self.nodes)
+        return () if self.nodes is None else group_same_nodes(self.nodes)
 
     def in_frames(self, u: Array) -> Array:
-        """Return T⁻¹ u: displacements along the axes in the nodal frames."""
+        """Return T⁻¹ u: displacements (n,) along the axes, turned into the nodal frames."""
         turn = self.basis if self.dual is None else self.dual
         return u if turn is None else turn.transpose_apply(u)
 
     def along_axes(self, load: Array) -> Array:
-        """Return T⁻ᵀ f: a load [N] on the unknowns û as forces along the axes."""
+        """Return T⁻ᵀ f: a load (n,) [N] on the unknowns û as forces along the axes."""
         turn = self.basis if self.dual is None else self.dual
         return load if turn is None else turn @ load
 
     def whole(self) -> "ContactSurface":
-        """Return the places and sizes of the conditions of all ranks, by number, everywhere.
+        """Return a surface with the conditions of all ranks, by number, on every rank. Collective.
 
-        Collective.
+        It says where they are and how large; its places in the unknowns stay those of this rank.
         """
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "nodes")
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
@@ -219,33 +221,42 @@ class ContactSurface:
         return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
 
     def normal_values(self, x: Array) -> Array:
-        """Return B_n x, shape (m,); rows (k, m) of rows (k, n), as in all these products with B."""
+        """Return B_n x (m,); of rows (k, n) rows (k, m), as in all these products with B."""
         return np.asarray(x[self.owned] if x.ndim == 1 else x.take(self.owned, -1))
 
     def tangential_values(self, x: Array) -> Array:
-        """Return B_t x, shape (m, d - 1), zero where the tangent is prescribed."""
+        """Return B_t x (m, d - 1), zero where the tangent is prescribed."""
         return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
     def slip(self, u: Array, t: float) -> Array:
-        """Return the tangential displacements on the obstacle (m, d - 1) [m].
+        """Return the tangential displacements relative to the obstacle (m, d - 1) [m].
 
-        Those of open points are among them.
+        Open points have one too.
         """
-        there = self.tangential_values(u)
-        return there if self.slide is None else there - self.slide(t)
+        displacement = self.tangential_values(u)
+        return displacement if self.slide is None else displacement - self.slide(t)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array:
-        """Return B_t u plus what the obstacle slides between two times, (m, d - 1).
+        """Return where the slip of a step is zero, (m, d - 1) [m].
 
-        The slip is zero there.
+        It is B_t u plus what the obstacle slides in the step.
+
+        Args:
+            u: displacement (n,) [m] at the beginning of the step.
+            start: time of the beginning [s].
+            end: time of the end [s].
         """
-        origin, sliding = self.tangential_values(u), self.sliding(start, end)
+        origin = self.tangential_values(u)
+        sliding = self.sliding(start, end)
         return origin if sliding is None else origin + sliding
 
     def reaction_load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
-        """Return B_nᵀ r_n + B_tᵀ r_t, the contact reaction on the unknowns [N].
+        """Return B_nᵀ r_n + B_tᵀ r_t (rows,), the contact reaction [N] on the owned unknowns.
 
-        It is the owned part.
+        Args:
+            r_n: normal reactions (m,) [N], or rows (k, m).
+            rows: number of unknowns that this rank owns.
+            r_t: tangential reactions (m, d - 1) [N], None without friction.
         """
         load = np.zeros((*r_n.shape[:-1], rows))
         load.T[self.owned] = r_n.T
@@ -255,10 +266,7 @@ class ContactSurface:
         return load
 
     def gap(self, t: float) -> Array:
-        """Return the gap of the undeformed body at time t, (m,) [m].
-
-        It is gap0 less what the obstacle has moved.
-        """
+        """Return the gap of the undeformed body at time t [s]: gap0 less the motion, (m,) [m]."""
         return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
 
     def refuse_driven(self, t: float) -> None:
@@ -266,20 +274,20 @@ class ContactSurface:
 
         Collective.
         """
-        for one in self.watched:
-            one.refuse_driven(t)
+        for nodes in self.watched:
+            nodes.refuse_driven(t)
 
     def advance(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves towards the body between two times, (m,) [m].
+        """Return how far the obstacle moves towards the body between two times, (m,) [m].
 
-        It is None for one at rest.
+        Returns None for an obstacle at rest.
         """
         return None if self.motion is None else self.motion(end) - self.motion(start)
 
     def sliding(self, start: float, end: float) -> Array | None:
-        """Return what the obstacle moves along the tangents between two times, (m, d-1) [m].
+        """Return how far the obstacle moves along the tangents between two times, (m, d-1) [m].
 
-        It is None for one at rest.
+        Returns None for an obstacle at rest.
         """
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
@@ -288,32 +296,21 @@ class ContactSurface:
     ) -> "ContactSurface":
         """Return the surface on an obstacle that moves.
 
-        It moves ``towards`` the body and ``along`` the tangents; both are t [s] -> [m], one value
-        for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving
-        obstacle is not turned; its points face the same nodes.
+        A moving obstacle is not turned; its points face the same nodes.
+
+        Args:
+            towards: function of the time t [s] that returns how far it has moved towards the body
+                [m]: one number, or an array (m,) in the order of ``points``. None: not at all.
+            along: function of the time t [s] that returns how far it has moved along the tangents
+                [m]: one number, or an array (m, d-1). None: not at all.
         """
-
-        def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
-            function("moving", name, way, "give a function of the time t [s] that returns metres")
-            place = f"a moving obstacle: {name}"
-
-            def moved(t: float) -> Array:
-                return users(
-                    f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape)
-                )
-
-            moved.given = way  # type: ignore[attr-defined]  # what is asked for its frequency
-            return moved
-
-        watched = tuple(one.before_moving(towards) for one in self.watched)
-        return replace(
-            self,
-            watched=watched,
-            motion=None if towards is None else spread("towards", towards, (self.count,)),
-            slide=None
-            if along is None
-            else spread("along", along, (self.count, self.tangents.shape[1])),
-        )
+        watched = tuple(nodes.before_moving(towards) for nodes in self.watched)
+        motion = slide = None
+        if towards is not None:
+            motion = _motion_of_points("towards", towards, self.gap0.shape)
+        if along is not None:
+            slide = _motion_of_points("along", along, self.tangents.shape)
+        return replace(self, watched=watched, motion=motion, slide=slide)
 
     def bilateral_everywhere(self) -> "ContactSurface":
         """Return the bilateral comparison case: every point stays on the obstacle."""
@@ -322,12 +319,10 @@ class ContactSurface:
     def with_frictionless_corners(self) -> "ContactSurface":
         """Let nodes with several conditions slide freely over their faces beside friction.
 
-        Else they are refused.
-
-        What such a node could rub on one face is a force across the other, which the conditions,
-        each a bound on one unknown, do not hold. In space it still rubs along its edge, with the
-        normal force of its first condition (of one group: that of the face with the lowest node
-        numbers). Collective.
+        Otherwise such nodes are refused beside friction: what a node rubs on one face is a force
+        across the other, which the conditions, each a bound on one unknown, do not hold. In space
+        it still rubs along its edge, with the normal force of its first condition (of one group:
+        that of the face with the lowest node numbers). Collective.
         """
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
@@ -340,9 +335,7 @@ class ContactSurface:
     def on_springs(
         self, stiffness: Annotated[float, Positive, Unit("Pa/m"), "the foundation modulus"]
     ) -> "ContactSurface":
-        """Return the surface on a linearly deformable support.
-
-        ``stiffness`` is its foundation modulus.
+        """Return the surface on a linearly deformable support, with this foundation modulus.
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the
         unilateral law.
@@ -350,44 +343,66 @@ class ContactSurface:
         return replace(self, compliance=1.0 / (float(stiffness) * self.weights))
 
 
-def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
-    """Return a value for all points, or one for each.
+def _motion_of_points(name: str, given: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
+    """Return a user's motion of an obstacle as a function that gives every point its own [m].
+
+    Args:
+        name: the argument that it was given as.
+        given: the user's function of the time.
+        shape: that of the values, a row for each condition.
+    """
+    function("moving", name, given, "give a function of the time t [s] that returns metres")
+    nowhere = np.zeros(shape)
+
+    def motion(t: float) -> Array:
+        owner = f"a moving obstacle: {name}({t:g} s)"
+        return call_user(owner, lambda: _spread_motion(owner, given(t), shape), nowhere)
+
+    motion.given = given  # type: ignore[attr-defined]  # is asked for its frequency
+    return motion
+
+
+def _spread_motion(owner: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """Return what a user's motion gives as an array with a row for each condition.
+
+    Args:
+        owner: the function and its argument, for the sentence.
+        value: a value for all points, or one for each.
+        shape: that of the answer.
 
     Raises:
         InputError: what are no finite metres.
     """
-    found = np.asarray(value)
-    alike = all(
-        n in (1, m) for n, m in zip(found.shape[::-1], shape[::-1], strict=False)
-    ) and found.ndim <= len(shape)
-    if found.dtype.kind not in "iuf" or not alike or not np.all(np.isfinite(found)):
+    metres = np.asarray(value)
+    # The lengths of the axes are compared from the last one on, as numpy does.
+    pairs = zip(metres.shape[::-1], shape[::-1], strict=False)
+    fits = metres.ndim <= len(shape) and all(n in (1, m) for n, m in pairs)
+    if not fits or metres.dtype.kind not in "iuf" or not np.all(np.isfinite(metres)):
         raise InputError(
-            f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one "
-            f"number or an array of shape {shape}"
+            f"{owner} is {shown(value)}; return finite metres, one number or an array of shape "
+            f"{shape}"
         )
-    return np.broadcast_to(found.astype(float), shape)
+    return np.broadcast_to(metres.astype(float), shape)
 
 
-def same_node(nodes: Indices) -> tuple[Indices, ...]:
-    """Return the places of each number that stands several times in ``nodes`` (m,).
+def group_same_nodes(nodes: Indices) -> tuple[Indices, ...]:
+    """Return, for each number that stands several times in ``nodes`` (m,), its places.
 
-    They are in the order of the numbers.
+    The groups are in the order of the numbers.
     """
     order = np.argsort(nodes, kind="stable")
     _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
     several = counts > 1
-    return tuple(
-        order[at : at + k]
-        for at, k in zip(first[several].tolist(), counts[several].tolist(), strict=True)
-    )
+    starts = first[several].tolist()
+    sizes = counts[several].tolist()
+    return tuple(order[start : start + k] for start, k in zip(starts, sizes, strict=True))
 
 
 def nodal_frames(directions: Array) -> Array:
-    """Return orthonormal frames (k, d, d) of contact directions.
+    """Return orthonormal frames (k, d, d) of contact directions (k, d).
 
-    The first column is the contact direction n, the others are tangential.
-
-    2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1.
+    The first column is the contact direction n, the others are tangential. In the plane t = (-n_y,
+    n_x). In space t1 is the projection of the axis that is least aligned with n, and t2 = n x t1.
     """
     k, d = directions.shape
     frames = np.empty((k, d, d))
@@ -404,35 +419,46 @@ def nodal_frames(directions: Array) -> Array:
 
 
 def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
-    """Return (c, Q), nodal frames (k, d, d) with the contact direction in column c.
+    """Return (c, Q): nodal frames whose contact direction is in the column of its own component.
 
-    Component c is the normal one.
+    Axes at right angles to a direction keep their own columns: they are the components that may be
+    prescribed.
 
-    c is the direction's largest component. Axes at right angles to the direction keep their own
-    columns: these are the components that may be prescribed.
+    Args:
+        frames: (k, d, d) as ``nodal_frames`` returns them.
+
+    Returns:
+        c (k,), the largest component of each direction, and Q (k, d, d), whose column c is the
+        direction.
     """
     k, d, _ = frames.shape
-    directions, every = frames[:, :, 0], np.arange(k)
+    nodes = np.arange(k)
+    directions = frames[:, :, 0]
     size = np.abs(directions)
     normal = np.argmax(size, axis=1)
-    size[every, normal] = np.inf
-    # the first tangent is made of the axis least aligned
+
+    # The tangents take the other columns in the order of the components of the direction, the
+    # smallest first: the first tangent is made of the axis that is least aligned.
+    size[nodes, normal] = np.inf
     others = np.argsort(size, axis=1, kind="stable")[:, :-1]
+
+    # Where the direction is an axis, the tangents are the other axes as they are.
     blocks = np.tile(np.eye(d), (k, 1, 1))
-    turned = np.count_nonzero(directions, axis=1) > 1
-    blocks[every[turned, None], :, others[turned]] = frames[turned, :, 1:].swapaxes(1, 2)
-    blocks[every, :, normal] = directions
+    oblique = np.count_nonzero(directions, axis=1) > 1
+    tangents = frames[oblique, :, 1:].swapaxes(1, 2)
+    blocks[nodes[oblique, None], :, others[oblique]] = tangents
+    blocks[nodes, :, normal] = directions
     return normal, blocks
 
 
 def tangential_columns(column: Indices, d: int) -> Indices:
-    """Return the columns (m, d-1) beside these (m,), ascending."""
-    beside = np.arange(d - 1)[None, :]
-    return np.asarray(beside + (beside >= column[:, None]))
+    """Return the columns (m, d-1) of a frame beside the normal ones (m,), ascending."""
+    tangents = np.arange(d - 1)[None, :]
+    return np.asarray(tangents + (tangents >= column[:, None]))
 
 
 def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
-    """Return a surface without any contact: the linear comparison case."""
+    """Return a surface without any contact: the linear case to compare with."""
     none = np.zeros(0, dtype=np.int64)
     return ContactSurface(
         comm=comm,

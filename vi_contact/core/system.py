@@ -1,7 +1,4 @@
-"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t).
-
-The loads on their right-hand side are here too.
-"""
+"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t), and their loads."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,34 +8,35 @@ import numpy as np
 
 from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
 from .checks import array, function, instance, provides, several, shown
-from .collective import kept_error
+from .collective import keep_error
 from .errors import InputError
 from .products import Remembered
 
 
 class Companion(Protocol):
-    """Provide a motion among the loads that is marched beside the run.
-
-    It is that of the ground, or of a free field.
-    """
+    """Provide a motion of the ground, or of a free field, that is marched beside the run."""
 
     def bind(self, scheme: Any, dt: Any) -> None:
-        """Take over ``scheme`` and the time steps ``dt`` [s] of the run that is about to step.
+        """Take over the scheme and the time steps of the run that is about to step.
 
-        ``scheme`` is a ``core.step.Scheme``.
+        The loop calls it on every rank before each base step, so binding the same again must change
+        nothing. Another scheme or other steps begin the motion anew, from rest at t = 0.
 
-        Called on every rank before each base step, so binding the same again must change nothing;
-        another scheme or other steps begin the motion anew, from rest at t = 0. ``dt`` is a number
-        or a plan of ``run.time_steps``. InputError for a plan that the motion cannot follow.
+        Args:
+            scheme: the time scheme of the run, a ``core.step.Scheme``.
+            dt: the time step [s], or a plan of ``run.time_steps``.
+
+        Raises:
+            InputError: a plan that the motion cannot follow.
         """
 
 
 class Space(Protocol):
     """Say what the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
-    ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component;
-    ``coordinates`` (rows, d) [m]; ``hierarchy``: of displacements whose contact conditions need
-    one, else None.
+    Attributes:
+        dimension: number of directions, d.
+        unknowns: number of unknowns on all ranks.
     """
 
     dimension: int
@@ -46,15 +44,18 @@ class Space(Protocol):
 
     @property
     def ids(self) -> np.ndarray:
-        """Return the numbers of the owned unknowns, node * dimension + component."""
+        """Return the numbers (rows,) of the owned unknowns, node * dimension + component.
+
+        They do not depend on the number of ranks.
+        """
 
     @property
     def coordinates(self) -> Array:
-        """Return the coordinates (rows, d) [m]."""
+        """Return the coordinates (rows, d) [m] of the nodes of the owned unknowns."""
 
     @property
     def bodies(self) -> np.ndarray:
-        """Return the body of every owned unknown."""
+        """Return the number of the body (rows,) of every owned unknown."""
 
     @property
     def hierarchy(self) -> Any:
@@ -68,16 +69,20 @@ class Space(Protocol):
         """
 
     def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        """Return the values (k, d) at the nodes, on every rank.
+        """Return the values (k, d) at some nodes, the same on every rank.
 
-        ``derivative`` 0, 1 or 2 is that of the prescribed motion.
+        Args:
+            u: displacement, velocity or acceleration (rows,) of the owned unknowns.
+            nodes: numbers of the nodes (k,), as ``find_nodes`` returns them.
+            t: time [s] of the prescribed motion at held nodes.
+            derivative: 0, 1 or 2, that of the prescribed motion.
         """
 
 
-OTHERS = 4  # surfaces and the like of which factors are kept
-# products with each: what a step and the next one may ask for again
-KEPT = {"M": 6, "C": 4, "K": 2, "load": 2}
-PAIR = "give pairs of a vector [N] and a function of the time"
+OTHERS = 4  # surfaces and other objects, for each of which factors are remembered
+# Products with each that are remembered: what a step and the next one may ask for again.
+PRODUCTS = {"M": 6, "C": 4, "K": 2, "load": 2}
+PAIR_REMEDY = "give pairs of a vector [N] and a function of the time"
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,14 @@ class Load:
     Viscous and inertial parts are the shares in C u' and M u'' of what moves in a given way (a
     base, a free field): a mass law that changes C changes the former alike, and a body at rest
     feels neither.
+
+    Attributes:
+        constant: vector (n,) [N].
+        separable: pairs of a vector (n,) [N] and a function of the time t [s] that returns a
+            number.
+        general: functions of the time t [s] that return a vector (n,) [N].
+        viscous: functions of the same kind, for the share in C u'.
+        inertial: functions of the same kind, for the share in M u''.
     """
 
     constant: Array
@@ -100,14 +113,15 @@ class Load:
 
     def __post_init__(self) -> None:
         array("Load", "constant", self.constant, (None,), unit="N")
-        for name in ("separable", "general", "viscous", "inertial"):
-            for part in several(
-                "Load", name, getattr(self, name), "give a tuple of functions of the time"
-            ):
-                if name != "separable":
-                    function("Load", f"a part of {name}", part, "give a function of the time [s]")
-                elif len(several("Load", "a part of separable", part, PAIR)) != 2:
-                    raise InputError(f"Load: an item of separable has {len(part)} members; {PAIR}")
+        remedy = "give a tuple of functions of the time"
+        for part in several("Load", "separable", self.separable, remedy):
+            if len(several("Load", "a part of separable", part, PAIR_REMEDY)) != 2:
+                raise InputError(
+                    f"Load: an item of separable has {len(part)} members; {PAIR_REMEDY}"
+                )
+        for name in ("general", "viscous", "inertial"):
+            for part in several("Load", name, getattr(self, name), remedy):
+                function("Load", f"a part of {name}", part, "give a function of the time [s]")
 
     def __call__(self, t: float) -> Array:
         """Return f(t) [N]."""
@@ -118,9 +132,9 @@ class Load:
         return total
 
     def at_rest(self, t: float) -> Array:
-        """Return the load of a static stage at time t.
+        """Return the load [N] of a static stage at time t [s].
 
-        What moves in a given way stands still where it then is.
+        What moves in a given way stands still where it is at that time.
         """
         total = self.constant.copy()
         for vector, history in self.separable:
@@ -131,40 +145,49 @@ class Load:
 
     def in_basis(self, T: Matrix) -> "Load":
         """Return the same load on the unknowns û of u = T û: Tᵀ f."""
-        separable = tuple(
-            (T.transpose_apply(vector), history) for vector, history in self.separable
+        return Load(
+            constant=T.transpose_apply(self.constant),
+            separable=tuple((T.transpose_apply(v), history) for v, history in self.separable),
+            general=_turn(T, self.general),
+            viscous=_turn(T, self.viscous),
+            inertial=_turn(T, self.inertial),
         )
-        moving = (
-            _turned(T, functions) for functions in (self.general, self.viscous, self.inertial)
-        )
-        return Load(T.transpose_apply(self.constant), separable, *moving)
 
     def handed_over(self, P: Matrix) -> "Load":
-        """Return the load beside C* = PᵀCP: Pᵀ on its viscous parts."""
-        return replace(self, viscous=_turned(P, self.viscous))
+        """Return the load that belongs to C* = PᵀCP, with Pᵀ on its viscous parts."""
+        return replace(self, viscous=_turn(P, self.viscous))
 
 
 def history_value(history: Callable[[float], float], t: float) -> float:
-    """Return the value of a history; NaN and infinity are told of the load as a whole."""
+    """Return the value of a history at time t [s].
+
+    NaN and infinity pass here: they are refused in the load as a whole.
+
+    Raises:
+        InputError: the function raises, or returns anything but one real number; in a frame of
+            several ranks at its end.
+    """
     try:
         value = history(t)
-    except Exception as error:  # of one rank alone, perhaps
-        return kept_error(f"the history of a load or excitation at t = {t:g} s", error, 0.0)
+    except Exception as error:  # perhaps on one rank alone
+        return keep_error(f"the history of a load or excitation at t = {t:g} s", error, 0.0)
     if isinstance(value, float):
         return value
     if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
         what = f"the history of a load or excitation is {shown(value)} at t = {t:g} s"
-        return kept_error(what, InputError(f"{what}: return one real number"), 0.0)
+        return keep_error(what, InputError(f"{what}: return one real number"), 0.0)
     return value
 
 
-def _turned(
+def _turn(
     T: Matrix, functions: Sequence[Callable[[float], Array]]
 ) -> tuple[Callable[[float], Array], ...]:
-    def turned(function: Callable[[float], Array]) -> Callable[[float], Array]:
+    """Return functions of the time that give Tᵀ times what these functions give."""
+
+    def turn_one(function: Callable[[float], Array]) -> Callable[[float], Array]:
         return lambda t: T.transpose_apply(function(t))
 
-    return tuple(map(turned, functions))
+    return tuple(map(turn_one, functions))
 
 
 @dataclass(frozen=True)
@@ -220,48 +243,30 @@ class SemiDiscreteSystem:
     )
 
     def __post_init__(self) -> None:
+        owner = "SemiDiscreteSystem"
+        remedy = "give a SerialMatrix(…) or a PetscMatrix(…)"
         for name in ("M", "K") if self.C is None else ("M", "K", "C"):
-            remedy = "give a SerialMatrix(…) or a PetscMatrix(…)"
-            provides(
-                "SemiDiscreteSystem", name, getattr(self, name), ("rows", "transpose_apply"), remedy
-            )
+            provides(owner, name, getattr(self, name), ("rows", "transpose_apply"), remedy)
         names = ("combine", "factor", "dot", "comm")
-        provides(
-            "SemiDiscreteSystem",
-            "algebra",
-            self.algebra,
-            names,
-            "give SerialAlgebra() or PetscAlgebra(comm)",
-        )
-        instance("SemiDiscreteSystem", "load", self.load, Load, "give Load(constant, …)")
-        provides(
-            "SemiDiscreteSystem",
-            "space",
-            self.space,
-            ("dimension", "ids"),
-            "give a space, what unknowns mean",
-        )
+        remedy = "give SerialAlgebra() or PetscAlgebra(comm)"
+        provides(owner, "algebra", self.algebra, names, remedy)
+        instance(owner, "load", self.load, Load, "give Load(constant, …)")
+        remedy = "give a space, what unknowns mean"
+        provides(owner, "space", self.space, ("dimension", "ids"), remedy)
         for name, axes in (("u0", 1), ("v0", 1), ("influence", 2)):
             value = getattr(self, name)
-            if (
-                not isinstance(value, np.ndarray)
-                or value.ndim != axes
-                or value.dtype.kind not in "iuf"
-            ):
+            is_array = isinstance(value, np.ndarray) and value.ndim == axes
+            if not is_array or value.dtype.kind not in "iuf":
                 raise InputError(
-                    f"SemiDiscreteSystem: {name} is {shown(value)}; give real numbers along {axes} "
-                    "axes"
+                    f"{owner}: {name} is {shown(value)}; give real numbers along {axes} axes"
                 )
 
     def __repr__(self) -> str:
-        """Return what it is, in words: not the arrays."""
-        kind = (
-            f"{'un' if self.C is None else ''}damped, "
-            f"{'floating' if self.floating else 'supported'}"
-        )
-        return (
-            f"SemiDiscreteSystem({self.space.unknowns} unknowns in {self.space.dimension}D, {kind})"
-        )
+        """Return in words what it is, not the arrays."""
+        damped = "undamped" if self.C is None else "damped"
+        held = "floating" if self.floating else "supported"
+        size = f"{self.space.unknowns} unknowns in {self.space.dimension}D"
+        return f"SemiDiscreteSystem({size}, {damped}, {held})"
 
     @property
     def rows(self) -> int:
@@ -276,22 +281,26 @@ class SemiDiscreteSystem:
         """Return ½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
-    def cached(self, name: str, make: Callable[[], Any], *of: Any) -> Any:
-        """Return what ``make`` returned the first time.
+    def cached(self, name: str, make: Callable[[], Any], *others: Any) -> Any:
+        """Return what ``make`` returned the first time: a factor, or the like.
 
-        These are factors and the like, which live as long as the system.
+        It lives as long as the system. What depends on the load does not belong here: systems that
+        differ in their loads alone share this memory (``loaded``).
 
-        ``of``: the objects beside M, C and K that it depends on, as the contact surface; each of
-        the last few has its own. What depends on the load does not belong here: systems that differ
-        in it share this memory (``loaded``).
+        Args:
+            name: what it is called here.
+            make: makes it.
+            others: the objects beside M, C and K that it depends on, as the contact surface. Each
+                of the last few has its own.
         """
         known: dict[tuple[int, ...], tuple[Any, Any]] = self._cache.setdefault(name, {})
-        key = tuple(map(id, of))
+        key = tuple(map(id, others))
         if key not in known:
-            made = make()
+            value = make()
             if len(known) >= OTHERS:
-                del known[next(iter(known))]
-            known[key] = of, made  # with the objects, so that ids stay theirs
+                oldest = next(iter(known))
+                del known[oldest]
+            known[key] = (others, value)  # keeps the objects alive, so that the ids stay theirs
         return known[key][1]
 
     def forget_loads(self) -> None:
@@ -299,59 +308,71 @@ class SemiDiscreteSystem:
         self._products.pop("load", None)
 
     def product(self, name: str, x: Array) -> Array:
-        """Return M x, C x or K x, read-only.
+        """Return M x, C x or K x (n,), or rows (k, n) of rows; read-only.
 
-        It is made once for each of the last frozen vectors (core.products).
+        The last products with read-only vectors are remembered (``core.products``).
         """
-        return (self._products.get(name) or self._remembered(name))(x)
+        return (self._products.get(name) or self._open_memory(name))(x)
 
-    def _remembered(self, name: str) -> Remembered:
+    def _open_memory(self, name: str) -> Remembered:
+        """Return the memory of the products with a matrix, or of the load."""
         function = self.load if name == "load" else getattr(self, name).__matmul__
-        return self._products.setdefault(name, Remembered(function, KEPT[name]))
+        return self._products.setdefault(name, Remembered(function, PRODUCTS[name]))
 
     def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Any, Any]) -> None:
-        """Take what makes products of rows: (name, x, rows), and ("load", t, t).
+        """Learn products of one run from those of several runs.
 
-        When asked, the product with x is a row of that with the rows.
+        When it is asked for, the product with x is a row of the product with the rows.
+
+        Args:
+            many: the system that the runs share.
+            row: the row of this run.
+            known: (name, x, rows) for each product that is known, and ("load", t, t).
         """
 
-        def value(name: str, rows: Any) -> Callable[[], Array]:
+        def take_row(name: str, rows: Any) -> Callable[[], Array]:
             return lambda: np.asarray(many.product(name, rows)[row])
 
         for name, x, rows in known:
-            self._remembered(name).know(x, value(name, rows))
+            self._open_memory(name).know(x, take_row(name, rows))
 
     @property
     def times(self) -> list[float]:
-        """Return the times at which the load is known."""
+        """Return the times [s] at which the load is remembered."""
         return self._products["load"].numbers() if "load" in self._products else []
 
     def load_at(self, t: float) -> Array:
-        """Return f(t), read-only.
+        """Return f(t) (n,) [N], read-only.
 
-        It is made once for each of the last two times, unless something is marched beside it.
+        Those of the last two times are remembered, unless something is marched beside the system.
         """
         if self.companions:
             return self.load(t)
-        return (self._products.get("load") or self._remembered("load"))(float(t))
+        return (self._products.get("load") or self._open_memory("load"))(float(t))
 
     def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
-        """Return (u1 - u0)/dt and (v1 - v0)/dt.
+        """Return (u1 - u0)/dt [m/s] and (v1 - v0)/dt [m/s²].
 
-        The products of C and M with them are made of those with their ends.
+        The products of C and M with them are then known: differences of those with both ends.
+
+        Args:
+            u0: displacement (n,) [m] before the step.
+            u1: displacement (n,) [m] after it.
+            v0: velocity (n,) [m/s] before the step.
+            v1: velocity (n,) [m/s] after it.
+            dt: size of the step [s].
         """
 
-        def change(name: str, x0: Array, x1: Array) -> Array:
-            product = self._remembered(name)
+        def divide(name: str, x0: Array, x1: Array) -> Array:
+            product = self._open_memory(name)
             return product.know((x1 - x0) / dt, lambda: (product(x1) - product(x0)) / dt)
 
-        return (u1 - u0) / dt if self.C is None else change("C", u0, u1), change("M", v0, v1)
+        velocity = (u1 - u0) / dt if self.C is None else divide("C", u0, u1)
+        acceleration = divide("M", v0, v1)
+        return velocity, acceleration
 
     def changed(self, **values: Any) -> "SemiDiscreteSystem":
-        """Return the same system with other values of the attributes that are named.
-
-        It has no factor of the old one.
-        """
+        """Return the same system with other values of some attributes, and with no factor yet."""
         return replace(self, **values)
 
     def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
@@ -359,8 +380,12 @@ class SemiDiscreteSystem:
 
         Its factor is made when it is first needed.
 
-        ``shares``: whether the scheme needs M x, C x and K x in its next step, so that A x may be
-        made of them.
+        Args:
+            m: factor of the mass.
+            c: factor of the damping.
+            k: factor of the stiffness.
+            shares: whether the scheme needs M x, C x and K x in its next step, so that A x may be
+                made of them.
         """
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
@@ -373,9 +398,12 @@ class SemiDiscreteSystem:
                 total += c * self.product("C", x)
             return total
 
-        A, inertia = self.algebra.combine(terms), (m, self.M)
         return EffectiveMatrix(
-            A, self.algebra, space=self.space, inertia=inertia, image=image if shares else None
+            self.algebra.combine(terms),
+            self.algebra,
+            space=self.space,
+            inertia=(m, self.M),
+            image=image if shares else None,
         )
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> "SemiDiscreteSystem":
@@ -389,9 +417,9 @@ class SemiDiscreteSystem:
         return other
 
     def inertia(self, direction: Array) -> Array:
-        """Return M r, the force [N] of a unit acceleration in this direction (d,).
+        """Return M r (n,), the force [N] of a unit acceleration in this direction (d,).
 
-        It accelerates body and prescribed nodes by one.
+        Body and prescribed nodes are accelerated alike.
         """
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
@@ -399,33 +427,38 @@ class SemiDiscreteSystem:
     def in_basis(self, T: Matrix, dual: Matrix | None = None) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
-        Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is
-        orthogonal (None).
+        Args:
+            T: the change of basis.
+            dual: T⁻ᵀ, with which initial values and influence vectors turn (by T⁻¹); None where T
+                is orthogonal.
         """
-        return self._in_unknowns(T, (T if dual is None else dual).transpose_apply)
+        return self._change_unknowns(T, (T if dual is None else dual).transpose_apply)
 
     def in_relative(self, R: Matrix) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns ǔ of û = R ǔ.
 
-        In these, contact points move relative to the other body.
-
-        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
+        In these, contact points move relative to the other body. R = 1 + N with N N = 0 (nobody's
+        partner is somebody's partner), so that R⁻¹ = 2 - R.
         """
-        return self._in_unknowns(R, lambda x: 2.0 * x - R @ x)
+        return self._change_unknowns(R, lambda x: 2.0 * x - R @ x)
 
-    def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":
+    def _change_unknowns(
+        self, T: Matrix, inverse: Callable[[Array], Array]
+    ) -> "SemiDiscreteSystem":
+        """Return the system in other unknowns; ``inverse`` applies T⁻¹ to a vector."""
         turn = self.algebra.congruence
         return self.changed(
             M=turn(T, self.M),
             C=None if self.C is None else turn(T, self.C),
             K=turn(T, self.K),
             load=self.load.in_basis(T),
-            influence=_columns(self.influence, inverse),
-            base_mass=_columns(self.base_mass, T.transpose_apply),
+            influence=_map_columns(inverse, self.influence),
+            base_mass=_map_columns(T.transpose_apply, self.base_mass),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
         )
 
 
-def _columns(values: Array | None, apply: Callable[[Array], Array]) -> Array | None:
+def _map_columns(apply: Callable[[Array], Array], values: Array | None) -> Array | None:
+    """Return an array whose columns are a function of these, None for None."""
     return None if values is None else np.column_stack([apply(column) for column in values.T])

@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix
-from ..core.collective import together, together_if_own, users
+from ..core.collective import call_user, together, together_if_own
 from ..core.problem import ContactProblem
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.protocols import Impact
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
@@ -179,7 +179,7 @@ class March:
         with together_if_own(problem.surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
         for vector in (free.u, free.v, new.u, new.v):
-            frozen(vector)  # what is known of them stays true
+            freeze(vector)  # what is known of them stays true
         averages = partial(scheme.balance, problem, state, free, dt)
         return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
 
@@ -211,7 +211,7 @@ def after_impact(
         active=active,
         closing=active & ~old.active,
     )
-    target = users(
+    target = call_user(
         f"the impact law {type(law).__name__}",
         lambda: law.target(impact),
         np.full(surface.count, np.nan),

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.problem import ContactProblem
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.step import Report, State, StepProblem
 from ..core.system import Load, history_value
 
@@ -59,7 +59,7 @@ def join_states(states: Sequence[State]) -> State:
         if not all(name in state.memory for state in states):
             continue
         if value.shape == first.u.shape:
-            value = frozen(np.stack([state.memory[name] for state in states]))
+            value = freeze(np.stack([state.memory[name] for state in states]))
         memory[name] = value
     r_t = None
     rubbing = [state.r_t for state in states if state.r_t is not None]
@@ -69,8 +69,8 @@ def join_states(states: Sequence[State]) -> State:
     return State(
         first.t,
         first.k,
-        frozen(np.stack([state.u for state in states])),
-        frozen(np.stack([state.v for state in states])),
+        freeze(np.stack([state.u for state in states])),
+        freeze(np.stack([state.v for state in states])),
         np.stack([state.r_n for state in states]),
         np.stack([state.active for state in states]),
         memory,

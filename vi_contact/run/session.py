@@ -19,10 +19,10 @@ import numpy as np
 
 from ..core.algebra import Comm, largest
 from ..core.checks import on_all
-from ..core.collective import together, users
+from ..core.collective import call_user, together
 from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
-from ..core.stages import done
 from ..core.step import Recorder, Report, Row, State, StepResult
+from ..core.timing import take_report
 from .damping import NOT_COMPUTED, damping_in_words
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
@@ -281,7 +281,7 @@ class Session:
                     f"{state.t:.6g} s,"
                 )
                 call: Callable[[], Row] = partial(recorder.row, report)
-                row.update(users(name, call, nothing, as_it_is=True))
+                row.update(call_user(name, call, nothing, as_it_is=True))
             self.table.check(row)
             _refuse_overflow(row)
         writer.append(row)
@@ -349,7 +349,7 @@ class Session:
                 log.warning("%s", value)
         if self.resumed_from is not None:
             log.info("continues from the checkpoint of step %d", self.resumed_from)
-        log.info("set up: %s", done())
+        log.info("set up: %s", take_report())
         log.info("%d steps to do", self.left)
         if self.wall_time.text is not None:
             log.info(

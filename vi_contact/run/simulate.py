@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..core.algebra import Comm
-from ..core.collective import agree, together, users
+from ..core.collective import agree, call_user, together
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
@@ -273,7 +273,7 @@ def _start_recorders(
             name = f"the recorder {type(recorder).__name__} at the start"
             call: Callable[[], Row] = partial(recorder.start, problem, state, resumed)
             nothing: Row = {}
-            row |= users(name, call, nothing, as_it_is=True)
+            row |= call_user(name, call, nothing, as_it_is=True)
 
     # Only after the start: many recorders do not know their columns before.
     columns: dict[str, tuple[str, str]] = {}

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, ViContactError
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
@@ -290,7 +290,7 @@ class Group:
         old = self._states
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
-            frozen(vector)  # what is known of them stays true
+            freeze(vector)  # what is known of them stays true
         free = own_states(self._problem, problems, rows)
         self._many, self._states = self._apply_impact(rows, free, dt)
         system = self._problem.equations
@@ -330,7 +330,7 @@ class Group:
         if getattr(problem.impact, "by_rows", False) and not rows.memory:
             # The law takes rows: of all runs at once.
             new = after_impact(problem, scheme, self._many, rows, dt)
-            struck = (frozen(new.v) != rows.v).any(axis=1)
+            struck = (freeze(new.v) != rows.v).any(axis=1)
             problems = self._problems
 
             def own_state(row: int) -> State:

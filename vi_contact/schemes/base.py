@@ -1,6 +1,6 @@
-"""Hold what schemes share.
+"""Hold what schemes share: two families, the step in displacements, and what does not suit them.
 
-There are two families of them, the step in displacements, and what does not suit their contact.
+The arguments of the methods of a scheme are those of ``core.step.Scheme``, which explains them.
 """
 
 import logging
@@ -16,24 +16,18 @@ log = logging.getLogger(__name__)
 
 
 class SingleStep:
-    """Share what one-step schemes have in common.
+    """Share what one-step schemes have in common: they carry nothing but u and v.
 
     They start by themselves, and velocity jumps do not disturb them.
     """
 
     @property
     def mass(self) -> MassLaw:
-        """Return the consistent mass.
-
-        Contact is an impulse within the step, so contact nodes need their mass.
-        """
+        """Return the consistent mass: contact is an impulse within the step, which needs mass."""
         return ConsistentMass()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for unknowns without mass, as contact nodes.
-
-        Their forces would swing for ever.
-        """
+        """Raise InputError for unknowns without mass, whose forces would swing for ever."""
         _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
             raise InputError(
@@ -43,30 +37,27 @@ class SingleStep:
             )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state: there is nothing to prepare."""
+        """Return the state as it is: there is nothing to prepare."""
         return state
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return the state with the new velocity: nothing is to be restarted."""
+        """Return the state with the new velocity: there is nothing to restart."""
         return state.with_velocity(v)
 
 
 class BalanceStep:
-    """Share what schemes have in common that are safe without mass at the contact nodes only."""
+    """Share what schemes with contact in the balance of forces have in common.
+
+    They are safe only where contact nodes have no mass.
+    """
 
     @property
     def mass(self) -> MassLaw:
-        """Return the redistributed mass.
-
-        With contact in the balance of forces, mass at its nodes creates energy.
-        """
+        """Return the redistributed mass, without which contact nodes create energy."""
         return Redistributed()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes.
-
-        Warn when they have mass.
-        """
+        """Raise InputError for an impact law on massless nodes; warn of mass at contact nodes."""
         check_balance(repr(self), problem)
 
 
@@ -81,9 +72,17 @@ def position_step(
     guess: Array | None = None,
     active: Mask | None = None,
 ) -> StepProblem:
-    """Return the step A x = b - …, x = u1.
+    """Return the step A x = b - … in x = u1, with gap and slip at the end of the step.
 
-    Gap and slip are those of the end of the step. By default free flight is the guess.
+    Args:
+        problem: the problem that is marched.
+        state: the state at the beginning of the step.
+        A: the effective matrix of this dt.
+        dt: size of the step [s].
+        b: right-hand side (n,), ``scale`` times newtons.
+        scale: how many times newtons the reactions of the step are.
+        guess: predicted u1 (n,) [m]; None for free flight, u0 + dt v0.
+        active: predicted contact set (m,); None for that of the state.
     """
     end = state.t + dt
     return StepProblem(
@@ -102,35 +101,48 @@ def position_step(
     )
 
 
-def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
-    """Return the state after the step, with the mean reactions r/scale.
+def end_step(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
+    """Return the state at the end of a step, with the mean reactions r/scale and no memory.
 
-    What another scheme remembered is forgotten.
+    Args:
+        step: the step.
+        result: its answer.
+        u: displacement (n,) [m] at the end.
+        v: velocity (n,) [m/s] at the end.
     """
     r_t = None if result.r_t is None else result.r_t / step.scale
     return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
 
-def means(
+def balance_means(
     problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array
 ) -> Balance:
-    """Return the equation of a step with means of u, f and the rates of u and v.
+    """Return the equation of a step with the mean rates of u and v, and the new reactions.
 
-    The reactions are those of the new state.
+    Args:
+        problem: the problem that is marched.
+        old: the state before the step.
+        new: the state after it.
+        dt: size of the step [s].
+        u: mean displacement (n,) [m] of the scheme.
+        f: mean load (n,) [N] of the scheme.
     """
     v, a = problem.equations.rates(old.u, new.u, old.v, new.v, dt)
     return Balance(u=u, v=v, a=a, f=f, r_n=new.r_n, r_t=new.r_t)
 
 
 def check_balance(name: str, problem: ContactProblem) -> None:
-    """Check what schemes with contact in the acceleration balance march.
+    """Check a problem for schemes with contact in the balance of forces.
 
-    Raises InputError for an impact law on massless contact nodes: there is no momentum that it
-    could change. Warns, once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1
-    g0) is created whenever a contact opens.
+    It warns, once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1 g0) is
+    created whenever a contact opens.
+
+    Raises:
+        InputError: an impact law on massless contact nodes, which have no momentum to change.
     """
     _refuse_massless_elsewhere(problem)
-    massless, surface = problem.equations.massless is not None, problem.surface
+    surface = problem.surface
+    massless = problem.equations.massless is not None
     if massless and problem.impact is not None:
         raise InputError(
             f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in "
@@ -138,14 +150,14 @@ def check_balance(name: str, problem: ContactProblem) -> None:
         )
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
-    told = problem.equations.cached(f"told of {name}", list, surface)
-    if not told and surface.comm.rank == 0:
+    warnings = problem.equations.cached(f"warnings of {name}", list, surface)
+    if not warnings and surface.comm.rank == 0:
         log.warning(
             "%s with consistent mass can gain energy whenever a contact opens: leave out "
             "mass=ConsistentMass(), or take ContactStabilisedNewmark() or Midpoint()",
             name,
         )
-    told.append(True)
+    warnings.append(True)
 
 
 def _refuse_massless_elsewhere(problem: ContactProblem) -> None:

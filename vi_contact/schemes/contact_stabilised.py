@@ -1,6 +1,4 @@
-"""Step by contact-stabilised Newmark.
-
-The predictor is made admissible first, so that contact forces do not ring.
+"""Step by contact-stabilised Newmark: an admissible predictor keeps contact forces from ringing.
 
     u_p = argmin ½ (u - u0 - dt v0)ᵀ M (u - u0 - dt v0)  over  gap(u) >= 0  (= on bilateral rows)
     M (u1 - u_p) = -½ dt² [K ½(u0 + u1) + C (u1 - u0)/dt - f(t0 + ½ dt) + B_nᵀ r̄_n + B_tᵀ r̄_t]
@@ -40,16 +38,18 @@ from ..core.protocols import Frictionless
 from ..core.step import Balance, State, StepProblem, StepResult
 from ..solvers.automatic import solver_beside_steps
 from ..solvers.certified import TOLERANCE, CertifiedSolver
-from .base import SingleStep, means, position_step, stepped
-from .consistent_data import mass_matrix, rigid_part
+from .base import SingleStep, balance_means, end_step, position_step
+from .consistent_data import mass_matrix, without_springs
 
 
 @dataclass(frozen=True)
 class ContactStabilisedNewmark(SingleStep):
-    """Step by the module's equations.
+    """Step by the module's equations, which need mass at contact nodes.
 
-    They need mass at contact nodes. ``projected``: whether the predictor is projected. StepFailure
-    when the projection cannot be certified.
+    A step raises StepFailure when the projection cannot be certified.
+
+    Attributes:
+        projected: whether the predictor is projected.
     """
 
     projected: bool = True
@@ -66,19 +66,19 @@ class ContactStabilisedNewmark(SingleStep):
     ) -> StepProblem:
         """Return the step with b of the module's equations."""
         system = problem.equations
-        u_p, active = free, _ = state.u + dt * state.v, state.active
+        free = state.u + dt * state.v
+        u_p = free
+        active = state.active
         if self.projected:
-            u_p, active = admissible(problem, state, free, dt)
-        Mu = (
-            system.product("M", state.u) + dt * system.product("M", state.v)
-            if u_p is free
-            else system.M @ u_p
-        )
-        b = (
-            2.0 * system.load_at(state.t + 0.5 * dt)
-            + 4.0 / dt**2 * Mu
-            - system.product("K", state.u)
-        )
+            u_p, active = project_predictor(problem, state, free, dt)
+
+        # M u_p of a free flight is made of products that are known.
+        if u_p is free:
+            Mu = system.product("M", state.u) + dt * system.product("M", state.v)
+        else:
+            Mu = system.M @ u_p
+        f = system.load_at(state.t + 0.5 * dt)
+        b = 2.0 * f + 4.0 / dt**2 * Mu - system.product("K", state.u)
         if system.C is not None:
             b += 2.0 / dt * system.product("C", state.u)
         return position_step(problem, state, A, dt, b=b, scale=2.0, guess=u_p, active=active)
@@ -92,40 +92,51 @@ class ContactStabilisedNewmark(SingleStep):
         dt: float,
     ) -> State:
         """Return the state with v1 = v0 + 2/dt (u1 - u_p)."""
-        return stepped(step, result, result.x, state.v + 2.0 / dt * (result.x - step.guess))
+        v = state.v + 2.0 / dt * (result.x - step.guess)
+        return end_step(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the equation above."""
-        return means(
-            problem,
-            old,
-            new,
-            dt,
-            u=0.5 * (old.u + new.u),
-            f=problem.equations.load_at(old.t + 0.5 * dt),
-        )
+        """Return the averages of the module's equation."""
+        u = 0.5 * (old.u + new.u)
+        f = problem.equations.load_at(old.t + 0.5 * dt)
+        return balance_means(problem, old, new, dt, u=u, f=f)
 
 
-def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
-    """Return (u_p, the points that stopped it) for a predicted displacement ``u``.
-
-    The step is that of dt after ``state``.
+def project_predictor(
+    problem: ContactProblem, state: State, u: Array, dt: float
+) -> tuple[Array, Mask]:
+    """Return the admissible displacement nearest to a predicted one.
 
         M w = -B_nᵀ q,    0 <= q  ⊥  gap0 - B_n u - B_n w >= 0,    u_p = u + w
 
-    The same small problem as a step with A = M, solved in the increment w, so that nothing is
-    rounded where nothing is in the way. Springs give way: their points are not projected. Normal
-    directions only; friction has no part in it. StepFailure when the projection cannot be
-    certified.
+    It is the same small problem as a step with A = M, solved in the increment w, so that nothing is
+    rounded where nothing is in the way. Springs give way: their points are not projected. Only
+    normal directions are projected; friction has no part in it.
+
+    Args:
+        problem: the problem that is marched.
+        state: the state at the beginning of the step.
+        u: predicted displacement (n,) [m] at its end.
+        dt: size of the step [s].
+
+    Returns:
+        u_p (n,) [m], and the points (m,) that stopped it.
+
+    Raises:
+        StepFailure: the projection cannot be certified.
     """
-    surface, system, rigid = problem.surface, problem.equations, problem.surface.rigid
+    surface = problem.surface
+    system = problem.equations
+    rigid = surface.rigid
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)
     if surface.some(np.isnan(gap)) or not surface.some(closed & (gap != 0.0)):
-        return u, closed  # nothing in the way; of NaN the step itself tells
-    bounds: ContactProblem = system.cached(  # springs are not bounds here, and nothing rubs
+        return u, closed  # nothing is in the way; NaN is refused by the step itself
+
+    # Springs are not bounds here, and nothing rubs.
+    bounds: ContactProblem = system.cached(
         "admissible predictor, bounds",
-        lambda: replace(problem, surface=rigid_part(surface), friction=Frictionless()),
+        lambda: replace(problem, surface=without_springs(surface), friction=Frictionless()),
         surface,
     )
     M = mass_matrix(problem)

@@ -42,7 +42,7 @@ from ..core.problem import ContactProblem
 from ..core.quantities import Between
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import BalanceStep, position_step
-from .consistent_data import consistent_acceleration, equilibrated, massless_take
+from .consistent_data import consistent_acceleration, equilibrate, replace_massless
 
 SLACK = 1e-12  # round-off in the conditions of stability
 
@@ -50,8 +50,8 @@ SLACK = 1e-12  # round-off in the conditions of stability
 class AlphaStep(BalanceStep, ABC):
     """Step by the module's equations, with the weights of a member.
 
-    Its memory is "a" (the acceleration), "reaction" (Bᵀr at the same end) and "of" (alpha_m,
-    alpha_f and t they belong to).
+    The memory of its states is "a", the acceleration (n,) [m/s²], "reaction", Bᵀr (n,) [N] at the
+    same time, and "of", the alpha_m, alpha_f and t that they belong to.
     """
 
     by_rows: ClassVar[bool] = True
@@ -59,30 +59,30 @@ class AlphaStep(BalanceStep, ABC):
     @property
     @abstractmethod
     def weights(self) -> "GeneralisedAlpha":
-        """Return the member of generalised-alpha that it is.
+        """Return the member of generalised-alpha that the scheme is, with all four weights."""
 
-        It tells alpha_m, alpha_f, beta and gamma.
-        """
-
-    def _mark(self, t: float) -> Array:
+    def _owner_of_memory(self, t: float) -> Array:
+        """Return what memory at time t [s] belongs to: the array "of"."""
         return np.array([self.weights.alpha_m, self.weights.alpha_f, t])
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with massless nodes in equilibrium and its acceleration.
+        """Return the state with its acceleration, and massless nodes in equilibrium.
 
-        This is not done on restarts or a new dt.
+        On a restart, and for a new dt, the state is good as it is.
         """
-        if np.array_equal(state.memory.get("of", ()), self._mark(state.t)):
+        if np.array_equal(state.memory.get("of", ()), self._owner_of_memory(state.t)):
             return state
-        return self._restarted(problem, equilibrated(problem, state), dt)
+        return self._restart(problem, equilibrate(problem, state), dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the acceleration that fits the new velocity."""
-        return self._restarted(problem, state.with_velocity(v), dt)
+        return self._restart(problem, state.with_velocity(v), dt)
 
-    def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
+    def _restart(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """Return the state with the acceleration that fits it."""
         a, reaction = consistent_acceleration(problem, state, dt)
-        return replace(state, memory={"a": a, "reaction": reaction, "of": self._mark(state.t)})
+        owner = self._owner_of_memory(state.t)
+        return replace(state, memory={"a": a, "reaction": reaction, "of": owner})
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A of the module's equations."""
@@ -90,11 +90,13 @@ class AlphaStep(BalanceStep, ABC):
         inertia = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)
         return problem.equations.effective(m=inertia, c=w.gamma / (w.beta * dt), k=1.0)
 
-    def _known(self, state: State, dt: float) -> tuple[Array, Array]:
-        """(v1, a1) for u1 = 0."""
-        w, a0 = self.weights, state.memory["a"]
+    def _known_rates(self, state: State, dt: float) -> tuple[Array, Array]:
+        """Return v1 and a1 for u1 = 0: their parts that the state before the step fixes."""
+        w = self.weights
+        a0 = state.memory["a"]
         a = (w.beta - 0.5) / w.beta * a0 - (state.u + dt * state.v) / (w.beta * dt**2)
-        return state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a), a
+        v = state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a)
+        return v, a
 
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
@@ -103,15 +105,15 @@ class AlphaStep(BalanceStep, ABC):
 
         b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f).
         """
-        system, w = problem.equations, self.weights
-        v, a = self._known(state, dt)
+        system = problem.equations
+        w = self.weights
+        v, a = self._known_rates(state, dt)
         mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
         b = system.load_at(state.t + dt) - system.M @ mean
         if w.alpha_f != 0.0:
             ratio = w.alpha_f / (1.0 - w.alpha_f)
-            b += ratio * (
-                system.load_at(state.t) - system.product("K", state.u) - state.memory["reaction"]
-            )
+            f0 = system.load_at(state.t)
+            b += ratio * (f0 - system.product("K", state.u) - state.memory["reaction"])
             v = v + ratio * state.v
         if system.C is not None:
             b -= system.C @ v
@@ -130,46 +132,62 @@ class AlphaStep(BalanceStep, ABC):
         Massless unknowns get no acceleration and the mean velocity of the step.
         """
         w = self.weights
-        v, a = self._known(state, dt)
+        v, a = self._known_rates(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
         a += result.x / (w.beta * dt**2)
-        reaction = problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t)
+        v = replace_massless(problem, v, (result.x - state.u) / dt)
         memory = {
-            "a": massless_take(problem, 0.0, a),
-            "reaction": reaction,
-            "of": self._mark(step.t),
+            "a": replace_massless(problem, a, 0.0),
+            "reaction": problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t),
+            "of": self._owner_of_memory(step.t),
         }
-        v = massless_take(problem, (result.x - state.u) / dt, v)
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the step's own equation of motion."""
-        return weighted(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
+        return balance_ends(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
 
 
-def weighted(
+def balance_ends(
     problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = ""
 ) -> Balance:
-    """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else.
+    """Return the equation of a step with weighted means of its ends.
 
-    ``level`` is that of names in memory.
+    Args:
+        problem: the problem that is marched.
+        old: the state before the step.
+        new: the state after it.
+        m: weight of the old acceleration; the new one has 1 - m.
+        f: weight of all else at the old end; the new end has 1 - f.
+        level: how the names "a" and "reaction" end in the memory of the states.
     """
-    load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
+    load_at = problem.equations.load_at
+    surface = problem.surface
+    reaction = old.memory[f"reaction{level}"]
+    r_t = None
+    if new.r_t is not None:
+        r_t = (1.0 - f) * new.r_t + f * surface.tangential_values(reaction)
     return Balance(
         u=(1.0 - f) * new.u + f * old.u,
         v=(1.0 - f) * new.v + f * old.v,
         a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
-        f=(1.0 - f) * load(new.t) + f * load(old.t),
-        r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
-        r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0),
+        f=(1.0 - f) * load_at(new.t) + f * load_at(old.t),
+        r_n=(1.0 - f) * new.r_n + f * surface.normal_values(reaction),
+        r_t=r_t,
     )
 
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(AlphaStep):
-    """Step by the module's equations.
+    """Step by the module's equations; ``spectral_radius`` chooses good weights.
 
-    Take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable.
+    Weights that are not unconditionally stable raise InputError.
+
+    Attributes:
+        alpha_m: weight of the old acceleration.
+        alpha_f: weight of the old forces.
+        beta: Newmark's weight of a1 in u1.
+        gamma: Newmark's weight of a1 in v1.
     """
 
     alpha_m: float
@@ -178,19 +196,19 @@ class GeneralisedAlpha(AlphaStep):
     gamma: float
 
     def __post_init__(self) -> None:
-        alpha_m, alpha_f, beta, gamma = (
-            real(getattr(self, name)) for name in self.__dataclass_fields__
-        )
+        alpha_m = real(self.alpha_m)
+        alpha_f = real(self.alpha_f)
+        beta = real(self.beta)
+        gamma = real(self.gamma)
         least = 0.5 - alpha_m + alpha_f
         stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
-        if not (stable and np.inf > beta >= 0.5 * gamma - SLACK and np.isfinite(least + gamma)):
-            told = ", ".join(
-                f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__
-            )
+        stable = stable and np.inf > beta >= 0.5 * gamma - SLACK
+        if not stable or not np.isfinite(least + gamma):
+            weights = ", ".join(f"{name}={shown(value)}" for name, value in vars(self).items())
             raise InputError(
-                f"{told} are not unconditionally stable, and contact has no highest frequency to "
-                "choose dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, "
-                "beta >= gamma/2"
+                f"{weights} are not unconditionally stable, and contact has no highest frequency "
+                "to choose dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + "
+                "alpha_f, beta >= gamma/2"
             )
 
     @property
@@ -213,8 +231,9 @@ class GeneralisedAlpha(AlphaStep):
     ) -> "GeneralisedAlpha":
         """Return the member of order 2 with this amplification at infinite frequency.
 
-        It goes from 0 (all damped) to 1 (none).
+        0 damps all of it, 1 nothing.
         """
-        alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf), rho_inf / (1.0 + rho_inf)
+        alpha_m = (2.0 * rho_inf - 1.0) / (1.0 + rho_inf)
+        alpha_f = rho_inf / (1.0 + rho_inf)
         apart = alpha_f - alpha_m
         return cls(alpha_m, alpha_f, beta=0.25 * (1.0 + apart) ** 2, gamma=0.5 + apart)

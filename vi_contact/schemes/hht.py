@@ -1,6 +1,4 @@
-"""Step by the method of Hilber, Hughes and Taylor.
-
-It is Newmark's, with the forces but not the inertia before its end.
+"""Step by the method of Hilber, Hughes and Taylor: Newmark's, with forces before the end.
 
     M a1 + C v_f + K u_f = (1 + alpha) f1 - alpha f0 - B_nᵀ r_n,f - B_tᵀ r_t,f
     (…)_f = (1 + alpha) (…)1 - alpha (…)0
@@ -26,7 +24,11 @@ from .generalised_alpha import AlphaStep, GeneralisedAlpha
 
 @dataclass(frozen=True)
 class HHT(AlphaStep):
-    """Step by the module's equations."""
+    """Step by the module's equations.
+
+    Attributes:
+        alpha: minus the weight of the old forces; -1/3 damps most, 0 nothing.
+    """
 
     alpha: Annotated[
         float,
@@ -38,5 +40,5 @@ class HHT(AlphaStep):
 
     @cached_property
     def weights(self) -> GeneralisedAlpha:
-        """Return the weights as a generalised-alpha member."""
+        """Return the member of generalised-alpha that the scheme is."""
         return GeneralisedAlpha(0.0, -self.alpha, 0.25 * (1.0 - self.alpha) ** 2, 0.5 - self.alpha)

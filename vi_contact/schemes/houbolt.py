@@ -1,6 +1,4 @@
-"""Step by Houbolt's method.
-
-Velocity and acceleration at the end are those of the cubic through four displacements.
+"""Step by Houbolt's method: rates at the end are those of the cubic through four displacements.
 
     dt v1  = 11/6 u1 - 3 u0 + 3/2 u(-1) - 1/3 u(-2)
     dt² a1 = 2 u1 - 5 u0 + 4 u(-1) - u(-2)

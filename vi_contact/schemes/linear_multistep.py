@@ -1,6 +1,4 @@
-"""Step with the general linear multistep operators of the boundary method.
-
-They are eqs. 11a,b, with Newmark as one member.
+"""Step with the general linear multistep operators of the boundary method, its eqs. 11a,b.
 
     sum_r a[r] u(p-r)     = dt    sum_r b[r] u'(p-r)          (11a)
     sum_r gamma[r] u(p-r) = mu dt² sum_r b[r] u''(p-r)        (11b)     r = 0..q, b[0] != 0
@@ -36,21 +34,27 @@ from ..core.problem import ContactProblem
 from ..core.quantities import RATIO, Finite
 from ..core.step import Balance, State, StepProblem, StepResult
 from .base import BalanceStep, position_step
-from .consistent_data import consistent_acceleration, equilibrated, massless_take
-from .generalised_alpha import weighted
+from .consistent_data import consistent_acceleration, equilibrate, replace_massless
+from .generalised_alpha import balance_ends
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
 DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
+CONSISTENT = 1e-12  # relative; defects of the operators that are round-off
+STABLE = 1.0 + 1e-6  # amplification: double roots on the unit circle have no more digits
 
 
 @dataclass(frozen=True)
 class LinearMultistep(BalanceStep):
     """Step with the coefficients of a linear multistep method.
 
-    The newest level is first; all are of one length q + 1 >= 2.
+    InputError is raised for unequal lengths, for b[0] = 0, and for operators that are not exact for
+    u = 1, t and t², or not unconditionally stable.
 
-    InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u =
-    1, t and t²).
+    Attributes:
+        a: factors of u in eq. 11a, the newest level first, q + 1 >= 2 of them.
+        b: factors of u' in eq. 11a, and of u'' in eq. 11b, as many.
+        gamma: factors of u in eq. 11b, as many.
+        mu: factor of the right-hand side of eq. 11b.
     """
 
     by_rows: ClassVar[bool] = True
@@ -74,8 +78,11 @@ class LinearMultistep(BalanceStep):
                 "LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit "
                 "schemes can hold contact"
             )
+
+        # Consistency: what eq. 11a misses for u = 1 and t, and eq. 11b for u = 1, t and t², where
+        # levels are one apart and the newest is at t = 0.
         level = -np.arange(q + 1.0)
-        a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
+        a, b, gamma = self._operators()
         defects = (
             a.sum(),
             a @ level - b.sum(),
@@ -84,31 +91,39 @@ class LinearMultistep(BalanceStep):
             gamma @ level**2 - 2.0 * self.mu * b.sum(),
         )
         scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
-        if not np.max(np.abs(defects)) <= 1e-12 * scale * (q + 1) ** 2:
+        if not np.max(np.abs(defects)) <= CONSISTENT * scale * (q + 1) ** 2:
             raise InputError(
                 "LinearMultistep coefficients are inconsistent: give some for which eq. 11a is "
                 "exact for u = 1, t and eq. 11b for u = 1, t, t²"
             )
-        if self.spectral_radius() > 1.0 + 1e-6:
+        if self.spectral_radius() > STABLE:
             raise InputError(
                 f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not "
                 "unconditionally stable: contact has no highest frequency to choose dt by; take "
                 "other coefficients, for Newmark beta >= gamma/2 >= 1/4"
             )
 
-    def spectral_radius(self) -> float:
-        """Return the largest |z| of the solutions u(p) = z^p over FREQUENCIES and DAMPING.
-
-        The solutions are those of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and DAMPING xi:
-        roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z).
-        """
-        a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
-        polynomials = [b] + [
-            gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING
-        ]
-        return max(
-            float(np.max(np.abs(np.roots(polynomial)), initial=0.0)) for polynomial in polynomials
+    def _operators(self) -> tuple[Array, Array, Array]:
+        """Return a, b and gamma as arrays (q + 1,)."""
+        return (
+            np.asarray(self.a, dtype=float),
+            np.asarray(self.b, dtype=float),
+            np.asarray(self.gamma, dtype=float),
         )
+
+    def spectral_radius(self) -> float:
+        """Return the largest amplification |z| of solutions u(p) = z^p.
+
+        They are those of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and DAMPING xi: roots of
+        gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z).
+        """
+        a, b, gamma = self._operators()
+        polynomials = [b]  # of infinite frequency
+        for w in FREQUENCIES:
+            for xi in DAMPING:
+                polynomials.append(gamma / (self.mu * w**2) + 2.0 * xi / w * a + b)
+        radii = [np.max(np.abs(np.roots(p)), initial=0.0) for p in polynomials]
+        return float(max(radii))
 
     @classmethod
     def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> "LinearMultistep":
@@ -122,31 +137,43 @@ class LinearMultistep(BalanceStep):
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
 
-    def _factors(self, dt: float) -> tuple[float, float]:
+    def _derivatives(self, dt: float) -> tuple[float, float]:
         """Return dv/du and da/du of the newest level."""
-        return self.a[0] / (dt * self.b[0]), self.gamma[0] / (self.mu * dt**2 * self.b[0])
+        dv_du = self.a[0] / (dt * self.b[0])
+        da_du = self.gamma[0] / (self.mu * dt**2 * self.b[0])
+        return dv_du, da_du
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state with a past, unless it has one for this dt.
+        """Return the state with a past for this dt, and massless nodes in equilibrium.
 
-        Massless nodes come into equilibrium, once.
+        A state that has such a past is good as it is. For a new dt the past is filled in anew with
+        the acceleration that is known.
         """
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
-            return self._restarted(problem, equilibrated(problem, state), dt)
+            return self._restart(problem, equilibrate(problem, state), dt)
         if np.array_equal(memory["dt"], [dt]) and f"a_{len(self.a) - 2}" in memory:
             return state
-        return self._with_past(state, memory["a_0"], memory["reaction_0"], dt)
+        return self._fill_past(state, memory["a_0"], memory["reaction_0"], dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the past of the new velocity."""
-        return self._restarted(problem, state.with_velocity(v), dt)
+        return self._restart(problem, state.with_velocity(v), dt)
 
-    def _restarted(self, problem: ContactProblem, state: State, dt: float) -> State:
-        return self._with_past(state, *consistent_acceleration(problem, state, dt), dt)
+    def _restart(self, problem: ContactProblem, state: State, dt: float) -> State:
+        """Return the state with the past of the acceleration that fits it."""
+        a, reaction = consistent_acceleration(problem, state, dt)
+        return self._fill_past(state, a, reaction, dt)
 
-    def _with_past(self, state: State, a: Array, reaction: Array, dt: float) -> State:
-        """Return the state with levels 1..q before it under constant acceleration a."""
+    def _fill_past(self, state: State, a: Array, reaction: Array, dt: float) -> State:
+        """Return the state with levels 1..q before it, under constant acceleration.
+
+        Args:
+            state: the state.
+            a: the acceleration (n,) [m/s²].
+            reaction: Bᵀr (n,) [N] beside it.
+            dt: distance of the levels [s].
+        """
         past = {"a_0": a, "reaction_0": reaction, "dt": np.array([dt]), "t": np.array([state.t])}
         for r in range(1, len(self.a)):
             back = r * dt
@@ -157,19 +184,19 @@ class LinearMultistep(BalanceStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A of the module's equations."""
-        damping, inertia = self._factors(dt)
-        return problem.equations.effective(m=inertia, c=damping, k=1.0)
+        dv_du, da_du = self._derivatives(dt)
+        return problem.equations.effective(m=da_du, c=dv_du, k=1.0)
 
     def _levels(self, state: State) -> dict[str, Array]:
-        """u, v, a at the q levels before the step, 1 = newest."""
+        """Return u, v and a at the q levels before the step, of which 1 is the newest."""
         levels = {"u_1": state.u, "v_1": state.v, "a_1": state.memory["a_0"]}
         for r in range(2, len(self.a)):
             for name in "uva":
                 levels[f"{name}_{r}"] = state.memory[f"{name}_{r - 1}"]
         return levels
 
-    def _known(self, levels: dict[str, Array], dt: float) -> tuple[Array, Array]:
-        """(v, a) of the new level for u = 0: the parts of eqs. 11c,d that the past fixes."""
+    def _known_rates(self, levels: dict[str, Array], dt: float) -> tuple[Array, Array]:
+        """Return v and a of the new level for u = 0: parts of eqs. 11c,d that the past fixes."""
         v = np.zeros_like(levels["u_1"])
         a = np.zeros_like(v)
         for r in range(1, len(self.a)):
@@ -182,7 +209,7 @@ class LinearMultistep(BalanceStep):
     ) -> StepProblem:
         """Return the step with b = f(t_p) - M a_known - C v_known."""
         system = problem.equations
-        v, a = self._known(self._levels(state), dt)
+        v, a = self._known_rates(self._levels(state), dt)
         b = system.load_at(state.t + dt) - system.M @ a
         if system.C is not None:
             b -= system.C @ v
@@ -196,28 +223,22 @@ class LinearMultistep(BalanceStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with velocity and acceleration from eqs. 11c,d.
-
-        The levels move one down.
-        """
+        """Return the state with velocity and acceleration from eqs. 11c,d, its levels one older."""
         levels = self._levels(state)
-        (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
-        v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
-        a = massless_take(problem, 0.0, a_known + by_a * result.x)
-        reaction = problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t)
-        newest = {
+        v_known, a_known = self._known_rates(levels, dt)
+        dv_du, da_du = self._derivatives(dt)
+        mean = (result.x - state.u) / dt
+        v = replace_massless(problem, v_known + dv_du * result.x, mean)
+        a = replace_massless(problem, a_known + da_du * result.x, 0.0)
+        memory = {
+            **levels,
             "a_0": a,
-            "reaction_0": reaction,
+            "reaction_0": problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t),
             "dt": state.memory["dt"],
             "t": np.array([step.t]),
         }
-        return State(
-            step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t
-        )
+        return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the mean of the equations of motion at both ends of the step.
-
-        The old end is that after its impact.
-        """
-        return weighted(problem, old, new, 0.5, 0.5, "_0")
+        """Return the mean of the equations of motion at both ends, the old one after its impact."""
+        return balance_ends(problem, old, new, 0.5, 0.5, "_0")

@@ -40,8 +40,10 @@ from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.quantities import RATIO, Between
 from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, means, stepped
+from .base import SingleStep, balance_means, end_step
 from .consistent_data import ROUND_OFF
+
+SLACK = 1e-12  # round-off in the largest theta
 
 
 @dataclass(frozen=True)
@@ -68,18 +70,15 @@ class MoreauJean(SingleStep):
 
     def __post_init__(self) -> None:
         check_fields(self)
-        largest = 1.0 / (1.0 + self.e)
-        if self.theta > largest + 1e-12 and not self.allow_energy_gain:
+        most = 1.0 / (1.0 + self.e)
+        if self.theta > most + SLACK and not self.allow_energy_gain:
             raise InputError(
                 f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give "
-                f"theta from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True"
+                f"theta from 0.5 to 1/(1 + e) = {most:g}, or allow_energy_gain=True"
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for what does not suit the scheme.
-
-        This is massless contact nodes, springs, an impact law, or a bilateral point with a gap.
-        """
+        """Raise InputError for massless nodes, springs, an impact law, or a bilateral gap."""
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
@@ -104,22 +103,23 @@ class MoreauJean(SingleStep):
             m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2, shares=True
         )
 
-    def _load(self, problem: ContactProblem, t: float, dt: float) -> Array:
-        load = problem.equations.load_at
-        return (1.0 - self.theta) * load(t) + self.theta * load(t + dt)
+    def _mean_load(self, problem: ContactProblem, t: float, dt: float) -> Array:
+        """Return f_θ (n,) [N] of the step from t to t + dt [s]."""
+        load_at = problem.equations.load_at
+        return (1.0 - self.theta) * load_at(t) + self.theta * load_at(t + dt)
 
-    def _target(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Return the largest normal velocity after the step of a closed point.
-
-        All refer to the velocity of the obstacle.
-        """
-        surface, advance = problem.surface, problem.surface.advance(state.t, state.t + dt)
+    def _bound(self, problem: ContactProblem, state: State, dt: float) -> Array:
+        """Return the largest normal velocities (m,) [m/s] of closed points after the step."""
+        surface = problem.surface
+        advance = surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt
+
+        # Relative to the obstacle, points that approach obey Newton's law, and points that had
+        # begun to separate the bound that creates no energy (see the head of this module).
         v_n = surface.normal_values(state.v) - obstacle
-        returning = -self.e if self.allow_energy_gain else -(1.0 - self.theta) / self.theta
-        return obstacle + np.where(
-            surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n
-        )
+        separating = -self.e if self.allow_energy_gain else -(1.0 - self.theta) / self.theta
+        restitution = np.where(v_n < 0.0, separating, -self.e)
+        return obstacle + np.where(surface.bilateral, 0.0, restitution * v_n)
 
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
@@ -128,27 +128,28 @@ class MoreauJean(SingleStep):
 
         b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0).
         """
-        system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
-        force = self._load(problem, state.t, dt) - system.product("K", state.u)
-        force -= self.theta * left * dt * system.product("K", state.v)
+        system = problem.equations
+        surface = problem.surface
+        rest = 1.0 - self.theta
+        force = self._mean_load(problem, state.t, dt) - system.product("K", state.u)
+        force -= self.theta * rest * dt * system.product("K", state.v)
         if system.C is not None:
-            force -= left * system.product("C", state.v)
-        middle = surface.gap(state.t + 0.5 * dt) - surface.normal_values(
-            state.u + 0.5 * dt * state.v
-        )
+            force -= rest * system.product("C", state.v)
+
+        # Points are closed that would be in the obstacle in the middle of the step if nothing
+        # stopped them, and held points.
+        u_middle = state.u + 0.5 * dt * state.v
+        gap = surface.gap(state.t + 0.5 * dt) - surface.normal_values(u_middle)
         size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
-        # if nothing stops them; and held points
-        closed = np.asarray((middle <= ROUND_OFF * size) | surface.bilateral)
+        closed = np.asarray((gap <= ROUND_OFF * size) | surface.bilateral)
+
+        # The slip rate is the tangential velocity relative to the obstacle.
         sliding = surface.sliding(state.t, state.t + dt)
-        slip = (
-            np.zeros((surface.count, surface.tangents.shape[1]))
-            if sliding is None
-            else sliding / dt
-        )
+        slip0 = np.zeros(surface.tangents.shape) if sliding is None else sliding / dt
         return StepProblem(
             A=A,
             b=system.product("M", state.v) + dt * force,
-            bound=np.where(closed, self._target(problem, state, dt), np.inf),
+            bound=np.where(closed, self._bound(problem, state, dt), np.inf),
             surface=surface,
             scale=dt,
             guess=state.v,
@@ -156,7 +157,7 @@ class MoreauJean(SingleStep):
             t=state.t + dt,
             k=state.k + 1,
             friction=problem.friction,
-            slip0=slip if problem.frictional else None,
+            slip0=slip0 if problem.frictional else None,
             rate_factor=1.0,
         )
 
@@ -170,15 +171,10 @@ class MoreauJean(SingleStep):
     ) -> State:
         """Return the state with u1 = u0 + dt v_θ."""
         u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
-        return stepped(step, result, u, result.x)
+        return end_step(step, result, u, result.x)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the equation above."""
-        return means(
-            problem,
-            old,
-            new,
-            dt,
-            u=old.u + self.theta * (new.u - old.u),
-            f=self._load(problem, old.t, dt),
-        )
+        """Return the averages of the module's equation."""
+        u = old.u + self.theta * (new.u - old.u)
+        f = self._mean_load(problem, old.t, dt)
+        return balance_means(problem, old, new, dt, u=u, f=f)

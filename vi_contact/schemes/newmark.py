@@ -1,6 +1,4 @@
-"""Step by Newmark's method.
-
-The equation of motion, with contact in it, holds at the end of the step.
+"""Step by Newmark's method: the equation of motion, with contact, holds at the end of the step.
 
     u1 = u0 + dt v0 + dt² ((½ - beta) a0 + beta a1),    v1 = v0 + dt ((1 - gamma) a0 + gamma a1)
     M a1 + C v1 + K u1 = f1 - B_nᵀ r_n1 - B_tᵀ r_t1
@@ -28,27 +26,29 @@ from functools import cached_property
 
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State
-from .generalised_alpha import AlphaStep, GeneralisedAlpha, weighted
+from .generalised_alpha import AlphaStep, GeneralisedAlpha, balance_ends
 
 
 @dataclass(frozen=True)
 class Newmark(AlphaStep):
-    """Step by the module's equations. InputError unless beta >= gamma/2 >= ¼."""
+    """Step by the module's equations; InputError is raised unless beta >= gamma/2 >= ¼.
+
+    Attributes:
+        beta: weight of a1 in u1.
+        gamma: weight of a1 in v1.
+    """
 
     beta: float = 0.25
     gamma: float = 0.5
 
     def __post_init__(self) -> None:
-        _ = self.weights
+        _ = self.weights  # checks them
 
     @cached_property
     def weights(self) -> GeneralisedAlpha:
-        """Return the weights as a generalised-alpha member."""
+        """Return the member of generalised-alpha that the scheme is."""
         return GeneralisedAlpha(0.0, 0.0, self.beta, self.gamma)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equations of both ends.
-
-        Their weights make M a the change of momentum.
-        """
-        return weighted(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)
+        """Return the equations of both ends, weighted so that M a dt is the change of momentum."""
+        return balance_ends(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)

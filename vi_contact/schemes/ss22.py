@@ -1,6 +1,4 @@
-"""Step by SS22, a form of the Zienkiewicz-Wood-Taylor method.
-
-It is the single-step form with two weights theta1, theta2.
+"""Step by SS22, the single-step form of Zienkiewicz, Wood and Taylor with two weights.
 
     u(tau) = u0 + v0 tau + ½ alpha tau²
     weighted residual with mean values of tau/dt (theta1) and (tau/dt)² (theta2):
@@ -25,14 +23,18 @@ from ..core.checks import real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, means, position_step, stepped
+from .base import SingleStep, balance_means, end_step, position_step
 
 
 @dataclass(frozen=True)
 class SS22(SingleStep):
-    """Step by the module's equations.
+    """Step by the module's equations; InputError is raised unless theta2 >= theta1 >= ½.
 
-    InputError unless theta2 >= theta1 >= ½ (else only conditionally stable).
+    Other weights are stable for small steps only.
+
+    Attributes:
+        theta1: mean of tau/dt.
+        theta2: mean of (tau/dt)².
     """
 
     by_rows: ClassVar[bool] = True
@@ -49,10 +51,9 @@ class SS22(SingleStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
-        theta1, theta2 = self.theta1, self.theta2
-        return problem.equations.effective(
-            m=2.0 / (theta2 * dt**2), c=2.0 * theta1 / (theta2 * dt), k=1.0
-        )
+        m = 2.0 / (self.theta2 * dt**2)
+        c = 2.0 * self.theta1 / (self.theta2 * dt)
+        return problem.equations.effective(m=m, c=c, k=1.0)
 
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
@@ -60,9 +61,8 @@ class SS22(SingleStep):
         """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
         system = problem.equations
         guess = state.u + dt * state.v
-        force = system.load_at(state.t + self.theta1 * dt) - system.K @ (
-            state.u + self.theta1 * dt * state.v
-        )
+        u_mean = state.u + self.theta1 * dt * state.v
+        force = system.load_at(state.t + self.theta1 * dt) - system.K @ u_mean
         if system.C is not None:
             force -= system.C @ state.v
         b = A @ guess + force / self.theta2
@@ -78,13 +78,12 @@ class SS22(SingleStep):
     ) -> State:
         """Return the state with alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
         v = state.v + 2.0 * (result.x - step.guess) / dt
-        return stepped(step, result, result.x, v)
+        return end_step(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the residual equation."""
         alpha = (new.v - old.v) / dt
         u = old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha
-        mean = means(
-            problem, old, new, dt, u=u, f=problem.equations.load_at(old.t + self.theta1 * dt)
-        )
-        return replace(mean, v=old.v + self.theta1 * dt * alpha)
+        f = problem.equations.load_at(old.t + self.theta1 * dt)
+        balance = balance_means(problem, old, new, dt, u=u, f=f)
+        return replace(balance, v=old.v + self.theta1 * dt * alpha)

@@ -26,16 +26,18 @@ from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
 from ..laws.mass import Redistributed
-from .base import check_balance, means, position_step, stepped
-from .consistent_data import equilibrated, massless_take
+from .base import balance_means, check_balance, end_step, position_step
+from .consistent_data import equilibrate, replace_massless
 
 
 @dataclass(frozen=True)
 class Trapezoidal:
     """Step by the module's equations.
 
-    ``mass``: the mass matrix for problems that do not name
-    one.
+    The memory of its states is "force", f - K u - Bᵀr (n,) [N].
+
+    Attributes:
+        mass: the mass law for problems that do not name one.
     """
 
     by_rows: ClassVar[bool] = True
@@ -47,10 +49,9 @@ class Trapezoidal:
         provides("Trapezoidal", "mass", self.mass, ("apply",), remedy, lacks=("target",))
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes.
+        """Raise InputError for an impact law on massless contact nodes, or for a second mass law.
 
-        So it does for a mass of its own beside that of the problem. Warn when contact nodes have
-        mass.
+        Warn when contact nodes have mass.
         """
         if self.mass not in (Redistributed(), problem.mass):
             raise InputError(
@@ -62,20 +63,18 @@ class Trapezoidal:
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state with massless nodes in equilibrium.
 
-        This is done once, not on restarts and changes of dt.
+        On a restart, and for a new dt, the state is good as it is.
         """
         if "force" in state.memory:
             return state
-        return self._with_force(problem, equilibrated(problem, state))
+        return self._remember_force(problem, equilibrate(problem, state))
 
-    def _with_force(self, problem: ContactProblem, state: State) -> State:
-        """Keep f - K u - Bᵀr of the state: the next step starts with it."""
+    def _remember_force(self, problem: ContactProblem, state: State) -> State:
+        """Return the state with f - K u - Bᵀr in its memory: the next step starts with it."""
         system = problem.equations
         reaction = problem.surface.reaction_load(state.r_n, system.rows, state.r_t)
-        return replace(
-            state,
-            memory={"force": system.load_at(state.t) - system.product("K", state.u) - reaction},
-        )
+        force = system.load_at(state.t) - system.product("K", state.u) - reaction
+        return replace(state, memory={"force": force})
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the new velocity; forces do not depend on it."""
@@ -109,14 +108,16 @@ class Trapezoidal:
         Massless unknowns get the mean velocity of the step.
         """
         mean = (result.x - state.u) / dt
-        v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)
-        return self._with_force(problem, stepped(step, result, result.x, v))
+        v = replace_massless(problem, 2.0 / dt * (result.x - state.u) - state.v, mean)
+        return self._remember_force(problem, end_step(step, result, result.x, v))
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the means of both ends."""
-        load = problem.equations.load_at
-        r_t = None if new.r_t is None else 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)
-        end = means(
-            problem, old, new, dt, u=0.5 * (old.u + new.u), f=0.5 * (load(old.t) + load(new.t))
-        )
-        return replace(end, r_n=0.5 * (old.r_n + new.r_n), r_t=r_t)
+        load_at = problem.equations.load_at
+        u = 0.5 * (old.u + new.u)
+        f = 0.5 * (load_at(old.t) + load_at(new.t))
+        balance = balance_means(problem, old, new, dt, u=u, f=f)
+        r_t = None
+        if new.r_t is not None:
+            r_t = 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)
+        return replace(balance, r_n=0.5 * (old.r_n + new.r_n), r_t=r_t)

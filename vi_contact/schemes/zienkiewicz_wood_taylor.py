@@ -1,6 +1,4 @@
-"""Step as Zienkiewicz, Wood and Taylor do.
-
-Displacement and velocity are interpolated independently.
+"""Step as Zienkiewicz, Wood and Taylor do, with independent displacement and velocity.
 
 Linear u and v over the step, weighted residual with weight phi (docs/reference/sources.md [2]):
 
@@ -25,12 +23,16 @@ from ..core.arguments import check_fields
 from ..core.problem import ContactProblem
 from ..core.quantities import Between
 from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, means, position_step, stepped
+from .base import SingleStep, balance_means, end_step, position_step
 
 
 @dataclass(frozen=True)
 class ZienkiewiczWoodTaylor(SingleStep):
-    """Step by the module's equations."""
+    """Step by the module's equations.
+
+    Attributes:
+        phi: weight of the end of the step.
+    """
 
     by_rows: ClassVar[bool] = True
 
@@ -47,7 +49,8 @@ class ZienkiewiczWoodTaylor(SingleStep):
             m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0, shares=True
         )
 
-    def _load(self, problem: ContactProblem, state: State, dt: float) -> Array:
+    def _mean_load(self, problem: ContactProblem, state: State, dt: float) -> Array:
+        """Return f (n,) [N] at t0 + phi dt."""
         return problem.equations.load_at(state.t + self.phi * dt)
 
     def step(
@@ -57,8 +60,9 @@ class ZienkiewiczWoodTaylor(SingleStep):
 
         b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0.
         """
-        system, phi = problem.equations, self.phi
-        b = self._load(problem, state, dt) / phi
+        system = problem.equations
+        phi = self.phi
+        b = self._mean_load(problem, state, dt) / phi
         b += (system.product("M", state.u) + dt * system.product("M", state.v)) / (phi * dt) ** 2
         b -= (1.0 - phi) / phi * system.product("K", state.u)
         if system.C is not None:
@@ -75,15 +79,10 @@ class ZienkiewiczWoodTaylor(SingleStep):
     ) -> State:
         """Return the state with v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
         v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
-        return stepped(step, result, result.x, v)
+        return end_step(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the equation above."""
-        return means(
-            problem,
-            old,
-            new,
-            dt,
-            u=old.u + self.phi * (new.u - old.u),
-            f=self._load(problem, old, dt),
-        )
+        """Return the averages of the module's equation."""
+        u = old.u + self.phi * (new.u - old.u)
+        f = self._mean_load(problem, old, dt)
+        return balance_means(problem, old, new, dt, u=u, f=f)

@@ -17,10 +17,10 @@ from ..core.checks import on_all
 from ..core.collective import together_if_own
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
-from ..core.products import frozen
-from ..core.stages import stage
+from ..core.products import freeze
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
+from ..core.timing import report_time
 from ..core.verify import kkt_residual
 from .correction import corrected
 from .door import refuse_matrix, refuse_nan
@@ -71,7 +71,7 @@ class CertifiedSolver:
     def _get(self, rank: int) -> PreparedSolver:
         """Return the solver of that rank of escalation, prepared when first needed."""
         if rank not in self._prepared:
-            prepare = stage("preparing")(self._solvers[rank].prepare)
+            prepare = report_time("preparing")(self._solvers[rank].prepare)
             self._prepared[rank] = prepare(self._A, self._surface, self._scale)
         return self._prepared[rank]
 
@@ -90,7 +90,7 @@ class CertifiedSolver:
             except StepFailure as failure:
                 tried.append(str(failure))
                 continue
-            frozen(result.x)
+            freeze(result.x)
             certificate = kkt_residual(step, result)
             if max(NEAR * self._tolerance, result.aim) < certificate.worst < FAR:
                 solve, goal = self._get(rank).solve, NEAR * self._tolerance

@@ -27,11 +27,11 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.checks import instance, provides
 from ..core.problem import ContactProblem
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.sizes import refuse_dense
-from ..core.stages import stage
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
+from ..core.timing import report_time
 from ..kernels.condensation import Condensation, Last, condense
 from .certified import check_laws
 from .friction.condensed import CondensedFriction
@@ -138,7 +138,7 @@ class PreparedCondensed:
         )
         return made, self._settings.method.prepare(made.flexibility, bilateral)
 
-    @stage("condensing")
+    @report_time("condensing")
     def _condensed(self, *, frictional: bool) -> Condensation:
         """Return A condensed, with the compliance of the support in its flexibility."""
         made, surface = condense(self._A, self._surface, frictional=frictional), self._surface
@@ -196,5 +196,5 @@ class PreparedCondensed:
         r, active, counts, failed = small.solve_many(
             many.bound - condensed.free(many.b), many.active
         )
-        x = frozen(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
+        x = freeze(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
         return Answers(StepResult(x, r, active, 0, self._name), counts, failed)

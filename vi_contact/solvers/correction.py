@@ -26,7 +26,7 @@ from ..core.algebra import Array
 from ..core.certificate import Certificate
 from ..core.collective import limit_of
 from ..core.errors import StepFailure
-from ..core.products import frozen
+from ..core.products import freeze
 from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -133,7 +133,7 @@ def corrected(
             better = added(step, result, solve(left_over(step, result, share)), share)
         except StepFailure:
             break
-        frozen(better.x)
+        freeze(better.x)
         found, before = kkt_residual(step, better), certificate.worst
         if not found.worst < before:
             break

@@ -22,8 +22,8 @@ from ...core.algebra import Array, from_each
 from ...core.checks import instance
 from ...core.collective import Parts, agree
 from ...core.quantities import Unit
-from ...core.stages import stage
 from ...core.system import Load, SemiDiscreteSystem
+from ...core.timing import report_time
 from ...laws.free_motions import Unheld, floats
 from ...laws.materials import Damping, Section
 from .. import compat
@@ -62,7 +62,7 @@ LIGHTER = (
 )
 
 
-@stage("assembling")
+@report_time("assembling")
 def assemble(
     mesh: Any,
     material: Materials | None = None,

@@ -18,13 +18,13 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, Matrix, largest
 from ...core.checks import at
-from ...core.corners import PARALLEL, at_right_angles, corner_of
+from ...core.corners import PARALLEL, are_orthogonal, corner_frame
 from ...core.errors import InputError
 from ...core.surfaces import (
     ContactSurface,
+    group_same_nodes,
     nodal_blocks,
     nodal_frames,
-    same_node,
     tangential_columns,
 )
 from ..mesh.nodal_space import NodalSpace
@@ -113,7 +113,7 @@ class NodalFrames:
         self.turns = self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
         # nodes with several conditions have all their directions in it
-        for slots in same_node(self.place):
+        for slots in group_same_nodes(self.place):
             self._refuse_dependent(slots)
             self._turn_corner(slots)
         self.oblique = not np.array_equal(self.turns, self.blocks)
@@ -121,10 +121,10 @@ class NodalFrames:
     def _turn_corner(self, slots: Indices) -> None:
         """Give a node with several conditions its frame."""
         node = self.place[slots[0]]
-        self.column[slots], block = corner_of(self.directions[slots])
+        self.column[slots], block = corner_frame(self.directions[slots])
         self.blocks[node] = block
         self.turns[node] = (
-            block if at_right_angles(self.directions[slots]) else np.linalg.inv(block).T
+            block if are_orthogonal(self.directions[slots]) else np.linalg.inv(block).T
         )
         free = ~np.isin(np.arange(len(block)), self.column[slots])
         self.rubs[slots] = False

@@ -25,9 +25,9 @@ from ...core.checks import at, flag, optional, provides
 from ...core.collective import together
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
-from ...core.stages import stage
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
+from ...core.timing import report_time
 from ...meshes.rows import number_alike
 from ..body.space import FemSpace
 from ..mesh.tagged_mesh import Facets
@@ -47,7 +47,7 @@ from .watching import Watched, clamped_or_prescribed, watched_nodes
 log = logging.getLogger(__name__)
 
 
-@stage("contact")
+@report_time("contact")
 def contact_pair(
     system: SemiDiscreteSystem,
     facets1: Facets,

@@ -12,7 +12,7 @@ from ...core.algebra import Array, Indices
 from ...core.checks import array, instance, integers, optional, provides
 from ...core.collective import agree, together
 from ...core.errors import InputError
-from ...core.obstacles import Obstacle, admissible_gap, facing
+from ...core.obstacles import Obstacle, admissible_gap, locate_obstacle
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..matrices.own_matrices import MatrixSpace
@@ -108,7 +108,7 @@ def contact_points(
     gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
     if obstacle is not None:
         with together(space.comm):  # an obstacle of the user's may fail on one rank
-            directions, gap = facing(obstacle, every.points, every.normals)
+            directions, gap = locate_obstacle(obstacle, every.points, every.normals)
     if opposite is not None:
         faced = _nodes(
             space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area

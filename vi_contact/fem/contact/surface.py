@@ -16,10 +16,10 @@ from ...core.checks import array, at, flag, optional, provides, several
 from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
 from ...core.errors import InputError
-from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
-from ...core.stages import stage
+from ...core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
 from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
+from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
@@ -36,7 +36,7 @@ from .watching import Watched, clamped_or_prescribed, watched_nodes
 log = logging.getLogger(__name__)
 
 
-@stage("contact")
+@report_time("contact")
 def contact_surface(
     system: SemiDiscreteSystem,
     facets: Facets,
@@ -236,7 +236,7 @@ def _obstacle(
         if not len(points):  # users' functions need not cope with none
             return np.zeros_like(points), np.zeros(0)
         way = Touching() if obstacle is None else obstacle
-        directions, gap = facing(
+        directions, gap = locate_obstacle(
             way, points, normals, name=name, angle=angle, alone=len(points) == count
         )
         return snapped(directions), admissible_gap(gap, points, size)
@@ -280,7 +280,9 @@ def _looking(
         if not len(points):  # users' functions need not cope with none
             return directions, gap
         try:
-            ways, gaps = facing(Touching() if obstacle is None else obstacle, points, normals)
+            ways, gaps = locate_obstacle(
+                Touching() if obstacle is None else obstacle, points, normals
+            )
         except InputError:
             return directions, gap
         cosine = np.sum(ways * normals, axis=1)

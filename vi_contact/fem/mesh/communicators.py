@@ -10,7 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ...core.stages import trim
+from ...core.timing import release_memory
 
 
 class MpiComm:
@@ -71,4 +71,4 @@ def give_back(comm: Any) -> None:
     """
     for _ in range(2):  # what one held may be free only after it
         PETSc.garbage_cleanup(comm)
-    trim()
+    release_memory()

@@ -20,7 +20,7 @@ from ...core.checks import ended, function, instance, mask, provides, refuse, sh
 from ...core.collective import Parts, agree
 from ...core.errors import InputError
 from ...core.files import on_root
-from ...core.stages import stage
+from ...core.timing import report_time
 from ...meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from ...meshes.gmsh_session import MeshScript
 from ...meshes.partition import destinations
@@ -243,7 +243,7 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     return _distribute(comm, lambda: arrays_from_script(mesh))
 
 
-@stage("mesh")
+@report_time("mesh")
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     """Return the mesh that rank 0 produces, distributed, and its groups. Collective.
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import schemes
-from ...core import stages
+from ...core import timing
 from ...core.errors import InputError
 from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located, starters
 from ..studies.cases.short_settings import ShortOptions
@@ -188,7 +188,7 @@ def _run(options: argparse.Namespace) -> str:
     from ..studies.cases.case import read_case  # late: finite elements
 
     comm, path = world(), located(options.case)
-    stages.show(not options.quiet)
+    timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
         seconds_of(options.wall_time)
     if options.steps is not None and options.steps < 1:

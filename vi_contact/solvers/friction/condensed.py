@@ -21,7 +21,7 @@ import numpy as np
 from ...core.algebra import Array, Mask
 from ...core.collective import limit_of, slope_of
 from ...core.errors import ViContactError
-from ...core.products import frozen
+from ...core.products import freeze
 from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...kernels.condensation import Condensation
@@ -118,7 +118,7 @@ class CondensedFriction:
                 counts[row], histories[row] = found.iterations, found.history
             except ViContactError as error:
                 failed[row] = error
-        x = frozen(self.condensed.answer(r.reshape(free.shape), held, places))
+        x = freeze(self.condensed.answer(r.reshape(free.shape), held, places))
         rows = StepResult(x, r[..., 0].copy(), active, 0, self._name, r_t=r[..., 1:].copy())
         return Answers(rows, counts, failed, histories)
 
