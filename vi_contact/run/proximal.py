@@ -29,7 +29,7 @@ from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
-from ..solvers.correction import MARGIN, added, kept, left_over, share_of
+from ..solvers.correction import MARGIN, add, kept_reactions, left_over, share_of
 from .rigid_bodies import RigidBodies, body_springs
 
 ITERATIONS = 200
@@ -153,7 +153,7 @@ class Proximal:
         for _ in range(ITERATIONS):
             inner = self._left_over(answer, share, centre, carried)
             found = self._prepared.solve(inner)
-            result = added(self.step, answer, found, share)
+            result = add(self.step, answer, found, share)
             worst, new = (
                 self.certificate(result).worst,
                 self._motion(result.x - centre, found.active),
@@ -198,7 +198,7 @@ class Proximal:
         K u has none, and its round-off would move the body.
         """
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
-        r_n, r_t = kept(self.step, answer, share)
+        r_n, r_t = kept_reactions(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
         b = (
             left.b
