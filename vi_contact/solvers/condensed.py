@@ -36,7 +36,7 @@ from ..kernels.condensation import Condensation, Last, condense
 from .certified import check_laws
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
-from .friction.problem import FrictionMethod, inner_method
+from .friction.problem import FrictionMethod, check_inner_method
 from .friction.slip_rate import RateIteration
 from .normal.active_set import ActiveSet, PreparedSets
 from .normal.lcp import LCPResult
@@ -85,7 +85,7 @@ class Condensed:
             remedy,
             lacks=("check", "carries_friction"),
         )
-        inner_method("Condensed", "friction_method", self.friction_method)
+        check_inner_method("Condensed", "friction_method", self.friction_method)
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
