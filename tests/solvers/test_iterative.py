@@ -19,9 +19,9 @@ from vi_contact.core.algebra import EffectiveMatrix, SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
-from vi_contact.solvers.iterative.conjugate_gradients import told
+from vi_contact.solvers.iterative.conjugate_gradients import format_residuals
 from vi_contact.solvers.iterative.layout import Nodewise
-from vi_contact.solvers.iterative.preconditioners import KINDS, chosen, courant
+from vi_contact.solvers.iterative.preconditioners import KINDS, choose, courant
 
 M = 8  # contact points of pushed_block
 HALF = np.array([0.3, 0.0] * 4)
@@ -227,9 +227,9 @@ def test_not_a_number_is_a_sentence() -> None:
 
 
 def test_history_shows_first_some_and_last() -> None:
-    assert told([1.0]) == "1.0e+00" and told([]) == "none"
+    assert format_residuals([1.0]) == "1.0e+00" and format_residuals([]) == "none"
     assert (
-        told([10.0**-i for i in range(11)])
+        format_residuals([10.0**-i for i in range(11)])
         == "1.0e+00, 1.0e-02, 1.0e-04, 1.0e-06, 1.0e-08, 1.0e-10"
     )
 
@@ -353,7 +353,7 @@ def test_the_courant_number_follows_the_matrices() -> None:
     assert courant(effective(K, range(4), (0.0, M))) == np.inf
     assert np.isnan(courant(effective(K, range(4))))
     numbers = (0.1, 0.5, 0.6, 30.0, 31.0, np.inf, np.nan)
-    assert [chosen(one, modes=True) for one in numbers] == [
+    assert [choose(one, modes=True) for one in numbers] == [
         "jacobi",
         "jacobi",
         "icc",
@@ -362,4 +362,4 @@ def test_the_courant_number_follows_the_matrices() -> None:
         "gamg",
         "icc",
     ]
-    assert chosen(np.inf, modes=False) == "icc"
+    assert choose(np.inf, modes=False) == "icc"

@@ -29,7 +29,7 @@ from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
-from ..solvers.correction import MARGIN, added, kept, left_over, share_of
+from ..solvers.correction import MARGIN, add, kept_reactions, left_over, share_of
 from .rigid_bodies import RigidBodies, body_springs
 
 ITERATIONS = 200
@@ -192,7 +192,7 @@ class Proximal:
             # One step: an ordinary problem for what the answer leaves over.
             inner = self._left_over(answer, share, centre, carried)
             increment = self._prepared.solve(inner)
-            result = added(self.step, answer, increment, share)
+            result = add(self.step, answer, increment, share)
             worst = self.certificate(result).worst
             new = self._motion(result.x - centre, increment.active)
             progress.take(result, worst, new.pace)
@@ -251,7 +251,7 @@ class Proximal:
         left = left_over(self.step, answer, share)
         x = answer.x
         surface = self.step.surface
-        r_n, r_t = kept(self.step, answer, share)
+        r_n, r_t = kept_reactions(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
         b = (
             left.b

@@ -1,6 +1,4 @@
-"""Choose the route by the size of the problem.
-
-It is condensed where that is faster, iterative where it is not.
+"""Choose the route by the size of the problem: condensed where that is faster, else iterative.
 
 Condensing costs one factor of A, once per dt, and a step then one forward and one backward
 substitution; the iterative route costs some tens of products with A every step, and next to nothing
@@ -29,56 +27,69 @@ IN_SPACE = 20_000
 ALONE_IN_SPACE = 50_000  # the same on one rank, where CHOLMOD factorises
 # rows of the small problem, by dimension: 5000 take 200 MB on every rank
 DENSE = {3: 4_000, 2: 5_000, 1: 5_000}
-TOLERANCE = (
-    1e-12  # of conjugate gradients beside the steps: what starts a run should not be seen in it
-)
+# of conjugate gradients beside the steps: what starts a run should not be seen in it
+TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
 class Automatic:
-    """Solve by ``condensed`` or by ``iterative``.
-
-    It is the one that is faster for the size of the problem.
+    """Solve by the one of two solvers that is faster for the size of the problem.
 
     ``iterative`` solves problems in space from 50 000 unknowns on (20 000 on several ranks, or
     without CHOLMOD), and problems with more contact points (with friction: contact unknowns) than
     4000 in space or 5000 in the plane. ``condensed`` solves all others, and all problems without
-    finite elements. The log says which one is used. If ``iterative`` is None, it is Iterative(),
-    which needs PETSc.
+    finite elements. The log says which one is used.
+
+    Attributes:
+        condensed: the solver of smaller problems.
+        iterative: the solver of larger ones; None stands for Iterative(), which needs PETSc.
     """
 
     condensed: Solver = field(default_factory=Condensed)
     iterative: Solver | None = None
 
     def __post_init__(self) -> None:
+        remedy = "give a solver, or leave it out"
         for name in ("condensed", "iterative"):
-            if getattr(self, name) is not None:
-                provides(
-                    "Automatic",
-                    name,
-                    getattr(self, name),
-                    ("check", "prepare"),
-                    "give a solver, or leave it out",
-                )
+            solver = getattr(self, name)
+            if solver is not None:
+                provides("Automatic", name, solver, ("check", "prepare"), remedy)
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for what the chosen route cannot treat. Collective."""
         self.route(problem.system.K, problem.surface, problem.frictional).check(problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
-        """Return what chooses a route at the first step."""
-        return Chosen(self, A, surface, scale)
+        """Return what chooses a route at the first step.
+
+        Args:
+            A: the effective matrix.
+            surface: the contact surface.
+            scale: of reactions, over which compliances are divided.
+        """
+        return PreparedAutomatic(self, A, surface, scale)
 
     def route(self, matrix: Matrix, surface: ContactSurface, frictional: bool) -> Solver:
-        """Return the solver for a matrix of this size and this surface. Collective."""
+        """Return the solver for a matrix of this size and this surface. Collective.
+
+        Args:
+            matrix: any matrix of the system.
+            surface: the contact surface.
+            frictional: whether tangential unknowns count too.
+        """
         if isinstance(matrix, SerialMatrix):
             return self.condensed
-        dimension, comm = surface.points.shape[1], surface.comm
-        alone = comm.size == 1 and load_cholmod(comm) is not None
-        large = dimension == 3 and total(comm, matrix.rows) >= (
-            ALONE_IN_SPACE if alone else IN_SPACE
-        )
-        if not large and surface.total * (dimension if frictional else 1) <= DENSE[dimension]:
+        dimension = surface.points.shape[1]
+        comm = surface.comm
+
+        # In space from some unknowns on a factor costs more than iterations.
+        has_cholmod = comm.size == 1 and load_cholmod(comm) is not None
+        most = ALONE_IN_SPACE if has_cholmod else IN_SPACE
+        is_large = dimension == 3 and total(comm, matrix.rows) >= most
+
+        # From some contact unknowns on their dense matrix does.
+        contact_unknowns = surface.total * (dimension if frictional else 1)
+        if not is_large and contact_unknowns <= DENSE[dimension]:
             return self.condensed
         if self.iterative is not None:
             return self.iterative
@@ -87,41 +98,51 @@ class Automatic:
         return Iterative()
 
 
-class Chosen:
-    """Choose at the first step, which tells whether it rubs, and solve all by what was chosen."""
+class PreparedAutomatic:
+    """Choose a solver at the first step, which tells whether there is friction, and keep to it."""
 
-    def __init__(self, rule: Automatic, *given: Any) -> None:
-        self._rule, self._given = rule, given
+    def __init__(
+        self, rule: Automatic, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> None:
+        """Note what the chosen solver is prepared with: see ``Automatic.prepare``."""
+        self._rule = rule
+        self._A = A
+        self._surface = surface
+        self._scale = scale
         self._prepared: PreparedSolver | None = None
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the answer of the chosen route. Collective."""
-        return self._chosen(step).solve(step)
+        return self._choose(step).solve(step)
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Any:
-        """Return the answers of the chosen route to several runs; None where it has none."""
-        together = getattr(self._chosen(many), "solve_many", None)
-        return None if together is None else together(many, own)
+        """Return the answers of the chosen route to several steps; None where it has none.
 
-    def _chosen(self, step: StepProblem) -> PreparedSolver:
+        Args:
+            many: the steps; its arrays have a row for each.
+            own: makes the step of one row.
+        """
+        solve_many = getattr(self._choose(many), "solve_many", None)
+        return None if solve_many is None else solve_many(many, own)
+
+    def _choose(self, step: StepProblem) -> PreparedSolver:
+        """Return the prepared solver, chosen by the first step. Collective."""
         if self._prepared is None:
             route = self._rule.route(step.A.matrix, step.surface, step.slip0 is not None)
             if step.surface.comm.rank == 0:
                 log.info(
                     "Automatic: %s for %d contact points", type(route).__name__, step.surface.total
                 )
-            self._prepared = route.prepare(*self._given)
+            self._prepared = route.prepare(self._A, self._surface, self._scale)
         return self._prepared
 
 
 def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
-    """Return what solves the contact problems that schemes pose beside the steps.
+    """Return what solves the contact problems that schemes pose beside the steps. Collective.
 
-    These are posed at the start or of a predictor.
-
-    Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which
-    factorise nothing: these matrices, of mass or of a layer of nodes, are well-conditioned.
-    Volume() for systems that are not symmetric. Collective.
+    Schemes pose them at the start, or for a predictor. Small ones (``core.sizes``) are solved by
+    Condensed(), others by conjugate gradients, which factorise nothing: these matrices, of mass or
+    of a layer of nodes, are well-conditioned. Systems that are not symmetric take Volume().
     """
     if not A.algebra.symmetric:
         from .volume import Volume

@@ -1,6 +1,4 @@
-"""Certify or refuse steps.
-
-There are a solver, the methods to escalate to, and the certificate of every answer.
+"""Certify or refuse steps: try a solver, then the methods to escalate to, and judge each answer.
 
 An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets
 bodies of very unlike stiffness, is corrected by what it leaves over (``correction``) before it is
@@ -22,7 +20,7 @@ from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.timing import report_time
 from ..core.verify import kkt_residual
-from .correction import corrected
+from .correction import correct
 from .door import refuse_matrix, refuse_nan
 
 TOLERANCE = 1e-9
@@ -35,7 +33,7 @@ ADVICE = "try a smaller dt or another solver, or check the data of this time"
 class CertifiedSolver:
     """Try a solver and the methods to escalate to, all bound to one effective matrix.
 
-    Nothing uncertified leaves it.
+    No answer without a certificate below the tolerance leaves it.
     """
 
     def __init__(
@@ -49,18 +47,31 @@ class CertifiedSolver:
         surface: ContactSurface | None = None,
         advice: str = ADVICE,
     ) -> None:
+        """Check the problem, and prepare the first solver. Collective.
+
+        Args:
+            problem: the contact problem.
+            A: the effective matrix of its steps.
+            scale: of reactions, over which compliances are divided.
+            solvers: the solver, and the methods to escalate to.
+            tolerance: the largest residual of a certificate.
+            surface: in the place of the problem's.
+            advice: end of the sentence that refuses a step.
+
+        Raises:
+            InputError: the problem, or a matrix that is not finite, does not suit a solver.
+        """
         for solver in solvers:
             solver.check(problem)
-        self._surface, self._A, self._scale, self._advice = (
-            surface or problem.surface,
-            A,
-            scale,
-            advice,
-        )
-        self._solvers, self._tolerance = solvers, tolerance
+        self._problem = problem
+        self._A = A
+        self._scale = scale
+        self._solvers = solvers
+        self._tolerance = tolerance
+        self._surface = surface or problem.surface
+        self._advice = advice
         self._prepared: dict[int, PreparedSolver] = {}
         refuse_matrix(problem, A)
-        self._problem = problem
         self._get(0)
 
     @property
@@ -76,41 +87,54 @@ class CertifiedSolver:
         return self._prepared[rank]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
-        """Return (result, certificate, escalated) of the first method below tolerance.
+        """Return the first answer whose certificate is below the tolerance. Collective.
+
+        Returns:
+            The answer, its certificate, and whether it is by a method that was escalated to.
 
         Raises:
-            StepFailure: there is none.
+            StepFailure: no method has such an answer; the error says what each one gave.
         """
         refuse_nan(step, lambda: self._problem.equations)
-        tried = []
-        for rank in range(len(self._solvers)):
+        failures = []
+        for rank, solver in enumerate(self._solvers):
             try:
-                with together_if_own(self._surface.comm, self._solvers[rank]):
+                with together_if_own(self._surface.comm, solver):
                     result = self._get(rank).solve(step)
             except StepFailure as failure:
-                tried.append(str(failure))
+                failures.append(str(failure))
                 continue
             freeze(result.x)
             certificate = kkt_residual(step, result)
-            if max(NEAR * self._tolerance, result.aim) < certificate.worst < FAR:
-                solve, goal = self._get(rank).solve, NEAR * self._tolerance
-                result, certificate = corrected(step, result, certificate, solve, goal)
+
+            # Round-off that comes near the tolerance is corrected; larger residuals have causes
+            # that no correction removes, and no solver is asked for more than it aims at.
+            goal = NEAR * self._tolerance
+            if max(goal, result.aim) < certificate.worst < FAR:
+                solve = self._get(rank).solve
+                result, certificate = correct(step, result, certificate, solve, goal)
             if certificate.worst <= self._tolerance:
                 return result, certificate, rank > 0
-            tried.append(f"{result.method}: {certificate}")
+            failures.append(f"{result.method}: {certificate}")
         raise StepFailure(
             f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "
-            f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}"
+            f"{self._tolerance:g} ({'; '.join(failures)}): {self._advice}"
         )
 
 
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
-    """Raise InputError for laws that do not fit.
+    """Raise InputError for laws and matrices that do not suit a solver. Collective.
 
-    This is for friction without a tangential direction, or of a wrong number of values, and for
-    matrices that are not symmetric unless the owner solves with them. Collective.
+    These are friction without a tangential direction, or of a wrong number of values, and matrices
+    that are not symmetric.
+
+    Args:
+        owner: the solver, as messages name it.
+        problem: the contact problem.
+        unsymmetric: whether the solver takes matrices that are not symmetric.
     """
-    surface, law = problem.surface, problem.friction
+    surface = problem.surface
+    law = problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(
             f"{owner} needs symmetric matrices and those of the system are not: use "

@@ -1,6 +1,6 @@
-"""Eliminate everything but the contact unknowns.
+"""Eliminate everything but the contact unknowns: the condensed route.
 
-This is the condensed route (docs/reference/sources.md [1], sections 3, 4).
+See docs/reference/sources.md [1], sections 3, 4.
 
 With the one factorisation of A and the unit vectors E of the normal unknowns:
 
@@ -20,7 +20,7 @@ points are kept too: ``friction.condensed``.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from ..kernels.condensation import Condensation, Last, condense
 from .certified import check_laws
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
-from .friction.problem import FrictionMethod, inner_method
+from .friction.problem import FrictionMethod, check_inner_method
 from .friction.slip_rate import RateIteration
 from .normal.active_set import ActiveSet, PreparedSets
 from .normal.lcp import LCPResult
@@ -48,10 +48,13 @@ class SmallMethod(Protocol):
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Check G (m, m) and factor or scale it, once for many right-hand sides.
 
-        ``bilateral`` (m,) says which rows are bilateral.
+        Args:
+            G: the Delassus operator.
+            bilateral: (m,) which rows are bilateral.
 
-        What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and
-        ``guess`` (m,).
+        Returns:
+            What has ``solve(q, guess) -> LCPResult``, with q (m,) the gaps without reactions and
+            guess (m,) the predicted contact set.
         """
 
 
@@ -59,12 +62,13 @@ class SmallMethod(Protocol):
 class Condensed:
     """Condense each step onto its contact unknowns and solve this smaller problem.
 
-    It does so on any number of ranks.
+    It does so on any number of ranks. Matrices that are not symmetric need Lemke. For contact sets
+    too large for a dense G use ``Iterative``.
 
-    ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves
-    it with friction: FrictionNewton, NSGS, FixedPoint or GivenForces. ``rates`` is the iteration
-    around it for laws that depend on the slip rate. Matrices that are not symmetric need Lemke. For
-    contact sets too large for a dense G use ``Iterative``.
+    Attributes:
+        method: solves it without friction: ActiveSet, Hildreth or Lemke.
+        friction_method: solves it with friction: FrictionNewton, NSGS, FixedPoint or GivenForces.
+        rates: the iteration around it for laws that depend on the slip rate.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
@@ -81,120 +85,154 @@ class Condensed:
             remedy,
             lacks=("check", "carries_friction"),
         )
-        inner_method("Condensed", "friction_method", self.friction_method)
+        check_inner_method("Condensed", "friction_method", self.friction_method)
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for what the route cannot treat.
+        """Raise InputError for what the route cannot treat. Collective.
 
         This is friction without a tangential direction, or of a wrong number of values, more
         contact unknowns than a dense matrix suits, and matrices that are not symmetric unless the
         methods take them.
         """
         surface = problem.surface
+        methods: list[object] = [self.method]
         if problem.frictional:
-            refuse_dense(
-                f"Condensed() with {problem.friction}",
-                surface.total * (1 + surface.tangents.shape[1]),
-            )
+            unknowns = surface.total * (1 + surface.tangents.shape[1])
+            refuse_dense(f"Condensed() with {problem.friction}", unknowns)
+            methods.append(self.friction_method)
         else:
             refuse_dense("Condensed()", surface.total)
-        used = (self.method, self.friction_method) if problem.frictional else (self.method,)
-        check_laws(
-            "Condensed",
-            problem,
-            unsymmetric=all(getattr(one, "unsymmetric", False) for one in used),
-        )
+        unsymmetric = all(getattr(method, "unsymmetric", False) for method in methods)
+        check_laws("Condensed", problem, unsymmetric=unsymmetric)
 
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedCondensed":
         """Return what condenses A at its first step, which tells of friction.
 
-        InputError for too many conditions.
+        Args:
+            A: the effective matrix.
+            surface: the contact surface.
+            scale: of reactions, over which compliances are divided.
+
+        Raises:
+            InputError: for too many conditions.
         """
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 
 
+class NormalProblem(NamedTuple):
+    """Hold A condensed onto the normal unknowns, and the method for the small problem."""
+
+    condensed: Condensation
+    small: Any  # made by the method: PreparedLCP or its like
+
+
 class PreparedCondensed:
-    """Solve the condensed problem of one A. ``delassus`` is G (dense, equal on all ranks)."""
+    """Solve the condensed problem of one A.
+
+    A is condensed onto the normal unknowns at the first step without friction, and onto normal and
+    tangential ones at the first step with friction: most runs need one of both.
+    """
 
     def __init__(
         self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> None:
-        self._settings, self._A, self._surface, self._scale = settings, A, surface, scale
+        """Note what is to be condensed: see ``Condensed.prepare``. Collective."""
+        self._settings = settings
+        self._A = A
+        self._surface = surface
+        self._scale = scale
         self._rigid = surface.everywhere(surface.rigid)
         self._name = f"condensed {type(settings.method).__name__}" if surface.total else "linear"
+        self._normal: NormalProblem | None = None
         if surface.tangents.shape[1] == 0:
-            self._normal  # noqa: B018  nothing rubs in one dimension
+            self._condense_normal()  # in one dimension no step has friction
 
-    @cached_property
-    def _normal(self) -> tuple[Condensation, Any]:
-        """A condensed onto the normal unknowns, and the method for the small problem."""
-        made, bilateral = (
-            self._condensed(frictional=False),
-            self._surface.everywhere(self._surface.bilateral),
-        )
-        return made, self._settings.method.prepare(made.flexibility, bilateral)
+    def _condense_normal(self) -> "NormalProblem":
+        """Condense A onto the normal unknowns, unless that is done, and return what it gave."""
+        if self._normal is None:
+            condensed = self._condense(frictional=False)
+            bilateral = self._surface.everywhere(self._surface.bilateral)
+            small = self._settings.method.prepare(condensed.flexibility, bilateral)
+            self._normal = NormalProblem(condensed, small)
+        return self._normal
 
     @report_time("condensing")
-    def _condensed(self, *, frictional: bool) -> Condensation:
+    def _condense(self, *, frictional: bool) -> Condensation:
         """Return A condensed, with the compliance of the support in its flexibility."""
-        made, surface = condense(self._A, self._surface, frictional=frictional), self._surface
-        extra = surface.everywhere(surface.compliance) / self._scale
-        normal = np.arange(surface.total) * (len(made.there) // max(surface.total, 1))
-        made.flexibility[normal, normal] += extra
-        return made
+        surface = self._surface
+        condensed = condense(self._A, surface, frictional=frictional)
+        compliance = surface.everywhere(surface.compliance) / self._scale
+        unknowns_of_a_condition = len(condensed.there) // max(surface.total, 1)
+        normal = np.arange(surface.total) * unknowns_of_a_condition
+        condensed.flexibility[normal, normal] += compliance
+        return condensed
 
     @property
     def delassus(self) -> Array:
-        """Return G of the normal unknowns."""
-        return self._normal[0].flexibility
+        """Return G of the normal unknowns: dense, equal on all ranks."""
+        return self._condense_normal().condensed.flexibility
 
     @cached_property
     def friction(self) -> CondensedFriction:
         """Return the small problem with friction, made at the first step that has some."""
-        method, rates = self._settings.friction_method, self._settings.rates
+        settings = self._settings
+        condensed = self._condense(frictional=True)
         return CondensedFriction(
-            method, self._condensed(frictional=True), self._surface, rates=rates
+            settings.friction_method, condensed, self._surface, rates=settings.rates
         )
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return x, r_n and the active set of a step."""
-        if step.slip0 is not None and self._surface.total:
+        """Return the answer to a step. Collective."""
+        surface = self._surface
+        if step.slip0 is not None and surface.total:
             return self.friction.solve(step, self._rigid)
-        surface, (condensed, small), bound, guess = (
-            self._surface,
-            self._normal,
-            step.bound,
-            step.active,
-        )
+        condensed, small = self._condense_normal()
+
+        # Every rank solves the whole small problem.
+        bound = step.bound
+        guess = step.active
         if surface.comm.size > 1:
             bound, guess = surface.everywhere(np.column_stack([bound, guess])).T
             guess = guess > 0.0
-        found: LCPResult = small.solve(bound - condensed.free(step.b), guess)
-        x = condensed.answer(found.r, (found.r != 0.0) & self._rigid, bound)
+        answer: LCPResult = small.solve(bound - condensed.free(step.b), guess)
+
+        # Closed conditions on a rigid support go exactly onto their bound.
+        x = condensed.answer(answer.r, (answer.r != 0.0) & self._rigid, bound)
         return StepResult(
-            x, surface.mine(found.r), surface.mine(found.active), found.iterations, self._name
+            x,
+            r_n=surface.mine(answer.r),
+            active=surface.mine(answer.active),
+            iterations=answer.iterations,
+            method=self._name,
         )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
-        """Return the answers to the steps that are rows of ``many``; ``own`` makes one.
+        """Return the answers to several steps of this A.
 
-        None where this cannot be: on several ranks, without contact unknowns last in the factor,
-        and with other methods than ActiveSet.
+        Args:
+            many: the steps; its arrays have a row for each.
+            own: makes the step of one row.
+
+        Returns:
+            The answers; None where this cannot be: on several ranks, without contact unknowns last
+            in the factor, and with other methods than ActiveSet.
         """
-        surface, rubs = self._surface, many.slip0 is not None and self._surface.total > 0
-        condensed, small = (self.friction.condensed, None) if rubs else self._normal
-        if surface.comm.size > 1 or not isinstance(condensed, Last):
+        has_friction = many.slip0 is not None and self._surface.total > 0
+        if has_friction:
+            condensed = self.friction.condensed
+        else:
+            condensed, small = self._condense_normal()
+        if self._surface.comm.size > 1 or not isinstance(condensed, Last):
             return None
-        if rubs:
+        if has_friction:
             return self.friction.solve_many(many, own, self._rigid)
         if not isinstance(small, PreparedSets):
             return None
-        r, active, counts, failed = small.solve_many(
-            many.bound - condensed.free(many.b), many.active
-        )
+        gaps = many.bound - condensed.free(many.b)
+        r, active, counts, failed = small.solve_many(gaps, many.active)
         x = freeze(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
         return Answers(StepResult(x, r, active, 0, self._name), counts, failed)

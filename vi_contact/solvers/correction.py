@@ -1,6 +1,4 @@
-"""Correct residuals.
-
-What an answer leaves over is a step of its own, small, and solved by the same solver.
+"""Correct an answer: what it leaves over is a step of its own, small, for the same solver.
 
 The answer (x0, r0) stays, but for a share s of its reactions. The contract of ``step.py`` for d = x
 - x0 and q = r - (1 - s) r0 is the contract again, because reactions that obey the laws form a cone
@@ -39,13 +37,24 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class Share:
-    """Count the limit of a friction law in shares of the reactions: s limit(r / s)."""
+    """Count the limit of a friction law in shares of the reactions: s limit(r / s).
+
+    Attributes:
+        law: the friction law.
+        share: s.
+    """
 
     law: FrictionLaw
     share: float
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return the limit: the cohesive part is a share of what it was, the slope is the same."""
+        """Return the limit: the cohesive part is a share of what it was, the slope is the same.
+
+        Args:
+            r_n: (m,) normal reactions.
+            weights: (m,) areas of the conditions [m²].
+            scale: of reactions.
+        """
         return self.share * self.law.limit(r_n / self.share, weights, scale)
 
     def slope(self, weights: Array) -> Array:
@@ -53,7 +62,7 @@ class Share:
         return self.law.slope(weights)
 
     def at(self, speed: Array) -> FrictionLaw:
-        """Return itself, for a law that does not know the slip rate."""
+        """Return the share of the law at this slip rate [m/s]: itself where it knows no rates."""
         law = self.law.at(speed)
         return self if law is self.law else Share(law, self.share)
 
@@ -63,81 +72,119 @@ def share_of(residual: float) -> float:
 
     It is a power of two, so that no digit is lost.
     """
-    return float(np.clip(np.exp2(np.ceil(np.log2(max(residual, LEAST) * MARGIN))), LEAST, 1.0))
+    power = np.ceil(np.log2(max(residual, LEAST) * MARGIN))
+    return float(np.clip(np.exp2(power), LEAST, 1.0))
 
 
 def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProblem:
-    """Return the step for d and q of the head of this file."""
-    surface, x = step.surface, answer.x
-    r_n, r_t = kept(step, answer, share)
+    """Return the step for d and q of the head of this file.
+
+    Args:
+        step: the step of the answer.
+        answer: what leaves something over.
+        share: s, of its reactions that it gives back.
+    """
+    surface = step.surface
+    x = answer.x
+    r_n, r_t = kept_reactions(step, answer, share)
+    friction = step.friction
+    slip0 = None
+    if step.slip0 is not None:
+        slip0 = step.slip0 - surface.tangential_values(x)
+        if share != 1.0:
+            friction = Share(friction, share)
     return replace(
         step,
         b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
         bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
         guess=np.zeros_like(x),
         active=answer.active,
-        friction=step.friction
-        if step.slip0 is None or share == 1.0
-        else Share(step.friction, share),
-        slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x),
+        friction=friction,
+        slip0=slip0,
     )
 
 
-def added(step: StepProblem, answer: StepResult, found: StepResult, share: float) -> StepResult:
-    """Return the answer with the solution of what it left over."""
-    r_n, r_t = kept(step, answer, share)
-    if found.r_t is not None:
-        r_t = found.r_t if r_t is None else r_t + found.r_t
+def add(step: StepProblem, answer: StepResult, rest: StepResult, share: float) -> StepResult:
+    """Return the answer with the solution of what it left over.
+
+    Args:
+        step: the step of the answer.
+        answer: what left something over.
+        rest: d and q, the answer to ``left_over`` with the same share.
+        share: s.
+    """
+    r_n, r_t = kept_reactions(step, answer, share)
+    if rest.r_t is not None:
+        r_t = rest.r_t if r_t is None else r_t + rest.r_t
     return replace(
-        found,
-        x=answer.x + found.x,
-        r_n=r_n + found.r_n,
+        rest,
+        x=answer.x + rest.x,
+        r_n=r_n + rest.r_n,
         r_t=r_t,
-        iterations=answer.iterations + found.iterations,
+        iterations=answer.iterations + rest.iterations,
     )
 
 
-def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
+def kept_reactions(
+    step: StepProblem, answer: StepResult, share: float
+) -> tuple[Array, Array | None]:
     """Return 1 - s times the reactions, which corrections keep.
 
-    Those outside the cone, or no farther than s from its edge, are put on its edge: whether they
-    stick or slip, what is missing then lies in the cone of q.
+    Args:
+        step: the step of the answer.
+        answer: whose reactions they are.
+        share: s.
+
+    Returns:
+        r_n (m,) and, with friction, r_t (m, d - 1).
     """
     surface = step.surface
     r_n = np.where(surface.bilateral, answer.r_n, np.maximum(answer.r_n, 0.0))
     if answer.r_t is None or step.slip0 is None:
         return (1.0 - share) * r_n, None
+
+    # Friction outside the cone, or no farther than s from its edge, is put on its edge: whether it
+    # sticks or slips, what is missing then lies in the cone of q.
     law = step.friction_at(surface.tangential_values(answer.x) - step.slip0)
-    limit, size = (
-        limit_of(law, r_n, surface.weights, step.scale),
-        np.linalg.norm(answer.r_t, axis=1),
-    )
+    limit = limit_of(law, r_n, surface.weights, step.scale)
+    size = np.linalg.norm(answer.r_t, axis=1)
     onto = np.divide(limit, size, out=np.ones_like(size), where=size > (1.0 - share) * limit)
     return (1.0 - share) * r_n, (1.0 - share) * onto[:, None] * answer.r_t
 
 
-def corrected(
+def correct(
     step: StepProblem,
     result: StepResult,
     certificate: Certificate,
     solve: Callable[[StepProblem], StepResult],
     goal: float,
 ) -> tuple[StepResult, Certificate]:
-    """Return the result after corrections that brought its certificate to the goal.
+    """Correct an answer until its certificate is at the goal, or as near as it gets. Collective.
 
-    Or they brought it as near to it as they got.
+    Args:
+        step: the step.
+        result: its answer.
+        certificate: that of the answer.
+        solve: the solver.
+        goal: the residual to come to.
+
+    Returns:
+        The corrected answer, and its certificate.
     """
     for _ in range(ROUNDS):
-        share = share_of(certificate.worst)
+        before = certificate.worst
+        share = share_of(before)
         try:
-            better = added(step, result, solve(left_over(step, result, share)), share)
+            rest = solve(left_over(step, result, share))
         except StepFailure:
             break
+        better = add(step, result, rest, share)
         freeze(better.x)
-        found, before = kkt_residual(step, better), certificate.worst
-        if not found.worst < before:
+        judged = kkt_residual(step, better)
+        if not judged.worst < before:
             break
-        result, certificate = replace(better, method=result.method, history=result.history), found
-        if not goal < found.worst < 0.5 * before:
+        result = replace(better, method=result.method, history=result.history)
+        certificate = judged
+        if not goal < judged.worst < 0.5 * before:
             break
     return result, certificate

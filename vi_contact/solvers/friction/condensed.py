@@ -1,4 +1,4 @@
-"""Condense with friction: the Delassus operator of normal and tangential contact unknowns together.
+"""Condense with friction: one Delassus operator of normal and tangential contact unknowns.
 
 With the unit vectors E of the normal and F of the tangential unknowns, x_free = A⁻¹b and D = [E F]:
 
@@ -32,7 +32,11 @@ from .slip_rate import RateIteration
 class CondensedFriction:
     """Solve the small problem with friction of one A.
 
-    It is condensed onto normal and tangential unknowns.
+    A is condensed onto its normal and tangential contact unknowns.
+
+    Attributes:
+        condensed: A, condensed.
+        delassus: G (m d, m d).
     """
 
     def __init__(
@@ -43,86 +47,128 @@ class CondensedFriction:
         *,
         rates: RateIteration,
     ) -> None:
-        self._surface, self._rates, self.condensed = surface, rates, condensed
+        """Prepare the method for the flexibility of the contact unknowns.
+
+        Args:
+            method: for the small problem.
+            condensed: A, condensed; its flexibility is changed.
+            surface: the contact surface.
+            rates: iteration for laws that depend on the slip rate.
+        """
+        self._surface = surface
+        self._rates = rates
         self._name = f"condensed {type(method).__name__}"
-        self.delassus, d = condensed.flexibility, 1 + surface.tangents.shape[1]
-        fixed = np.flatnonzero(~condensed.there)
-        self.delassus[fixed, fixed] = self.delassus.diagonal()[fixed // d * d]
+        self.condensed = condensed
+        self.delassus = condensed.flexibility
+
+        # The row of a prescribed tangent is that of a spring as soft as the normal of its node.
+        d = 1 + surface.tangents.shape[1]
+        prescribed = np.flatnonzero(~condensed.there)
+        normal = prescribed // d * d
+        self.delassus[prescribed, prescribed] = self.delassus.diagonal()[normal]
         self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def solve(self, step: StepProblem, rigid: Mask) -> StepResult:
-        """Return the answer to a step."""
-        found, held, places = self.reactions(step, self.condensed.free(step.b), rigid)
-        x, mine = self.condensed.answer(found.r.ravel(), held, places), self._surface.slots
-        r_n, r_t = found.r[mine][:, 0].copy(), found.r[mine][:, 1:].copy()
+        """Return the answer to a step; ``rigid`` (m,) says which supports are. Collective."""
+        answer, held, values = self.reactions(step, self.condensed.free(step.b), rigid)
+        x = self.condensed.answer(answer.r.ravel(), held, values)
+        mine = self._surface.slots
+        r = answer.r[mine]
         return StepResult(
-            x, r_n, found.active[mine], found.iterations, self._name, r_t=r_t, history=found.history
+            x,
+            r_n=r[:, 0].copy(),
+            active=answer.active[mine],
+            iterations=answer.iterations,
+            method=self._name,
+            r_t=r[:, 1:].copy(),
+            history=answer.history,
         )
 
     def reactions(
         self, step: StepProblem, free: Array, rigid: Mask
     ) -> tuple[FrictionResult, Mask, Array]:
-        """Return the reactions for contact unknowns that would be ``free``, and where they are put.
+        """Return the reactions of a step, and where contact unknowns are put. Collective.
 
         Closed points on a rigid support are put on their bound, those that stick where they were,
         which removes round-off only.
+
+        Args:
+            step: the step.
+            free: (m d,) contact unknowns without reactions.
+            rigid: (m,) which supports are.
+
+        Returns:
+            The answer to the small problem; which contact unknowns (m d,) are held, and on what
+            values (m d,).
         """
         surface = self._surface
         assert step.slip0 is not None
-        none = np.zeros(surface.count)
+
+        # All ranks get the problem of all conditions: bounds, and the law with the coefficients of
+        # rest.
         rest = step.friction_at(np.zeros_like(step.slip0))
-        cohesion, slope = (
-            limit_of(rest, none, surface.weights, step.scale),
-            slope_of(rest, surface.weights),
-        )
-        given = surface.everywhere(
-            np.column_stack([step.bound, step.slip0, cohesion, slope, step.active])
-        )
-        places, (cohesion, slope, closed) = given[:, :-3], given[:, -3:].T
-        q = places - free.reshape(places.shape)
+        cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
+        slope = slope_of(rest, surface.weights)
+        columns = np.column_stack([step.bound, step.slip0, cohesion, slope, step.active])
+        of_all = surface.everywhere(columns)
+        values = of_all[:, :-3]
+        cohesion, slope, closed = of_all[:, -3:].T
+        q = values - free.reshape(values.shape)
         active = closed > 0.0
 
-        def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:
-            return self._small.solve(q, cohesion, mu, active if before is None else before.r)
+        def solve(mu: Array, before: FrictionResult | None) -> FrictionResult:
+            guess = active if before is None else before.r
+            return self._small.solve(q, cohesion, mu, guess)
 
-        found = self._rates.solve(
-            step, rest, slope, solved, lambda found: self._slip(q, found)[surface.slots]
-        )
-        held = np.repeat(found.stick[:, None], places.shape[1], axis=1)
-        held[:, 0] = (found.r[:, 0] != 0.0) & rigid
-        held &= found.r.any()
-        return found, held.ravel(), places.ravel()
+        def slip_of(answer: FrictionResult) -> Array:
+            return self._slip(q, answer)[surface.slots]
+
+        answer = self._rates.solve(step, rest, slope, solve, slip_of)
+
+        # Where no point carries anything, nothing is held.
+        held = np.repeat(answer.stick[:, None], values.shape[1], axis=1)
+        held[:, 0] = (answer.r[:, 0] != 0.0) & rigid
+        held &= answer.r.any()
+        return answer, held.ravel(), values.ravel()
 
     def solve_many(
         self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
     ) -> Answers:
-        """Return the answers to several steps.
+        """Return the answers to several steps of this A, on one rank.
 
-        ``many`` holds their rows, ``own`` makes one of them.
+        Args:
+            many: the steps; its arrays have a row for each.
+            own: makes the step of one row.
+            rigid: (m,) which supports are.
         """
-        free, (m, d) = (
-            self.condensed.free(many.b),
-            (len(many.bound), 1 + self._surface.tangents.shape[1]),
-        )
-        r, places, held = (
-            np.zeros((len(free), m, d)),
-            np.zeros(free.shape),
-            np.zeros(free.shape, dtype=bool),
-        )
-        active, counts, failed = held[:, :m].copy(), [0] * len(free), dict[int, ViContactError]()
-        histories: list[tuple[float, ...]] = [()] * len(free)
-        for row in range(len(free)):
+        free = self.condensed.free(many.b)
+        k = len(free)
+        m = len(many.bound)
+        d = 1 + self._surface.tangents.shape[1]
+        r = np.zeros((k, m, d))
+        values = np.zeros(free.shape)
+        held = np.zeros(free.shape, dtype=bool)
+        active = np.zeros((k, m), dtype=bool)
+        counts = [0] * k
+        histories: list[tuple[float, ...]] = [()] * k
+        failed: dict[int, ViContactError] = {}
+        for row in range(k):
             try:
-                found, held[row], places[row] = self.reactions(own(row), free[row], rigid)
-                r[row], active[row] = found.r, found.active
-                counts[row], histories[row] = found.iterations, found.history
+                answer, held[row], values[row] = self.reactions(own(row), free[row], rigid)
             except ViContactError as error:
                 failed[row] = error
-        x = freeze(self.condensed.answer(r.reshape(free.shape), held, places))
+                continue
+            r[row] = answer.r
+            active[row] = answer.active
+            counts[row] = answer.iterations
+            histories[row] = answer.history
+        x = freeze(self.condensed.answer(r.reshape(free.shape), held, values))
         rows = StepResult(x, r[..., 0].copy(), active, 0, self._name, r_t=r[..., 1:].copy())
         return Answers(rows, counts, failed, histories)
 
-    def _slip(self, q: Array, found: FrictionResult) -> Array:
-        """B_t x - slip0 (m, d - 1) of points that rub, exactly zero where they stick."""
-        w = q[:, 1:] + (self.delassus @ found.r.ravel()).reshape(q.shape)[:, 1:]
-        return np.where(((found.r[:, 0] > 0.0) & ~found.stick)[:, None], -w, 0.0)
+    def _slip(self, q: Array, answer: FrictionResult) -> Array:
+        """Return B_t x - slip0 (m, d - 1) of points under pressure, zero where they stick."""
+        moved = (self.delassus @ answer.r.ravel()).reshape(q.shape)
+        w_t = q[:, 1:] + moved[:, 1:]
+        slips = (answer.r[:, 0] > 0.0) & ~answer.stick
+        return np.where(slips[:, None], -w_t, 0.0)

@@ -1,6 +1,4 @@
-"""Extrapolate fixed-point iterations.
-
-The next point x is found from the points tried so far and their images g(x).
+"""Extrapolate fixed-point iterations: find the next x from points tried and their images g(x).
 
     plain       x <- g(x)
     Anderson    x <- g(x) - sum_j gamma_j (g_j+1 - g_j)
@@ -15,7 +13,7 @@ before is forgotten.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,6 +23,14 @@ from ...core.checks import provides
 from ...core.quantities import NotNegative, Positive
 
 Next = Callable[[Array, Array], Array]  # x (n,) and its image g(x) -> the point to try after x
+DEPENDENT = 1e-10  # of the largest singular value: differences that others nearly combine to
+
+
+class Tried(NamedTuple):
+    """Hold what is known of a point x that was tried."""
+
+    f: Array  # g(x) - x
+    image: Array  # g(x)
 
 
 class Extrapolation(Protocol):
@@ -34,8 +40,8 @@ class Extrapolation(Protocol):
         """Return what chooses the points of one iteration, which it remembers."""
 
 
-def accelerated(owner: str, value: Any) -> None:
-    """Raise InputError unless it is an extrapolation."""
+def check_extrapolation(owner: str, value: Any) -> None:
+    """Raise InputError unless the value is an extrapolation."""
     provides(
         owner, "extrapolation", value, ("start",), "give Plain() or Anderson()", lacks=("step",)
     )
@@ -52,7 +58,12 @@ class Plain:
 
 @dataclass(frozen=True)
 class Anderson:
-    """Extrapolate from the last ``depth`` steps, after ``after`` plain ones."""
+    """Extrapolate from the last steps.
+
+    Attributes:
+        depth: how many differences are combined, at most.
+        after: number of plain steps before.
+    """
 
     depth: Annotated[int, Positive] = 5
     after: Annotated[int, NotNegative] = 0
@@ -61,25 +72,29 @@ class Anderson:
         check_fields(self)
 
     def start(self) -> Next:
-        """Return the choice of the next point."""
+        """Return the choice of the next point, which remembers the points of one iteration."""
         count = 0
-        points: list[tuple[Array, Array]] = []  # (f, g)
+        points: list[Tried] = []
 
-        def following(x: Array, image: Array) -> Array:
+        def choose_next(x: Array, image: Array) -> Array:
             nonlocal count, points
             count += 1
-            new, kept = image - x, points[-self.depth :]
-            if (
-                kept
-                and np.array_equal(x, kept[-1][1])
-                and float(new @ kept[-1][0]) >= float(kept[-1][0] @ kept[-1][0])
-            ):
-                kept = []
-            points = [*kept, (new, image.copy())]
+            f = image - x
+
+            # After a plain step that let f grow along itself all that was tried is forgotten.
+            points = points[-self.depth :]
+            if points and np.array_equal(x, points[-1].image):
+                f_old = points[-1].f
+                if float(f @ f_old) >= float(f_old @ f_old):
+                    points = []
+            points.append(Tried(f, image.copy()))
             if count <= self.after or len(points) < 2:
                 return image
-            f, g = (np.column_stack(part) for part in zip(*points, strict=True))
-            gamma, *_ = np.linalg.lstsq(np.diff(f), f[:, -1], rcond=1e-10)
-            return np.asarray(image - np.diff(g) @ gamma)
 
-        return following
+            # Least squares for f by differences of f; the same combination of those of g.
+            of_f = np.diff(np.column_stack([point.f for point in points]))
+            of_g = np.diff(np.column_stack([point.image for point in points]))
+            gamma, *_ = np.linalg.lstsq(of_f, f, rcond=DEPENDENT)
+            return np.asarray(image - of_g @ gamma)
+
+        return choose_next

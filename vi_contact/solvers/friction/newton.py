@@ -1,6 +1,4 @@
-"""Solve contact with friction by semismooth Newton: the default.
-
-In 2D it is an active-set method and ends exactly.
+"""Solve contact with friction by semismooth Newton: the default, in 2D an active-set method.
 
 With y = r - w of the last iterate every node is open (y_n <= 0) or closed, and sticks (|y_t| <=
 limit) or slips along n = y_t/|y_t|. The next iterate solves the linear problem of these states,
@@ -34,25 +32,34 @@ from ...core.algebra import Array, Mask, SerialComm
 from ...kernels.compiler import load_loops
 from ...kernels.friction_sweeps import FrictionSweeps
 from .linear import Factored, LinearProblems, States
-from .nsgs import sweeper
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
+from .nsgs import make_sweep
+from .problem import (
+    Iterated,
+    PreparedFriction,
+    ScaledDelassus,
+    ScaledProblem,
+    Settings,
+    ShortMatrices,
+)
 
 ATTEMPTS = 10  # of Newton, with twice the sweeps before each
 FIRST_SWEEPS = 2
 SWEEPS = {2: 25, 3: 8}  # compiled sweeps in a row, by dimension: in 2D fewer when states settle
 STAGES = {2: 1, 3: 16}  # of sweeps, each with a new w
 FALL = 0.1  # of the residual in a stage: where it falls less Newton is faster
-Kept = dict[bytes, Factored]  # factors by the key of their states
+Factors = dict[bytes, Factored]  # by the key of their states
 
 
 @dataclass(frozen=True)
 class FrictionNewton(Settings):
-    """Hold the settings.
-
-    ``tolerance``: residual above which it refuses; ``max_iterations`` of Newton in a row.
+    """Hold the settings of Newton's method.
 
     In the result ``iterations`` counts linear solves, fallback sweeps and, as one, the sweeps
     before (0: no contact), ``history`` the residual after those and after each linear solve.
+
+    Attributes:
+        tolerance: the residual above which it refuses, that of r = 0 being 1.
+        max_iterations: of Newton in a row.
     """
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
@@ -60,47 +67,79 @@ class FrictionNewton(Settings):
     max_iterations: int = 30
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
-        """Check and scale G (m d, m d).
+        """Check and scale G (m d, m d); ``bilateral`` (m,) says which rows are bilateral.
 
-        Answers depend on their right-hand side alone, not on steps before.
+        Answers depend on their right-hand side alone, not on those before.
         """
         delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
-        # its sweeps read half of G
+        # Compiled sweeps read half of G.
         loops = load_loops(SerialComm()) if delassus.symmetric else None
-        if loops and delassus.count:
-            delassus.short  # noqa: B018  a part of set-up
-        return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, loops, {}))
+        short = delassus.make_short() if loops and delassus.count else None
+        loop = partial(self._loop, loops, short, {})
+        return PreparedFriction(self, self.tolerance, delassus, loop)
 
-    def _loop(self, loops: Any, kept: Kept, step: ScaledProblem, r: Array) -> Iterated:
+    def _loop(
+        self,
+        loops: Any,
+        short: ShortMatrices | None,
+        factors: Factors,
+        step: ScaledProblem,
+        r: Array,
+    ) -> Iterated:
+        """Sweep, and let Newton end it; where Newton goes in circles, sweep and begin anew.
+
+        Args:
+            loops: the compiled functions; None without a compiler.
+            short: what they read; None where nothing is to be swept.
+            factors: those of the last linear problems of this G.
+            step: the problem.
+            r: (m, d) reactions to start from, scaled.
+        """
         history: list[float] = []
-        swept, w = 0, None
-        if loops and step.unit > 0.0:
-            r, w, left = sweep_in_stages(loops, step, r)
+        if not step.unit > 0.0:
+            return Iterated(r, 0, history)
+        w = None
+        if loops and short is not None:
+            r, w, left = sweep_in_stages(loops, short, step, r)
             history.append(left / step.unit)
             if step.delassus.dimension > 2 and left <= step.rounding(r):
-                return r, 1, history
-        for attempt in range(ATTEMPTS if step.unit > 0.0 else 0):
-            r, done = self._newton(kept, step, r - (step.w(r) if w is None else w), history)
-            if done or attempt == ATTEMPTS - 1:
+                return Iterated(r, 1, history)
+        sweeps = 0
+        for attempt in range(ATTEMPTS):
+            y = r - (step.w(r) if w is None else w)
+            r, is_solved = self._newton(factors, step, y, history)
+            if is_solved or attempt == ATTEMPTS - 1:
                 break
-            sweep, r, w = sweeper(step), step.admissible(r), None
+            sweep = make_sweep(step)
+            r = step.admissible(r)
+            w = None
             for _ in range(FIRST_SWEEPS * 2**attempt):
-                r, swept = sweep(r), swept + 1
-                # they lead nowhere
+                r = sweep(r)
+                sweeps += 1
+                # With a G that is not symmetric sweeps may grow: they lead nowhere.
                 if not step.delassus.symmetric and not step.rounding(r) <= step.unit:
                     r = np.zeros_like(r)
                     break
-        return r, len(history) + swept, history
+        return Iterated(r, len(history) + sweeps, history)
 
     def _newton(
-        self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]
+        self, factors: Factors, step: ScaledProblem, y: Array, history: list[float]
     ) -> tuple[Array, bool]:
-        """Return the best iterate r, and whether it solves the problem.
+        """Iterate by Newton's method until it solves the problem or comes back to old states.
 
-        It does so to rounding or to the tolerance.
+        Args:
+            factors: those of the last linear problems of this G.
+            step: the problem.
+            y: (m, d) r - w, to start from.
+            history: gets the residual of each iterate, that of r = 0 being 1.
+
+        Returns:
+            The best iterate r (m, d), and whether it solves the problem, to rounding or to the
+            tolerance.
         """
-        best, smallest = np.zeros_like(y), step.unit
-        linear = LinearProblems(step.delassus, kept)
+        best = np.zeros_like(y)
+        smallest = step.unit
+        linear = LinearProblems(step.delassus, factors)
         states: States | None = None
         for _ in range(self.max_iterations):
             states = States(step, y, states)
@@ -111,23 +150,32 @@ class FrictionNewton(Settings):
             residual = step.residual(r, w)
             history.append(residual / step.unit)
             if residual < smallest:
-                best, smallest = r, residual
+                best = r
+                smallest = residual
             if residual <= step.rounding(r):
                 return r, True
             y = r - w
         return best, smallest <= self.tolerance * step.unit
 
 
-def sweep_in_stages(loops: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array, float]:
-    """Return r, w = q + G r and the residual after compiled sweeps.
+def sweep_in_stages(
+    loops: Any, short: ShortMatrices, step: ScaledProblem, r: Array
+) -> tuple[Array, Array, float]:
+    """Sweep by the compiled functions, in 3D with w made anew between stages.
 
-    In 2D, where they are a start only, w is as the sweeps left it.
+    Args:
+        loops: the compiled functions.
+        short: the matrices that they read.
+        step: the problem.
+        r: (m, d) reactions to start from, scaled.
+
+    Returns:
+        r, w = q + G r and the residual. In 2D, where r is a start only, w is as the sweeps left it.
     """
     delassus = step.delassus
     in_space = delassus.dimension > 2
-    G, H, blocks = delassus.short
     sweeps = FrictionSweeps(
-        loops, G, H, blocks, step.cohesion, step.slope, delassus.bilateral, r, step.w(r)
+        loops, *short, step.cohesion, step.slope, delassus.bilateral, r, step.w(r)
     )
     left = np.inf
     for _ in range(STAGES[delassus.dimension]):

@@ -1,6 +1,4 @@
-"""Solve contact with friction by nonsmooth Gauss-Seidel.
-
-One node is solved after another, each exactly.
+"""Solve contact with friction by nonsmooth Gauss-Seidel: one node after another, each exactly.
 
 Given the reactions of all other nodes, a node is open, or it sticks, or it slips:
 
@@ -27,33 +25,39 @@ from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, 
 
 @dataclass(frozen=True)
 class NSGS(Settings):
-    """Hold the settings. ``tolerance``: largest residual, that of r = 0 being 1.
+    """Hold the settings of the sweeps.
 
     In the result ``iterations`` counts sweeps and ``history`` the residual after each.
+
+    Attributes:
+        tolerance: the largest residual, that of r = 0 being 1.
+        max_iterations: number of sweeps, at most.
     """
 
     max_iterations: int = 5000
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
-        """Check and scale G (m d, m d)."""
+        """Check and scale G (m d, m d); ``bilateral`` (m,) says which rows are bilateral."""
         return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._loop)
 
     def _loop(self, step: ScaledProblem, r: Array) -> Iterated:
-        sweep, history = sweeper(step), list[float]()
+        """Sweep from r until the residual is small, or rounding."""
+        sweep = make_sweep(step)
+        history: list[float] = []
         while step.unit > 0.0 and len(history) < self.max_iterations:
             r = sweep(r)
             residual = step.residual(r, step.w(r))
             history.append(residual / step.unit)
-            if not np.isfinite(residual) or residual <= max(
-                self.tolerance * step.unit, step.rounding(r)
-            ):
+            goal = max(self.tolerance * step.unit, step.rounding(r))
+            if not np.isfinite(residual) or residual <= goal:
                 break
-        return r, len(history), history
+        return Iterated(r, len(history), history)
 
 
-def sweeper(step: ScaledProblem) -> Callable[[Array], Array]:
-    """Return one sweep: r -> r."""
-    d, matrix = step.delassus.dimension, step.delassus.matrix
+def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:
+    """Return one sweep over all nodes of a problem: r (m, d) -> r."""
+    d = step.delassus.dimension
+    matrix = step.delassus.matrix
     nodes = [_Node(step, i) for i in range(step.count)]
 
     def sweep(r: Array) -> Array:
@@ -68,54 +72,70 @@ def sweeper(step: ScaledProblem) -> Callable[[Array], Array]:
 
 
 class _Node:
-    """The problem of one node."""
+    """Solve the problem of one node."""
 
     def __init__(self, step: ScaledProblem, i: int) -> None:
+        """Take the block of node i, and eliminate its normal reaction from the tangential rows."""
         d = step.delassus.dimension
-        block = step.delassus.matrix[i * d : (i + 1) * d, i * d : (i + 1) * d]
-        self.normal, self.coupling, self.tangential = (
-            float(block[0, 0]),
-            block[0, 1:],
-            block[1:, 1:],
-        )
-        self.pushed = block[1:, 0]  # the coupling, unless G is not symmetric
+        rows = slice(i * d, (i + 1) * d)
+        block = step.delassus.matrix[rows, rows]
+        self.normal = float(block[0, 0])
+        self.coupling = block[0, 1:]  # of w_n to r_t
+        self.pushed = block[1:, 0]  # of w_t to r_n: the same, unless G is not symmetric
+        self.tangential = block[1:, 1:]
         self.condensed = self.tangential - np.outer(self.pushed, self.coupling) / self.normal
-        self.cohesion, self.slope = float(step.cohesion[i]), float(step.slope[i])
+        self.cohesion = float(step.cohesion[i])
+        self.slope = float(step.slope[i])
         self.bilateral = bool(step.delassus.bilateral[i])
 
     def solve(self, q: Array) -> Array:
-        """Return the reactions of the node when all others give it q."""
-        q_n, q_t = float(q[0]), q[1:]
+        """Return the reactions (d,) of the node when all others give it q (d,)."""
+        q_n = float(q[0])
+        q_t = q[1:]
+
+        # Open: without pressure there is cohesion alone, and the gap must not be negative.
         if not self.bilateral:
-            r_t = on_disk(self.tangential, q_t, lambda r_t: self.cohesion)
+            r_t = minimise_on_disk(self.tangential, q_t, lambda r_t: self.cohesion)
             if q_n + self.coupling @ r_t >= 0.0:
                 return np.concatenate([[0.0], r_t])
 
+        # Closed: w_n = 0 gives the pressure, which limits r_t; it sticks or slips.
         def pressure(r_t: Array) -> float:
             return float(-(q_n + self.coupling @ r_t) / self.normal)
 
-        r_t = on_disk(
+        r_t = minimise_on_disk(
             self.condensed,
             q_t - self.pushed * (q_n / self.normal),
             lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0),
         )
         r_n = pressure(r_t)
-        return np.concatenate([[r_n if self.bilateral else max(r_n, 0.0)], r_t])
+        if not self.bilateral:
+            r_n = max(r_n, 0.0)
+        return np.concatenate([[r_n], r_t])
 
 
-def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
-    """Return r with S r = -q when |r| <= limit(r), and else r on the disk.
+def minimise_on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
+    """Return r with S r = -q when |r| <= limit(r), and else r on the edge of the disk.
 
-    There, (S + lambda) r = -q on |r| = limit(r), lambda > 0.
+    There, (S + lambda) r = -q on |r| = limit(r), lambda > 0. r falls from S⁻¹q to 0 as lambda
+    grows; the root of |r| - limit is bracketed in s = 1/(1 + lambda/trace S) between 0 and 1.
 
-    S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| -
-    limit is bracketed in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of
-    the eigenvalues give r: a start only.
+    Args:
+        S: (k, k), symmetric positive definite. Of any other S the moduli of the eigenvalues give r:
+            a start only.
+        q: (k,).
+        limit: radius of the disk, which may depend on r.
     """
     if len(q) == 0 or not q.any():
         return np.zeros(len(q))
-    values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)
-    values, part, unit = np.abs(values), vectors.T @ q, float(np.sum(np.abs(values)))
+    if len(q) == 1:
+        values = np.diag(S)
+        vectors = np.eye(1)
+    else:
+        values, vectors = np.linalg.eigh(S)
+    values = np.abs(values)
+    part = vectors.T @ q
+    unit = float(np.sum(np.abs(values)))
 
     def reaction(s: float) -> Array:
         return np.asarray(vectors @ (-s * part / (s * values + (1.0 - s) * unit)))
@@ -132,5 +152,6 @@ def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
 
     root = brentq(outside, 0.0, 1.0, xtol=1e-300, rtol=8.9e-16, maxiter=200, disp=False)
     r = reaction(root)
-    size, radius = float(np.linalg.norm(r)), limit(r)
+    size = float(np.linalg.norm(r))
+    radius = limit(r)
     return r * (radius / size) if size > radius else r

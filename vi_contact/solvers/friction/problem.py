@@ -1,6 +1,4 @@
-"""Pose the small problem of a step with friction.
-
-Its residual, and the scaling all its methods share, are here.
+"""Pose the small problem of a step with friction, with its residual and the scaling of all methods.
 
     w = q + G r;    0 <= r_n  perpendicular to  w_n >= 0   (bilateral rows: w_n = 0, r_n free)
     |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0)
@@ -27,7 +25,7 @@ sqrt(J), as in ``normal.lcp``.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import blas, lapack
@@ -40,17 +38,40 @@ from ...core.quantities import Positive
 from ...laws.friction import project
 from ..normal.lcp import EPS, check_gap, energy_scale, scaled_matrix
 
-Iterated = tuple[Array, int, Sequence[float]]  # scaled r, iterations, history
+FEW = 0.25  # of the unknowns: so many that carry something make a product by rows the faster one
+# of the points that stick: how many times the residual, or its rounding, their slip may be
+STILL = 4.0
+
+
+class Iterated(NamedTuple):
+    """Hold where a method ended."""
+
+    r: Array  # (m, d), scaled
+    iterations: int
+    history: Sequence[float]
+
+
+class ShortMatrices(NamedTuple):
+    """Hold what the compiled sweeps read, in single precision."""
+
+    G: Any  # (m d, m d), scaled
+    H: Any  # its inverse in 2D; None where it is not positive definite to this precision
+    blocks: Any  # (m, d, d) inverses of the blocks of H on its diagonal; None with H
 
 
 @dataclass(frozen=True)
 class FrictionResult:
     """Answer (1), when a friction method has reached its tolerance or the limit that rounding sets.
 
-    ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit;
-    ``active`` (m,): r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached,
-    under a limit that is not zero; ``residual``: largest |F| of (2) over that of r = 0. Each method
-    tells what ``iterations`` and ``history`` count.
+    Attributes:
+        r: (m, d) reactions: r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the
+            last digit.
+        active: (m,) r_n > 0 or bilateral.
+        stick: (m,) w_t = 0 but for the residual reached, under a limit that is not zero.
+        iterations: each method tells what it counts.
+        residual: the largest |F| of (2) over that of r = 0.
+        method: the settings that made it.
+        history: each method tells what it holds.
     """
 
     r: Array
@@ -72,15 +93,19 @@ class FrictionMethod(Protocol):
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Check and scale G (m d, m d) and return ``PreparedFriction`` or its like for many q.
 
-        ``bilateral`` (m,) says which rows are bilateral.
+        Args:
+            G: the Delassus operator.
+            bilateral: (m,) which rows are bilateral.
         """
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Hold what all methods here let one choose.
+    """Hold the settings that all methods here have.
 
-    This is ``tolerance``, and ``max_iterations`` that they may take.
+    Attributes:
+        tolerance: each method tells of what.
+        max_iterations: that it may take.
     """
 
     carries_friction: ClassVar[bool] = True
@@ -91,15 +116,27 @@ class Settings:
         check_fields(self)
 
 
-def inner_method(owner: str, meaning: str, value: Any) -> None:
-    """Raise InputError unless it is a method for the small problem with friction."""
+def check_inner_method(owner: str, meaning: str, value: Any) -> None:
+    """Raise InputError unless the value is a method for the small problem with friction.
+
+    Args:
+        owner: whose setting it is.
+        meaning: the name of the setting.
+        value: what was given.
+    """
     remedy = "give FrictionNewton(), NSGS(), FixedPoint() or GivenForces()"
     provides(owner, meaning, value, ("prepare", "carries_friction"), remedy, lacks=("check",))
 
 
 @dataclass(frozen=True)
 class ScaledProblem:
-    """Pose (1) in scaled numbers: q (m, d), cohesion and slope (m,)."""
+    """Pose (1) in scaled numbers.
+
+    Attributes:
+        delassus: G.
+        q: (m, d).
+        cohesion, slope: (m,).
+    """
 
     delassus: "ScaledDelassus"
     q: Array
@@ -112,18 +149,16 @@ class ScaledProblem:
         """Return m."""
         return len(self.cohesion)
 
-    def moved(self, r: Array) -> Array:
-        """Return G r (m, d), from the rows that carry something when they are few.
-
-        Of the last r it is known.
-        """
+    def product(self, r: Array) -> Array:
+        """Return G r (m, d). Of the last r it is remembered."""
         if not (self._last and np.array_equal(self._last[0], r)):
-            self._last[:] = r.copy(), self.delassus.product(r.ravel()).reshape(r.shape)
+            image = self.delassus.product(r.ravel()).reshape(r.shape)
+            self._last[:] = [r.copy(), image]
         return self._last[1]
 
     def w(self, r: Array) -> Array:
         """Return q + G r (m, d)."""
-        return self.q + self.moved(r)
+        return self.q + self.product(r)
 
     def limit(self, r_n: Array) -> Array:
         """Return cohesion + slope max(r_n, 0)."""
@@ -146,43 +181,51 @@ class ScaledProblem:
         return 16.0 * EPS * self.delassus.norm * max_abs(r)
 
     def admissible(self, r: Array) -> Array:
-        """Return r with r_n >= 0 and r_t within its disk.
-
-        This removes rounding errors, and whatever else is outside.
-        """
+        """Return r (m, d) with r_n >= 0, and r_t put onto its disk where it is outside."""
         r_n = np.where(self.delassus.bilateral, r[:, 0], np.maximum(r[:, 0], 0.0))
         return np.column_stack([r_n, project(r[:, 1:], self.limit(r_n))])
 
     def start(self, guess: Array | Mask | None) -> Array:
-        """Return reactions to start from.
+        """Return reactions (m, d), scaled, to start from.
 
-        They are those guessed, or what opens the guessed set row by row, at least energy.
+        Args:
+            guess: reactions (m, d) [N]; or the contact set (m,), of which every row is opened by
+                itself, and all are scaled to the least energy; or None for zero.
         """
         if guess is None:
             return np.zeros_like(self.q)
         if guess.dtype != bool:
             return self.admissible(guess / self.delassus.scale)
+
+        # One step of Jacobi's method on the set, and a line search for the minimum of
+        # ½ rᵀG r + qᵀr along it. The product with G serves for the scaled r too.
         held = guess & np.isfinite(self.q[:, 0])
         r = self.admissible(np.where(held[:, None], -self.q, 0.0))
         carried = r != 0.0
         if carried.any():
-            moved = self.moved(r)
-            energy = np.vdot(moved, r)  # positive, unless G is not symmetric
+            image = self.product(r)
+            energy = np.vdot(image, r)  # positive, unless G is not symmetric
             best = -(self.q[carried] @ r[carried]) / energy if energy > 0.0 else 0.0
             r *= best
-            self._last[:] = r.copy(), best * moved
+            self._last[:] = [r.copy(), best * image]
         return r
 
-    def result(self, method: object, tolerance: float, found: Iterated) -> FrictionResult:
-        """Return the result in newtons.
+    def result(self, method: object, tolerance: float, iterated: Iterated) -> FrictionResult:
+        """Judge where a method ended, and return the result in newtons.
+
+        Args:
+            method: its settings.
+            tolerance: of the residual, that of r = 0 being 1.
+            iterated: where it ended.
 
         Raises:
-            StepFailure: the residual is above ``tolerance`` and above rounding.
+            StepFailure: the residual is above the tolerance and above rounding.
         """
-        r, iterations, history = found
-        r = self.admissible(r)
+        iterations = iterated.iterations
+        r = self.admissible(iterated.r)
         w = self.w(r)
-        residual, unit = self.residual(r, w), self.unit or 1.0
+        residual = self.residual(r, w)
+        unit = self.unit or 1.0
         rounding = self.rounding(r)
         if not residual <= max(tolerance * unit, rounding):
             raise StepFailure(
@@ -190,17 +233,41 @@ class ScaledProblem:
                 f"{residual / unit:.1e}: try another friction method (FrictionNewton, NSGS, "
                 "FixedPoint), or a smaller step of time or load"
             )
-        still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
-        active = (r[:, 0] > 0.0) | self.delassus.bilateral
-        stick = still & (self.limit(r[:, 0]) > 0.0)
-        r = r * self.delassus.scale
-        return FrictionResult(r, active, stick, iterations, residual / unit, method, tuple(history))
+        is_still = np.linalg.norm(w[:, 1:], axis=1) <= STILL * max(residual, rounding)
+        return FrictionResult(
+            r=r * self.delassus.scale,
+            active=(r[:, 0] > 0.0) | self.delassus.bilateral,
+            stick=is_still & (self.limit(r[:, 0]) > 0.0),
+            iterations=iterations,
+            residual=residual / unit,
+            method=method,
+            history=tuple(iterated.history),
+        )
 
 
 class ScaledDelassus:
-    """Hold d G d with its scale (m, d): what the methods work on."""
+    """Hold d G d with its scale: what the methods work on.
+
+    Attributes:
+        scale: (m, d) the numbers d.
+        matrix: (m d, m d) the scaled G.
+        norm: the largest sum of absolute entries of one of its rows.
+        bilateral: (m,) which rows are.
+        count, dimension: m and d.
+        symmetric: whether G is.
+    """
 
     def __init__(self, G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> None:
+        """Check and scale G.
+
+        Args:
+            G: the Delassus operator (m d, m d) [m/N].
+            bilateral: (m,) which rows are bilateral.
+            unsymmetric: whether G need not be symmetric.
+
+        Raises:
+            InputError: G has not m d rows for some d, or is not finite, or not symmetric.
+        """
         m = len(bilateral)
         d = G.shape[0] // m if m else 1
         if G.ndim != 2 or G.shape != (m * d, m * d):
@@ -209,53 +276,70 @@ class ScaledDelassus:
                 "node"
             )
         scale = energy_scale(G).reshape(m, d)
-        if d > 1:
-            scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
-        self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
+        if d > 1:  # one number for the tangents of a node: disks stay disks
+            mean = np.mean(scale[:, 1:] ** -2.0, axis=1)
+            scale[:, 1:] = mean[:, None] ** -0.5
+        self.scale = scale
+        self.bilateral = bilateral.copy()
+        self.count = m
+        self.dimension = d
         self.matrix, self.norm = scaled_matrix(G, scale.ravel(), unsymmetric=unsymmetric)
         self.symmetric = not unsymmetric or np.array_equal(self.matrix, self.matrix.T)
 
     def product(self, r: Array) -> Array:
-        """Return G r, (m d,)."""
+        """Return G r (m d,). Of a symmetric G few rows are read where few carry something."""
         if not self.symmetric:
             return np.asarray(self.matrix @ r)
         carried = np.flatnonzero(r)
-        if len(carried) <= 0.25 * len(r):
+        if len(carried) <= FEW * len(r):
             return np.asarray(r[carried] @ self.matrix[carried])
         return np.asarray(blas.dsymv(1.0, self.matrix.T, r))  # reads half of it
 
-    @cached_property
-    def short(self) -> tuple[Any, ...]:
-        """Return G in single precision for the compiled sweeps and, in 2D, inverses.
-
-        These are its inverse H and the inverse of each node's block of H, in single precision too.
-        There is None for what is missing, or is not positive definite to that precision.
-        """
-        G, d = self.matrix.astype(np.float32), self.dimension
-        triangle, info = lapack.spotrf(G, lower=1) if d == 2 else (G, 1)
-        if info:
-            return G, None, None
+    def make_short(self) -> ShortMatrices:
+        """Return what the compiled sweeps read, in single precision."""
+        G = self.matrix.astype(np.float32)
+        d = self.dimension
+        if d != 2:
+            return ShortMatrices(G, None, None)
+        triangle, info = lapack.spotrf(G, lower=1)
+        if info:  # not positive definite to single precision
+            return ShortMatrices(G, None, None)
         H = lapack.spotri(triangle, lower=1)[0]
         H = np.ascontiguousarray(np.tril(H) + np.tril(H, -1).T)
         places = np.arange(len(H)).reshape(-1, d)
-        return G, H, np.ascontiguousarray(np.linalg.inv(H[places[:, :, None], places[:, None, :]]))
+        blocks = np.linalg.inv(H[places[:, :, None], places[:, None, :]])
+        return ShortMatrices(G, H, np.ascontiguousarray(blocks))
 
     @cached_property
     def inverse(self) -> Array | None:
         """Return the inverse of the matrix; None where it is not positive definite to rounding."""
-        inverse, info = lapack.dpotri(lapack.dpotrf(self.matrix, lower=1)[0], lower=1)
+        factor = lapack.dpotrf(self.matrix, lower=1)[0]
+        inverse, info = lapack.dpotri(factor, lower=1)
         return None if info else np.tril(inverse) + np.tril(inverse, -1).T
 
     def problem(self, q: Array, cohesion: Array, slope: Array) -> ScaledProblem:
-        """Return problem (1) in scaled numbers."""
+        """Return problem (1) in scaled numbers.
+
+        Args:
+            q: (m, d) gap, and minus the slip, without reactions [m].
+            cohesion: (m,) [N].
+            slope: (m,).
+
+        Raises:
+            InputError: q contains NaN, or infinity where no gap may be open for ever.
+        """
         check_gap(q[:, 0], self.bilateral)
         if not np.isfinite(q[:, 1:]).all():
             raise InputError(
                 "the slip without reactions contains NaN or infinity: check the loads of this step"
             )
-        normal, tangential = self.scale[:, 0], self.scale[:, -1]
+        normal = self.scale[:, 0]
+        tangential = self.scale[:, -1]
         return ScaledProblem(
-            self, q * self.scale, cohesion / tangential, slope * (normal / tangential)
+            self,
+            q=q * self.scale,
+            cohesion=cohesion / tangential,
+            slope=slope * (normal / tangential),
         )
 
 
@@ -263,7 +347,11 @@ class ScaledDelassus:
 class PreparedFriction:
     """Solve (1) for one G and many right-hand sides.
 
-    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``.
+    Attributes:
+        method: the settings.
+        tolerance: the residual above which an answer is refused, that of r = 0 being 1.
+        delassus: G.
+        loop: (problem, where to start) -> where the method ended.
     """
 
     method: object
@@ -274,11 +362,17 @@ class PreparedFriction:
     def solve(
         self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None
     ) -> FrictionResult:
-        """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,).
+        """Solve (1).
 
-        ``guess``: predicted contact set (m,), or reactions (m, d). StepFailure when the tolerance
-        is not reached.
+        Args:
+            q: (m, d) gap, and minus the slip, without reactions.
+            cohesion: (m,) [as r].
+            slope: (m,).
+            guess: (m,) predicted contact set, or reactions (m, d).
+
+        Raises:
+            StepFailure: the tolerance is not reached.
         """
         step = self.delassus.problem(q, cohesion, slope)
-        found = self.loop(step, step.start(guess if step.unit > 0.0 else None))
-        return step.result(self.method, self.tolerance, found)
+        start = step.start(guess if step.unit > 0.0 else None)
+        return step.result(self.method, self.tolerance, self.loop(step, start))

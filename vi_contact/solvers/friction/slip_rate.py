@@ -1,6 +1,6 @@
-"""Iterate over friction coefficients that depend on the slip rate.
+"""Iterate over friction coefficients that depend on the slip rate of the step itself.
 
-The rate is that of the step itself; ordinary problems are solved in turn.
+Problems with given coefficients are solved in turn.
 
     mu <- mu(|v|),    v = rate_factor w_t(mu)
     w_t(mu): slip of the step with the coefficients mu given                                    (1)
@@ -28,17 +28,20 @@ from ...core.errors import StepFailure
 from ...core.protocols import FrictionLaw
 from ...core.quantities import Positive
 from ...core.step import StepProblem
-from .extrapolation import Anderson, Extrapolation, accelerated
+from .extrapolation import Anderson, Extrapolation, check_extrapolation
 
 
 @dataclass(frozen=True)
 class RateIteration:
-    """Hold the settings.
+    """Hold the settings of the iteration over coefficients.
 
-    ``tolerance``: change of coefficients over the largest; ``extrapolation``: the next guess.
+    In the result ``iterations`` counts those of all inner problems, and ``history`` is the change
+    of the coefficients in each iteration.
 
-    ``iterations`` of the result counts those of all inner problems, ``history`` is the change in
-    each iteration.
+    Attributes:
+        tolerance: change of the coefficients over the largest.
+        max_iterations: number of inner problems, at most.
+        extrapolation: how the next coefficients follow.
     """
 
     tolerance: Annotated[float, Positive] = 1e-12
@@ -46,7 +49,7 @@ class RateIteration:
     extrapolation: Extrapolation = field(default_factory=lambda: Anderson(depth=5, after=4))
 
     def __post_init__(self) -> None:
-        accelerated("RateIteration", self.extrapolation)
+        check_extrapolation("RateIteration", self.extrapolation)
         check_fields(self)
 
     def solve(
@@ -57,30 +60,39 @@ class RateIteration:
         solved: Callable[[Array, Any], Any],
         slip: Callable[[Any], Array],
     ) -> Any:
-        """Iterate from mu, the coefficients under the law at ``rest``.
+        """Iterate over the coefficients. A law without rates is solved for once. Collective.
 
-        They are those of all conditions. A law without rates is solved for once.
+        Args:
+            step: the step.
+            rest: its law at rest.
+            mu: coefficients of all conditions under this law, to begin with.
+            solved: solves the problem of given coefficients, and begins from the last answer, None
+                at first.
+            slip: makes B_t x - slip0 (m, d - 1) of this rank from an answer.
 
-        ``solved``: the problem of given coefficients, starting from the last result, None at first;
-        ``slip``: that of a result, B_t x - slip0 (m, d - 1) of this rank. StepFailure when the
-        tolerance is not reached. Collective.
+        Returns:
+            The last answer of ``solved``.
+
+        Raises:
+            StepFailure: the tolerance is not reached.
         """
         if rest is step.friction:
             return solved(mu, None)
-        following, spent, surface = self.extrapolation.start(), 0, step.surface
+        surface = step.surface
+        choose_next = self.extrapolation.start()
+        iterations = 0
         history: list[float] = []
-        found = None
+        answer = None
         while len(history) < self.max_iterations:
-            found = solved(mu, found)
-            spent += found.iterations
-            new = np.asarray(
-                surface.everywhere(slope_of(step.friction_at(slip(found)), surface.weights))
-            )
+            answer = solved(mu, answer)
+            iterations += answer.iterations
+            law = step.friction_at(slip(answer))
+            new = np.asarray(surface.everywhere(slope_of(law, surface.weights)))
             size = max(max_abs(new), max_abs(mu))
             history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:
-                return replace(found, iterations=spent, history=tuple(history))
-            mu = np.maximum(following(mu, new), 0.0)
+                return replace(answer, iterations=iterations, history=tuple(history))
+            mu = np.maximum(choose_next(mu, new), 0.0)
         raise StepFailure(
             f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the "
             "friction coefficients: take a smaller time step, or let mu(v) vary less with the slip "

@@ -1,6 +1,6 @@
 """Solve on the free unknowns of one contact set by PETSc's conjugate gradients.
 
-A watch may stop them.
+A function watches them, and may stop them.
 
 PETSc sees the whole operator and a preconditioner that masks: directions have no part in held rows,
 so that iterates and inner products are those of the reduced system, and the residual that PETSc
@@ -20,10 +20,16 @@ from ..volume.snes import Lent, weakly
 from .operator import Operator
 from .preconditioners import Masked
 
+# (iterations, residual, what makes the present x) -> PETSc's reason to stop, or 0
 Watch = Callable[[int, Array, Callable[[], Array]], int]
-SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
-# too many iterations; not a number; indefinite matrix
-STAGNATED, NOT_A_NUMBER, INDEFINITE = (-3, -9, -10)
+
+# PETSc's reasons for stopping, as they are used here.
+SOLVED = 3  # below an absolute tolerance
+WRONG_SIGNS = 2  # below a relative one
+STAGNATED = -3  # too many iterations
+NOT_A_NUMBER = -9
+INDEFINITE = -10  # the matrix is
+
 _OTHER_PRECONDITIONER = (
     "take another preconditioner, or Condensed() where a factor fits into memory"
 )
@@ -31,7 +37,7 @@ _CHECK_MATRIX = (
     "check that every body is held or has mass, that A is positive definite, and that "
     "no material is a million times stiffer than its neighbour"
 )
-# PETSc's reasons for stopping: number -> (what happened, what helps).
+# Reason -> (what happened, what helps).
 REASONS: Mapping[int, tuple[str, str]] = {
     2: ("the contact set did not settle", _OTHER_PRECONDITIONER),
     -3: ("the residual stagnated", f"{_CHECK_MATRIX}; else {_OTHER_PRECONDITIONER}"),
@@ -50,13 +56,20 @@ SHOWN = 6  # residuals
 
 
 class ConjugateGradients:
-    """Run PETSc's KSP ``cg``; ``ksp`` is the PETSc object."""
+    """Run PETSc's KSP ``cg``.
+
+    Attributes:
+        ksp: the PETSc object.
+    """
 
     def __init__(self, operator: Operator, masked: Masked) -> None:
+        """Make the solver of A with the closed springs, preconditioned on free unknowns."""
         shell = operator.shell()
         self._b, self._x = shell.createVecs()
         self._residual = self._b.duplicate()
-        self._operator, self._masked = operator, masked  # for as long as PETSc applies them
+        # Held for as long as PETSc applies them.
+        self._operator = operator
+        self._masked = masked
         self._watch: Watch = lambda its, residual, x: SOLVED
         self.ksp = PETSc.KSP().create(shell.comm)
         self.ksp.setOperators(shell)
@@ -68,12 +81,18 @@ class ConjugateGradients:
         self.ksp.pc.setPythonContext(Lent(masked))
 
     def solve(self, residual: Array, x: Array, watch: Watch) -> tuple[Array, Array, int]:
-        """Return (x, residual, PETSc's reason) of where the watch stopped.
+        """Solve from x until the watch says stop. Collective.
 
-        ``watch(iterations, residual, x)`` returned a reason there; its x is a function.
-        ``residual`` is that of x, with which it begins.
+        Args:
+            residual: padded, at x.
+            x: padded.
+            watch: is asked after every iteration.
+
+        Returns:
+            x and its residual where it stopped, and the reason that the watch gave.
         """
-        self._watch, self._start = watch, x
+        self._watch = watch
+        self._start = x
         self._b.array[:] = residual
         self.ksp.solve(self._b, self._x)
         self._operator.work.linear_iterations += self.ksp.getIterationNumber()
@@ -84,30 +103,33 @@ class ConjugateGradients:
         )
 
     def _test(self, ksp: Any, iteration: int, _norm: float) -> int:
+        """Ask the watch, as a convergence test of PETSc."""
         ksp.buildResidual(self._residual)
         return self._watch(
             iteration, self._residual.array_r, lambda: self._start + ksp.getSolution().array_r
         )
 
 
-def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
-    """Return the failure of a solver that stopped for PETSc's ``reason``.
+def cg_failure(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
+    """Return the error of a solver that stopped without an answer.
 
-    ``history`` are residuals over the forces.
+    Args:
+        name: of the solver.
+        reason: PETSc's.
+        iterations: linear ones of the step.
+        history: residuals over the forces.
     """
     words, remedy = REASONS.get(reason, CG_BROKE_DOWN)
     return StepFailure(
         f"{name} stopped after {iterations} linear iterations, {words} (residuals "
-        f"{told(history)}): {remedy}"
+        f"{format_residuals(history)}): {remedy}"
     )
 
 
-def told(history: Sequence[float]) -> str:
-    """Return the first residual, some, and the last."""
+def format_residuals(history: Sequence[float]) -> str:
+    """Return the first residual, some, and the last, as a text."""
     last = len(history) - 1
-    chosen = (
-        sorted({round(i * last / (SHOWN - 1)) for i in range(SHOWN)})
-        if last > 0
-        else range(len(history))
-    )
-    return ", ".join(f"{history[i]:.1e}" for i in chosen) or "none"
+    shown: Sequence[int] = range(len(history))
+    if last > 0:
+        shown = sorted({round(i * last / (SHOWN - 1)) for i in range(SHOWN)})
+    return ", ".join(f"{history[i]:.1e}" for i in shown) or "none"

@@ -1,6 +1,4 @@
-"""Hold the contact conditions of a step on the full-size vectors.
-
-It is known which are closed, and which of them have wrong signs.
+"""Hold the contact conditions of a step on the full-size vectors: which of them are closed.
 
 A closed rigid condition holds its unknown on the bound; the residual there is the reaction. A
 closed spring, of stiffness k = scale / compliance, leaves its unknown free and adds k to the
@@ -23,7 +21,14 @@ CLOSING = 1e-12  # penetration, relative to |x|, that closes a condition at the 
 class Contact:
     """Hold the closed set of one step.
 
-    ``rows`` say where the normal unknowns stand in the padded vectors of ``size``.
+    Attributes:
+        rows: (m,) where the normal unknowns stand in padded vectors.
+        closed: (m,) which conditions are closed.
+        bilateral, soft: (m,) which are always closed, and which are springs.
+        k: (m,) stiffness of the springs, in the unit of A.
+        diagonal: (m,) of A in the rows.
+        reach: (m,) which conditions have a finite bound.
+        bound: (m,) upper bounds, zero where they are not finite.
     """
 
     def __init__(
@@ -34,22 +39,31 @@ class Contact:
         diagonal: Array,
         missing: Indices,
     ) -> None:
-        self._owned, self.rows, self._size, self._missing = (
-            surface.owned,
-            rows,
-            len(diagonal),
-            missing,
-        )
-        self.bilateral, self.soft = surface.bilateral, surface.compliance > 0.0
+        """Take the conditions of a surface.
+
+        Args:
+            surface: the contact surface.
+            scale: of reactions, over which compliances are divided.
+            rows: (m,) where the normal unknowns stand in padded vectors.
+            diagonal: of A, padded.
+            missing: places in padded vectors that are no unknowns.
+        """
+        self._owned = surface.owned
+        self.rows = rows
+        self._size = len(diagonal)
+        self._missing = missing
+        self.bilateral = surface.bilateral
+        self.soft = surface.compliance > 0.0
         self.k = np.zeros(len(rows))
         self.k[self.soft] = scale / surface.compliance[self.soft]
         self.diagonal = diagonal[rows]
         self.closed: Mask = np.zeros(len(rows), dtype=bool)
 
     def begin(self, step: StepProblem) -> None:
-        """Take the bounds of a step, and its predicted set.
+        """Take the bounds of a step, and its predicted set with what the guess lets penetrate.
 
-        The points that the guess lets penetrate are added to it.
+        Raises:
+            InputError: on all ranks, where a bound is NaN.
         """
         if step.surface.some(np.isnan(step.bound)):
             raise InputError(
@@ -69,8 +83,8 @@ class Contact:
     @property
     def sprung(self) -> tuple[Indices, Array]:
         """Return rows and stiffnesses of the springs that are closed."""
-        chosen = self.closed & self.soft
-        return self.rows[chosen], self.k[chosen]
+        closed_springs = self.closed & self.soft
+        return self.rows[closed_springs], self.k[closed_springs]
 
     def place(self, x: Array) -> None:
         """Put the held unknowns of x on their bounds."""
@@ -86,68 +100,85 @@ class Contact:
         return load
 
     def weights(self) -> Array:
-        """Return the mask of the free unknowns.
+        """Return the mask w of the free unknowns, padded, for the preconditioner w M⁻¹ w.
 
-        It is 1, 0 where held or missing, and less than 1 at closed springs.
-
-        w M⁻¹ w is the preconditioner: sqrt(A_ii / (A_ii + k)) at a spring gives M the diagonal of A
-        + k there, and tends to the mask as the spring becomes rigid.
+        It is 0 where an unknown is held or missing, and 1 elsewhere. At a closed spring it is
+        sqrt(A_ii / (A_ii + k)), which gives M the diagonal of A + k there, and tends to 0 as the
+        spring becomes rigid.
         """
         w = np.ones(self._size)
         w[self._missing] = 0.0
         w[self.held] = 0.0
-        chosen = self.closed & self.soft
-        w[self.rows[chosen]] = np.sqrt(
-            self.diagonal[chosen] / (self.diagonal[chosen] + self.k[chosen])
-        )
+        springs = self.closed & self.soft
+        diagonal = self.diagonal[springs]
+        w[self.rows[springs]] = np.sqrt(diagonal / (diagonal + self.k[springs]))
         return w
 
     def reactions(self, x: Array, residual: Array) -> Array:
-        """Return r_n of the closed conditions, zero of the others.
+        """Return r_n (m,) of the closed conditions, zero of the others.
 
-        ``residual`` is load - (A + K_s) x.
+        ``residual`` is load - (A + K_s) x, padded like x.
         """
-        return np.where(
-            self.soft, self.spring_forces(x), np.where(self.closed, residual[self.rows], 0.0)
-        )
+        rigid = np.where(self.closed, residual[self.rows], 0.0)
+        return np.where(self.soft, self.spring_forces(x), rigid)
 
     def spring_forces(self, x: Array) -> Array:
         """Return the forces of the closed springs, zero of all other conditions."""
         return np.where(self.closed & self.soft, self.k * (x[self.rows] - self.bound), 0.0)
 
     def body_forces(self, x: Array, residual: Array, load: Array) -> float:
-        """Return the largest |A x| on this rank, without the springs."""
+        """Return the largest |A x| on this rank, without the springs.
+
+        Args:
+            x: padded.
+            residual: load - (A + K_s) x.
+            load: b with the load of closed springs, padded.
+        """
         Ax = load - residual
         rows, k = self.sprung
         Ax[rows] -= k * x[rows]
         Ax[self._missing] = 0.0
         return max_abs(Ax)
 
-    def wrong(self, x: Array, r: Array, *, error: float, least_force: float, x_ref: float) -> Mask:
-        """Return the conditions whose signs are wrong by more than ``error``, the largest residual.
+    def wrong_signs(
+        self, x: Array, r_n: Array, *, error: float, least_force: float, x_ref: float
+    ) -> Mask:
+        """Return the conditions (m,) whose signs are wrong by more than the error.
 
-        A closed one pulls: r below -error and -least_force; an open one has penetrated by more than
-        the error moves its unknown, error / A_ii, and by more than round-off.
+        A closed one is wrong that pulls, an open one that has penetrated by more than the error
+        moves its unknown.
+
+        Args:
+            x: padded.
+            r_n: (m,) reactions.
+            error: the largest residual of free unknowns.
+            least_force: tension that rounding may leave.
+            x_ref: size of displacements, by which the rounding of a gap is judged.
         """
-        stiff = np.where(self.soft, self.k / (self.diagonal + self.k), 1.0)
-        pulls = self.closed & ~self.bilateral & (r < -np.maximum(least_force, error * stiff))
+        # A force on the unknown of a spring is carried by the spring and by the body.
+        carried = np.where(self.soft, self.k / (self.diagonal + self.k), 1.0)
+        pulls = r_n < -np.maximum(least_force, error * carried)
         inside = x[self.rows] - self.bound > np.maximum(CLOSING * x_ref, error / self.diagonal)
-        return np.asarray(pulls | (~self.closed & self.reach & inside))
+        should_open = self.closed & ~self.bilateral & pulls
+        should_close = ~self.closed & self.reach & inside
+        return np.asarray(should_open | should_close)
 
     def change(self, wrong: Mask) -> None:
         """Close what is open and open what is closed of these conditions."""
         self.closed = self.closed ^ wrong
 
-    def feasible(self, x: Array) -> Array:
-        """Return x with no rigid support penetrated."""
+    def project(self, x: Array) -> Array:
+        """Return x with no rigid support penetrated, and bilateral ones on their bound."""
         x = x.copy()
         rigid = self.reach & ~self.soft
-        rows, bound = self.rows[rigid], self.bound[rigid]
+        rows = self.rows[rigid]
+        bound = self.bound[rigid]
         x[rows] = np.where(self.bilateral[rigid], bound, np.minimum(x[rows], bound))
         return x
 
     @property
     def _one_sided_springs(self) -> Mask:
+        """Return which conditions are springs that open."""
         return self.soft & ~self.bilateral & self.reach
 
     def close_springs(self, x: Array | None) -> None:
@@ -156,15 +187,23 @@ class Contact:
         self.closed = np.where(self._one_sided_springs, pressed, self.closed)
 
     def spring_slope(self, x: Array, d: Array, t: float) -> float:
-        """Return sum k max(x + t d - bound, 0) d over the one-sided springs of this rank."""
-        rows, bound, k = (
-            values[self._one_sided_springs] for values in (self.rows, self.bound, self.k)
-        )
-        return float(np.sum(k * np.maximum(x[rows] + t * d[rows] - bound, 0.0) * d[rows]))
+        """Return sum k max(x + t d - bound, 0) d over the one-sided springs of this rank.
+
+        It is the slope of their energy along the line.
+
+        Args:
+            x: padded, where the line begins.
+            d: padded, its direction.
+            t: how far along it.
+        """
+        springs = self._one_sided_springs
+        rows = self.rows[springs]
+        pressed = np.maximum(x[rows] + t * d[rows] - self.bound[springs], 0.0)
+        return float(np.sum(self.k[springs] * pressed * d[rows]))
 
     def fingerprint(self) -> float:
-        """Return a number of the closed set of this rank.
+        """Return a number for the closed set of this rank.
 
-        Its sum over ranks tells sets apart, in all likelihood.
+        Sums over ranks of two sets are different, in all likelihood.
         """
         return float(zlib.crc32(np.packbits(self.closed).tobytes()))

@@ -39,32 +39,47 @@ DIFFERENCE = 1e-6  # of the slip, for the derivative of coefficients
 class Tangents:
     """Read the tangential unknowns of padded vectors.
 
-    ``rows`` (L,): where the free ones are, point by point.
+    Attributes:
+        rows: (L,) where the free ones are, point by point.
+        rubs: (m,) which points have one.
+        c: (m,) stiffness of each point: the mean of the diagonal of A over its tangents.
     """
 
     def __init__(self, surface: ContactSurface, places: Indices, diagonal: Array) -> None:
+        """Note where the tangents are.
+
+        Args:
+            surface: the contact surface.
+            places: where the unknowns of this rank stand in padded vectors.
+            diagonal: of A, padded.
+        """
         self._free = surface.tangents >= 0
         self.rows: Indices = places[surface.tangents[self._free]]
         count = self._free.sum(axis=1)
         self.rubs: Mask = count > 0
-        self.c = np.where(self.rubs, np.sum(self.of(diagonal), axis=1) / np.maximum(count, 1), 1.0)
+        mean = np.sum(self.values(diagonal), axis=1) / np.maximum(count, 1)
+        self.c = np.where(self.rubs, mean, 1.0)
 
-    def of(self, v: Array) -> Array:
+    def values(self, v: Array) -> Array:
         """Return the tangential values (m, d - 1) of v, zero where a tangent is prescribed."""
         table = np.zeros(self._free.shape)
         table[self._free] = v[self.rows]
         return table
 
-    def flat(self, table: Array) -> Array:
+    def flatten(self, table: Array) -> Array:
         """Return the entries of a table (m, d - 1) for ``rows``."""
         return np.asarray(table[self._free])
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Hold the friction limit cohesion + slope r_n of every point.
+    """Hold the friction limit of every point, cohesion + slope r_n.
 
-    Its ``rise`` [A] with the slip, and the limit at rest, are held too.
+    Attributes:
+        cohesion: (m,) the limit without pressure.
+        slope: (m,) by how much it grows with r_n.
+        rise: (m,) by how much it grows with the slip, in the unit of A.
+        rest: the limits of points at rest, where they are others.
     """
 
     cohesion: Array
@@ -73,15 +88,17 @@ class Limits:
     rest: "Limits | None" = None
 
     def __call__(self, r_n: Array) -> Array:
-        """Return the limit (m,): tension rubs on nothing."""
+        """Return the limit (m,): a point in tension has no friction but its cohesion."""
         return self.cohesion + self.slope * np.maximum(r_n, 0.0)
 
-    def sticking(self, r_n: Array) -> Array:
+    def below_which_points_stick(self, r_n: Array) -> Array:
         """Return the limit (m,) below which a point sticks.
 
-        It is that of a slip that is slower under the law, or of rest.
+        It is the smaller one of those at the slip and at rest.
         """
-        return self(r_n) if self.rest is None else np.minimum(self(r_n), self.rest(r_n))
+        if self.rest is None:
+            return self(r_n)
+        return np.minimum(self(r_n), self.rest(r_n))
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -90,12 +107,12 @@ def dot(a: Array, b: Array) -> Array:
 
 
 class States:
-    """Take the states at y_n (m,), y_t (m, d - 1), and with them the linear problem.
+    """Hold which points stick and slip at some y, and the linear problem of these states.
 
-    ``slip``: s where y was taken.
-
-    Slip that turned back since ``before`` overshot, and sticks first. ``stuck``: points that stick,
-    whatever y says.
+    Attributes:
+        stick, slips: (m,) which points stick, and which slip.
+        direction: (m, d - 1) n of the points that slip, zero of all others.
+        kappa: (m,) curvature of the disk, zero of points that do not slip, and in 2D.
     """
 
     def __init__(
@@ -108,29 +125,44 @@ class States:
         before: "States | None" = None,
         stuck: Mask | None = None,
     ) -> None:
+        """Take the states at y.
+
+        Args:
+            tangents: where the tangents are.
+            limits: of friction at this slip.
+            y: y_n (m,) and y_t (m, d - 1).
+            slip: s (m, d - 1), where y was taken.
+            before: the states before; a slip that turned back since then overshot, and sticks.
+            stuck: (m,) points that stick, whatever y says.
+        """
         self._tangents = tangents
         y_n, y_t = y
-        limit, size, c = limits(y_n), np.linalg.norm(y_t, axis=1), tangents.c
-        sticks = size <= limits.sticking(y_n)
+        limit = limits(y_n)
+        size = np.linalg.norm(y_t, axis=1)
+        c = tangents.c
+
+        # Which points stick and which slip; one without a limit does neither.
+        sticks = size <= limits.below_which_points_stick(y_n)
         if before is not None:
             sticks |= dot(before.direction, y_t) < 0.0
-        self.stick: Mask = tangents.rubs & (limit > 0.0) & sticks
+        has_friction = tangents.rubs & (limit > 0.0)
+        self.stick: Mask = has_friction & sticks
         if stuck is not None:
             self.stick |= stuck & tangents.rubs
-        self.slips: Mask = tangents.rubs & (limit > 0.0) & ~self.stick
-        over = np.where(
-            self.slips, np.where(size > limit, size - limit, c * np.linalg.norm(slip, axis=1)), 1.0
-        )
-        self.direction: Array = (
-            np.where(self.slips[:, None], y_t, 0.0) / np.where(self.slips, size, 1.0)[:, None]
-        )
-        self.kappa = np.where(
-            self.slips,
-            np.minimum(limit * c / np.maximum(over, limit / STIFFEST), STIFFEST * c),
-            0.0,
-        )
+        self.slips: Mask = has_friction & ~self.stick
+
+        # n = y/|y|, and kappa = limit c / (|y| - limit). A point that slips with |y| below its
+        # limit, as one may between the limits of slip and of rest, has c |s| for the difference.
+        slip_size = np.linalg.norm(slip, axis=1)
+        over = np.where(self.slips, np.where(size > limit, size - limit, c * slip_size), 1.0)
+        y_of_slips = np.where(self.slips[:, None], y_t, 0.0)
+        self.direction: Array = y_of_slips / np.where(self.slips, size, 1.0)[:, None]
+        kappa = np.minimum(limit * c / np.maximum(over, limit / STIFFEST), STIFFEST * c)
+        self.kappa = np.where(self.slips, kappa, 0.0)
         if y_t.shape[1] < 2:
             self.kappa[:] = 0.0
+
+        # The coefficients of the linearised law, and n·s of the slip that it is linearised about.
         self._growth = np.where(self.slips & (y_n > 0.0), limits.slope, 0.0)
         self._cohesion = np.where(self.slips, limits.cohesion, 0.0)
         self._rise = np.where(self.slips, limits.rise, 0.0)
@@ -140,39 +172,42 @@ class States:
     def held(self) -> Indices:
         """Return the rows of the tangents that stick."""
         sticks = np.repeat(self.stick[:, None], self.direction.shape[1], axis=1)
-        return self._tangents.rows[self._tangents.flat(sticks)]
+        return self._tangents.rows[self._tangents.flatten(sticks)]
 
-    def turned(self, p: Array) -> Array:
+    def turn(self, p: Array) -> Array:
         """Return kappa (p - n n·p) + rise n n·p of tangential values p (m, d - 1)."""
         along = dot(self.direction, p)
-        return (
-            self.kappa[:, None] * p + ((self._rise - self.kappa) * along)[:, None] * self.direction
-        )
+        across = self.kappa[:, None] * p
+        return across + ((self._rise - self.kappa) * along)[:, None] * self.direction
 
     def apply(self, contact: Contact, p: Array, y: Array) -> None:
-        """Turn y = A p into the product of p with the matrix of the linear problem.
+        """Make of y = A p the product of p with the matrix of the linear problem, in place.
 
-        It changes the rows of the tangents.
+        Args:
+            contact: the closed set.
+            p: padded vector.
+            y: A p, padded, whose rows of tangents are changed.
         """
         tangents = self._tangents
-        rise = np.where(contact.soft, contact.k * p[contact.rows], -y[contact.rows])
-        extra = self.turned(tangents.of(p)) + (self._growth * rise)[:, None] * self.direction
-        y[tangents.rows] += tangents.flat(extra)
+        rise_of_r_n = np.where(contact.soft, contact.k * p[contact.rows], -y[contact.rows])
+        turn = self.turn(tangents.values(p))
+        extra = turn + (self._growth * rise_of_r_n)[:, None] * self.direction
+        y[tangents.rows] += tangents.flatten(extra)
 
     def residual(self, r_n: Array, r_t: Array, slip: Array) -> Array:
-        """Return the residual (m, d - 1) of the linear problem.
+        """Return the residual (m, d - 1) of the linear problem, as if no point stuck.
 
-        It is that of all points as if they did not stick.
+        Args:
+            r_n: (m,), normal reactions.
+            r_t: (m, d - 1), friction.
+            slip: (m, d - 1).
         """
         limit = self._cohesion + self._growth * r_n - self._rise * self._base
-        return np.asarray(r_t - limit[:, None] * self.direction - self.turned(slip))
+        return np.asarray(r_t - limit[:, None] * self.direction - self.turn(slip))
 
 
 class LawOfStep:
-    """Evaluate the friction law of a step.
-
-    Its limits are affine in r_n, with coefficients that may depend on the slip rate. ``settled``:
-    the coefficients are constant, or follow the slip by now.
+    """Evaluate the friction law of a step: limits affine in r_n.
 
     A law with rates may have several solutions where it weakens. As in ``friction.slip_rate`` the
     step begins with the coefficients of rest and takes those of the slip found in a few rounds;
@@ -188,60 +223,76 @@ class LawOfStep:
         self._step = step
         rest = np.zeros((step.surface.count, step.surface.tangents.shape[1]))
         self._constant = step.rate_factor == 0.0 or step.friction_at(rest) is step.friction
-        self._given, self._left = rest, 0 if self._constant else ROUNDS
-        self._limit, self._tresca = np.zeros(len(rest)), 0
+        self._given_slip = rest
+        self._rounds_of_slip = 0 if self._constant else ROUNDS
+        self._given_limit = np.zeros(len(rest))
+        self._rounds_of_limit = 0
 
     @property
     def settled(self) -> bool:
-        """Say whether an answer with the present coefficients is one of the step."""
-        return self._left == 0 and self._tresca == 0
+        """Say whether an answer with the present coefficients is one of the step.
+
+        They are constant then, or follow the slip.
+        """
+        return self._rounds_of_slip == 0 and self._rounds_of_limit == 0
 
     def advance(self, slip: Array, r_n: Array) -> None:
-        """Take the coefficients of this slip (m, d - 1), or the limits of r_n.
-
-        After some rounds they follow.
-        """
-        if self._tresca:
-            self._tresca -= 1
-            self._limit = self._at(slip)(r_n)
+        """End a round: give the coefficients of this slip (m, d - 1), or the limits of r_n (m,)."""
+        if self._rounds_of_limit:
+            self._rounds_of_limit -= 1
+            self._given_limit = self._limits_at(slip)(r_n)
         else:
-            self._given = slip
-            self._left -= 1
+            self._given_slip = slip
+            self._rounds_of_slip -= 1
 
     def give(self, rounds: int, slip: Array, r_n: Array) -> None:
         """Begin rounds of given coefficients, those of rest.
 
         Where coefficients are constant, the rounds are of given limits.
+
+        Args:
+            rounds: their number.
+            slip: (m, d - 1), the present one.
+            r_n: (m,), the present one.
         """
         if self._constant:
-            self._limit, self._tresca = self._at(slip)(r_n), rounds
+            self._given_limit = self._limits_at(slip)(r_n)
+            self._rounds_of_limit = rounds
         else:
-            self._given, self._left = np.zeros_like(slip), rounds
+            self._given_slip = np.zeros_like(slip)
+            self._rounds_of_slip = rounds
 
     def __call__(self, slip: Array, r_n: Array, reach: Array) -> Limits:
-        """Return the limits at this slip, or at the one that is given.
+        """Return the limits at this slip, or those that are given.
 
-        ``reach`` (m,): slips that points at rest may come to; they rise with the law where it
-        grows.
+        Args:
+            slip: (m, d - 1).
+            r_n: (m,), at which the rise with the slip is taken.
+            reach: (m,), slips that points at rest may come to; their limits rise with the law where
+                it grows.
         """
-        if self._tresca:
-            none = np.zeros_like(self._limit)
-            return Limits(self._limit, none, none)
-        if self._constant or self._left:
-            return self._at(self._given)
-        here, rest, size = (
-            self._at(slip),
-            self._at(np.zeros_like(slip)),
-            np.linalg.norm(slip, axis=1),
-        )
+        if self._rounds_of_limit:
+            none = np.zeros_like(self._given_limit)
+            return Limits(self._given_limit, none, none)
+        if self._constant or self._rounds_of_slip:
+            return self._limits_at(self._given_slip)
+
+        # The derivative with the slip, by a difference; only the size of the slip counts.
+        here = self._limits_at(slip)
+        rest = self._limits_at(np.zeros_like(slip))
+        size = np.linalg.norm(slip, axis=1)
         moved = size > 0.0
         h = DIFFERENCE * np.where(moved, size, reach)
-        change = self._at(np.column_stack([size + h, *np.zeros_like(slip.T[1:])]))(r_n) - here(r_n)
+        further = np.column_stack([size + h, *np.zeros_like(slip.T[1:])])
+        change = self._limits_at(further)(r_n) - here(r_n)
         rise = np.where(h > 0.0, change, 0.0) / np.where(h > 0.0, h, 1.0)
-        return Limits(here.cohesion, here.slope, np.where(moved, rise, np.maximum(rise, 0.0)), rest)
+        rise = np.where(moved, rise, np.maximum(rise, 0.0))
+        return Limits(here.cohesion, here.slope, rise, rest)
 
-    def _at(self, slip: Array) -> Limits:
-        step, none = self._step, np.zeros(self._step.surface.count)
+    def _limits_at(self, slip: Array) -> Limits:
+        """Return the limits under the coefficients of a slip (m, d - 1)."""
+        step = self._step
+        none = np.zeros(step.surface.count)
         law = step.friction_at(slip)
         weights = step.surface.weights
         return Limits(limit_of(law, none, weights, step.scale), slope_of(law, weights), none)

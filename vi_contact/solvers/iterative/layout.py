@@ -1,6 +1,4 @@
-"""Number the unknowns in whole nodes.
-
-Matrices can then be stored in blocks of the components of two nodes.
+"""Number the unknowns in whole nodes, so that matrices can be stored in blocks of two nodes.
 
 A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric
 matrix serves for all of it (SBAIJ): it takes a third of the time. Prescribed components are no
@@ -22,11 +20,13 @@ from ..volume.bounded_system import assembled
 
 @dataclass(frozen=True)
 class Layout:
-    """Say where this rank's unknowns stand among those of whole nodes.
+    """Say where this rank's unknowns stand among the components of whole nodes.
 
-    They stand in ``places`` (n,) of ``size``, ``width`` a node.
-
-    ``complete``: on no rank is there a component of a node that is no unknown.
+    Attributes:
+        width: components of a node.
+        places: (n,) where the unknowns stand in padded vectors.
+        size: length of padded vectors.
+        complete: whether all components are unknowns, on all ranks.
     """
 
     width: int
@@ -47,7 +47,7 @@ class Layout:
 
     def stripped(self, values: Array) -> Array:
         """Return the values of the unknowns; a copy."""
-        return values[self.places] if not self.complete else np.array(values)
+        return np.array(values) if self.complete else values[self.places]
 
     @property
     def missing(self) -> Indices:
@@ -63,6 +63,8 @@ def layout_of(A: EffectiveMatrix) -> Layout:
     n = A.matrix.rows
     if A.space is None or A.space.dimension == 1:
         return Layout(1, np.arange(n), n, complete=True)
+
+    # A node begins where its number changes, or where the component does not grow.
     d = int(A.space.dimension)
     node, component = np.divmod(np.asarray(A.space.ids), d)
     first = np.ones(n, dtype=bool)
@@ -76,7 +78,9 @@ class Nodewise:
     """Make matrices of A in whole nodes."""
 
     def __init__(self, A: EffectiveMatrix) -> None:
-        self.A, self.layout = A, layout_of(A)
+        """Make the layout of A. Collective."""
+        self.A = A
+        self.layout = layout_of(A)
 
     @cached_property
     def source(self) -> Any:
@@ -88,34 +92,35 @@ class Nodewise:
 
         Collective.
         """
-        layout, kind, d = self.layout, PETSc.IntType, self.layout.width
-        stored = getattr(self.A.matrix, "stored", None)
+        layout = self.layout
+        d = layout.width
         if d == 1:
             return self.source
-        if (
-            layout.complete
-            and stored is not None
-            and "sbaij" in stored.getType()
-            and stored.getBlockSize() == d
-        ):
+
+        # A matrix that is stored in such blocks already is used as it is.
+        stored: Any = getattr(self.A.matrix, "stored", None)
+        has_blocks = stored is not None and "sbaij" in stored.getType()
+        if layout.complete and has_blocks and stored.getBlockSize() == d:
             stored.setOption(PETSc.Mat.Option.SPD, True)
             return stored
+
+        # Otherwise the blocks on and above the diagonal are copied.
         mat = assembled(self.A) if layout.complete else self.entries()
         indptr, columns, values = mat.getValuesCSR()
         rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1]))
         ends, columns, values = upper_blocks(rows, d, mat.getOwnershipRange()[0])
-        arrays = (ends.astype(kind), columns.astype(kind), values)
-        made = PETSc.Mat().createSBAIJ(((layout.size, None),) * 2, d, csr=arrays, comm=mat.comm)
-        made.assemble()
-        made.setOption(PETSc.Mat.Option.SPD, True)
-        return made
+        arrays = (ends.astype(PETSc.IntType), columns.astype(PETSc.IntType), values)
+        sizes = ((layout.size, None), (layout.size, None))
+        blocks = PETSc.Mat().createSBAIJ(sizes, d, csr=arrays, comm=mat.comm)
+        blocks.assemble()
+        blocks.setOption(PETSc.Mat.Option.SPD, True)
+        return blocks
 
     def entries(self, result: Any = None) -> Any:
-        """Return A as an AIJ matrix of whole nodes, each block stored in full.
+        """Return A as an AIJ matrix of whole nodes, each block stored in full. Collective.
 
-        ``result`` is an earlier one to refill.
-
-        Rows of missing components hold the largest diagonal entry of A.
+        Rows of missing components hold the largest diagonal entry of A. ``result`` is an earlier
+        matrix to refill.
         """
         mat = self.source.PtAP(self._selected, result=result)
         mat.setBlockSize(self.layout.width)
@@ -128,11 +133,13 @@ class Nodewise:
 
     @cached_property
     def _selected(self) -> Any:
-        """Return P of A -> PᵀAP, with zeros stored for the other components of a node.
+        """Return P of A -> PᵀAP. Zeros are stored for the other components of a node.
 
-        They fill the blocks.
+        So every row of P has a whole block, and PᵀAP has full blocks.
         """
-        layout, kind, d = self.layout, PETSc.IntType, self.layout.width
+        layout = self.layout
+        kind = PETSc.IntType
+        d = layout.width
         n = len(layout.places)
         first = self.source.comm.tompi4py().scan(layout.size) - layout.size
         columns = (layout.places // d * d)[:, None] + np.arange(d)

@@ -21,9 +21,13 @@ ROUND_OFF = 1e-15  # of |A||x| and of the forces: what a residual cannot fall be
 
 @dataclass(frozen=True)
 class Measures:
-    """Hold what residuals are relative to: forces, reactions, displacements; and their round-off.
+    """Hold what residuals are relative to; maxima over ranks.
 
-    Maxima over ranks.
+    Attributes:
+        force: the largest of b and A x.
+        reaction: the largest of b and the reactions.
+        displacement: the largest of x and the guess.
+        round_off: residual that rounding leaves.
     """
 
     force: float
@@ -33,15 +37,24 @@ class Measures:
 
 
 class Measured:
-    """Measure the iterates of one step. ``load``: b, padded."""
+    """Measure the iterates of one step."""
 
     def __init__(self, step: StepProblem, load: Array) -> None:
+        """Note what all iterates share; ``load`` is b, padded."""
         self._comm: Comm = step.surface.comm
-        self._largest = step.A.largest
-        self._b, self._guess = max_abs(load), max_abs(step.guess)
+        self._largest_entry = step.A.largest
+        self._b = max_abs(load)
+        self._guess = max_abs(step.guess)
 
     def __call__(self, contact: Contact, x: Array, residual: Array, load: Array) -> Measures:
-        """Return the references at x, where ``residual`` is ``load`` - (A + K_s) x. Collective."""
+        """Return the references at x. Collective.
+
+        Args:
+            contact: the closed set.
+            x: padded.
+            residual: ``load`` - (A + K_s) x.
+            load: b with the load of closed springs, padded.
+        """
         local = np.array(
             [
                 self._b,
@@ -52,9 +65,9 @@ class Measured:
             ]
         )
         b, Ax, size, guess, reaction = self._comm.max(np.where(np.isnan(local), np.inf, local))
-        whole = self._largest * size
-        force = max(b, Ax, ROUNDING * whole)
-        return Measures(force, max(b, reaction), max(size, guess), ROUND_OFF * max(whole, force))
+        entries = self._largest_entry * size
+        force = max(b, Ax, ROUNDING * entries)
+        return Measures(force, max(b, reaction), max(size, guess), ROUND_OFF * max(entries, force))
 
 
 class Worth:
@@ -65,39 +78,65 @@ class Worth:
     """
 
     def __init__(self, comm: Comm, parts: int, tolerance: float) -> None:
-        self._comm, self._goal = comm, GOAL * tolerance
-        self._per_norm = self._sizes = self._largest = np.zeros(parts)
+        """Begin without knowledge.
+
+        Args:
+            comm: of the contact surface.
+            parts: number of arrays of an answer: x, r_n and with friction r_t.
+            tolerance: relative error that an answer may have.
+        """
+        self._comm = comm
+        self._goal = GOAL * tolerance
+        self._per_norm = np.zeros(parts)  # change of an array over the residual that it came with
+        self._sizes = np.zeros(parts)  # of the present answer
+        self._largest = np.zeros(parts)  # of the answers before
         self._seen: tuple[float, list[Array]] = (0.0, [])
 
     def keep(self) -> None:
         """Keep the last answer: it is one of a step."""
         self._largest = np.maximum(self._largest, self._sizes)
 
-    def goal(self, norm: float, of: Measures, *answer: Array, begin: bool) -> float:
-        """Return the residual to stop at.
+    def goal(self, norm: float, scales: Measures, *answer: Array, begin: bool) -> float:
+        """Return the residual to stop at. Collective.
 
-        It is what x and reactions need, but for round-off, or a share of the tolerance. ``norm``:
-        the present one; ``begin``: there is no larger one to compare with. Collective.
+        It is what x and reactions need, but for round-off, or a share of the tolerance.
+
+        Args:
+            norm: the present residual.
+            scales: what residuals are relative to.
+            *answer: x, r_n and with friction r_t.
+            begin: whether there is no larger residual to compare with.
         """
-        last, seen = self._seen
-        if begin or norm <= HALVED * last:
-            changes = [] if begin else [one - old for one, old in zip(answer, seen, strict=True)]
-            largest = self._comm.max(np.array([max_abs(one) for one in (*answer, *changes)]))
-            self._seen = norm, [np.array(one) for one in answer]
+        # Compare with the last answer whose residual was at least twice as large.
+        norm_before, answer_before = self._seen
+        if begin or norm <= HALVED * norm_before:
+            changes = []
+            if not begin:
+                changes = [new - old for new, old in zip(answer, answer_before, strict=True)]
+            largest = self._comm.max(np.array([max_abs(part) for part in (*answer, *changes)]))
+            self._seen = norm, [np.array(part) for part in answer]
             self._sizes = largest[: len(answer)]
             if not begin:
-                self._per_norm = largest[len(answer) :] / last
-        least = [of.displacement, *[LEAST * of.force] * (len(answer) - 1)]
+                self._per_norm = largest[len(answer) :] / norm_before
+
+        # Each part may change by the tolerance of its size; the residual that brings this about.
+        least = [scales.displacement, *[LEAST * scales.force] * (len(answer) - 1)]
         wanted = np.maximum(np.maximum(self._sizes, self._largest), least)
         moved = self._per_norm > 0.0
         needed = np.min(wanted[moved] / self._per_norm[moved], initial=np.inf)
-        return float(min(self._goal * of.force, max(self._goal * needed, of.round_off)))
+        return float(min(self._goal * scales.force, max(self._goal * needed, scales.round_off)))
 
 
 def largest_free(comm: Comm, residual: Array, weights: Array) -> float:
     """Return the largest residual of the unknowns that are not held. Collective.
 
-    It is infinite where it is not a number.
+    Args:
+        comm: of the contact surface.
+        residual: padded.
+        weights: padded, zero where held.
+
+    Returns:
+        The residual; infinite where one is not a number.
     """
     value = max_abs(np.where(weights > 0.0, residual, 0.0))
     return float(comm.max(np.array([np.inf if np.isnan(value) else value]))[0])

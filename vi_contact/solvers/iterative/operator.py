@@ -1,7 +1,4 @@
-"""Apply A, and the springs of closed points, to what PETSc hands over.
-
-What the solver has done is counted.
-"""
+"""Apply A, and the springs of closed points, to what PETSc hands over, and count the work."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,10 +14,13 @@ from ..volume.snes import Lent
 class Work:
     """Hold sums since the solver was prepared.
 
-    ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES;
-    ``newton_steps`` with friction; ``products`` with A; ``renewals`` of the preconditioner after
-    the first; ``fallbacks``: steps that ended by projected gradients, or with limits of friction
-    given for some rounds.
+    Attributes:
+        linear_iterations: of conjugate gradients, those of the fallback too, or of GMRES.
+        newton_steps: of steps with friction.
+        products: with A.
+        renewals: of the preconditioner after the first.
+        fallbacks: steps that ended by projected gradients, or with limits of friction given for
+            some rounds.
     """
 
     linear_iterations: int = 0
@@ -35,33 +35,40 @@ class Operator:
 
     Held rows are multiplied too. Conjugate gradients whose preconditioner leaves these rows alone
     never move them, and the residual that they carry along is the reaction there.
+
+    Attributes:
+        blocks: A, a PETSc matrix.
+        work: where products are counted.
     """
 
     def __init__(self, blocks: Any, work: Work) -> None:
-        self.blocks, self.work = blocks, work
+        self.blocks = blocks
+        self.work = work
         self._x, self._y = blocks.createVecs()
         self.set_springs(np.zeros(0, dtype=np.int64), np.zeros(0))
 
     def set_springs(self, rows: Indices, stiffness: Array) -> None:
         """Take the springs that are closed: their rows and stiffnesses, in the unit of A."""
-        self._rows, self._stiffness = rows, stiffness
+        self._rows = rows
+        self._stiffness = stiffness
 
     def mult(self, _shell: Any, x: Any, y: Any) -> None:
-        """Apply A + K_s to x: PETSc vectors."""
+        """Apply A + K_s to x, and write it into y: PETSc vectors."""
         self.work.products += 1
         self.blocks.mult(x, y)
         if len(self._rows):
             y.array[self._rows] += self._stiffness * x.array_r[self._rows]
 
     def __matmul__(self, x: Array) -> Array:
+        """Return (A + K_s) x, padded."""
         self._x.array[:] = x
         self.mult(None, self._x, self._y)
         return np.array(self._y.array_r)
 
     def shell(self) -> Any:
-        """Return a PETSc matrix that applies this operator, which must outlive it.
+        """Return a PETSc matrix that applies this operator. The operator must outlive it.
 
-        To hold it is not PETSc's, whose clean-up loses whatever only its contexts kept alive.
+        PETSc does not hold the operator: its clean-up loses whatever only its contexts kept alive.
         """
         mat = PETSc.Mat().createPython(self.blocks.getSizes(), Lent(self), comm=self.blocks.comm)
         mat.setUp()

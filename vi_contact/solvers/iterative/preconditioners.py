@@ -34,6 +34,7 @@ SMALL, LARGE = 0.5, 30.0  # Courant numbers; CHOSEN: docs/guide/solvers.md has w
 DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
 RENEWALS = 4  # in a step, at most
 FEW_LEVELS = 2  # of a multigrid: with fewer there is nothing for options of levels
+DEPENDENT = 1e-8  # of a vector: what is left of one that depends on others
 # of the diagonal, for factors that were not positive definite; CHOSEN: docs/guide/solvers.md
 RAISED = 0.5
 DEFAULTS: dict[str, Options] = {
@@ -64,11 +65,11 @@ def courant(A: EffectiveMatrix) -> float:
     return float(np.sqrt(max(total - inertia, 0.0) / inertia)) if inertia > 0.0 else float("inf")
 
 
-def chosen(number: float, modes: bool) -> str:
+def choose(number: float, modes: bool) -> str:
     """Return the preconditioner for a Courant number.
 
-    It is Jacobi up to 0.5, ICC up to 30 or where it is not known, GAMG beyond. ``modes``: whether
-    rigid motions are known, without which GAMG is no use.
+    It is Jacobi up to 0.5, ICC up to 30 or where the number is not known, GAMG beyond. ``modes``
+    says whether rigid motions are known, without which GAMG is no use.
     """
     if number <= SMALL:
         return JACOBI
@@ -77,16 +78,19 @@ def chosen(number: float, modes: bool) -> str:
 
 def defaults(kind: str, ranks: int) -> Options:
     """Return PETSc's options of a kind on so many ranks."""
-    return {**DEFAULTS[kind], **OVERLAP} if kind == ICC and ranks > 1 else DEFAULTS[kind]
+    if kind == ICC and ranks > 1:
+        return {**DEFAULTS[kind], **OVERLAP}
+    return DEFAULTS[kind]
 
 
 def shares(inverse: Any, template: Any) -> Array:
-    """Return 1/sqrt(k) of every row.
+    """Return 1/sqrt(k) of every row: k subdomains of a PETSc preconditioner hold it. Collective.
 
-    Here k is the number of a PETSc preconditioner's subdomains that hold it. Collective.
+    Subdomains are counted by an application to ones, with copies in the place of their factors.
     """
-    ones, count = template.duplicate(), template.duplicate()
+    ones = template.duplicate()
     ones.set(1.0)
+    count = template.duplicate()
     count.set(1.0)
     if inverse.getType() == "asm":
         parts = [(solver, solver.getPC()) for solver in inverse.getASMSubKSP()]
@@ -102,19 +106,24 @@ def shares(inverse: Any, template: Any) -> Array:
 
 
 class Masked:
-    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner.
-
-    ``inverse``: M⁻¹ as a PETSc preconditioner, without the shares of its subdomains, which are in
-    w.
-    """
+    """Apply w M⁻¹ w: the context of a PETSc shell preconditioner."""
 
     def __init__(self, inverse: Any, template: Any) -> None:
-        self._inverse, self._r, self._z = inverse, template.duplicate(), template.duplicate()
-        self._weights = self._shares = shares(inverse, template)
+        """Take M⁻¹ without the shares of its subdomains, which go into w.
+
+        Args:
+            inverse: a PETSc preconditioner.
+            template: a PETSc vector of its size.
+        """
+        self._inverse = inverse
+        self._r = template.duplicate()
+        self._z = template.duplicate()
+        self._shares = shares(inverse, template)
+        self._weights = self._shares
 
     @property
     def weights(self) -> Array:
-        """Return w, 0 in rows that are held; set without the shares."""
+        """Return w, 0 in rows that are held. What is set has no shares, and gets them."""
         return self._weights
 
     @weights.setter
@@ -122,7 +131,7 @@ class Masked:
         self._weights = weights * self._shares
 
     def apply(self, _pc: Any, r: Any, z: Any) -> None:
-        """Apply w M⁻¹ w to r: PETSc vectors."""
+        """Apply w M⁻¹ w to r, and write it into z: PETSc vectors."""
         np.multiply(self.weights, r.array_r, out=self._r.array)
         self._inverse.apply(self._r, z)
         z.array[:] *= self.weights
@@ -135,33 +144,41 @@ class Masked:
 
 
 class Inverse:
-    """Hold M⁻¹ as the PETSc preconditioner ``pc``.
+    """Hold M⁻¹: Jacobi or ICC, which do not depend on the contact set.
 
-    It is Jacobi or ICC, which do not depend on the contact set, made of the matrix with a diagonal
-    larger by the factor 1 + ``raised``.
+    Attributes:
+        pc: the PETSc preconditioner.
     """
 
     def __init__(self, matrix: Any, layers: OptionLayers, raised: float = 0.0) -> None:
-        made_of = matrix
+        """Make it. Collective.
+
+        Args:
+            matrix: A.
+            layers: PETSc's options.
+            raised: share by which the diagonal is made larger before.
+
+        Raises:
+            InputError: PETSc does not take the options.
+        """
         if raised:
-            made_of, diagonal = matrix.duplicate(copy=True), matrix.getDiagonal()
-            made_of.setDiagonal(diagonal * (1.0 + raised))
-        self.pc = made(made_of, layers)
+            diagonal = matrix.getDiagonal()
+            matrix = matrix.duplicate(copy=True)
+            matrix.setDiagonal(diagonal * (1.0 + raised))
+        self.pc = make_preconditioner(matrix, layers)
 
     def begin(self) -> None:
         """Begin a step."""
 
     def follow(self, held: Indices) -> None:
-        """Make M anew for the rows that are held, if it is time to. Collective.
+        """Make M anew for the rows that closed conditions and sticking points hold. Collective.
 
-        Closed conditions and sticking points hold them.
+        Jacobi and ICC have no need to.
         """
 
 
 class Multigrid(Inverse):
-    """Hold GAMG, or what else the options say, of an AIJ matrix.
-
-    It is renewed for the contact set.
+    """Hold GAMG, or what else the options say, of an AIJ matrix, and renew it for the contact set.
 
     The interpolation is that of the whole A with its rigid modes, in which no set has left a
     trace.
@@ -170,7 +187,17 @@ class Multigrid(Inverse):
     def __init__(
         self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work
     ) -> None:
-        self._nodewise, self._work, self._comm = nodewise, work, surface.comm
+        """Make it. Collective.
+
+        Args:
+            nodewise: makes matrices of A.
+            surface: the contact surface, whose frames rigid modes are in.
+            layers: PETSc's options.
+            work: where renewals are counted.
+        """
+        self._nodewise = nodewise
+        self._work = work
+        self._comm = surface.comm
         self._matrix = nodewise.entries()
         if nodewise.A.space is not None:
             modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
@@ -186,21 +213,21 @@ class Multigrid(Inverse):
         self._left = RENEWALS
 
     def follow(self, held: Indices) -> None:
-        """Make the Galerkin products anew when they are out of date.
+        """Make the Galerkin products anew where a tenth of the held rows have changed since.
 
-        They are when more than a tenth of the held rows have changed since.
+        Collective.
         """
         mask = np.zeros_like(self._built)
         mask[held] = True
-        moved, size = self._comm.sum(
-            np.array([np.sum(mask ^ self._built), np.sum(mask)], dtype=float)
-        )
+        local = np.array([np.sum(mask ^ self._built), np.sum(mask)], dtype=float)
+        moved, size = self._comm.sum(local)
         if self._left and moved > DRIFT * size:
             self._left -= 1
             self._built = mask
             self._renew(held)
 
     def _renew(self, held: Indices) -> None:
+        """Make M of A whose held rows and columns are replaced by their diagonal."""
         matrix = self._matrix
         self._nodewise.entries(matrix)
         diagonal = matrix.getDiagonal()
@@ -212,10 +239,11 @@ class Multigrid(Inverse):
         self._work.renewals += 1
 
 
-def made(matrix: Any, layers: OptionLayers) -> Any:
-    """Return a PETSc preconditioner of a matrix, from the options.
+def make_preconditioner(matrix: Any, layers: OptionLayers) -> Any:
+    """Return a PETSc preconditioner of a matrix, as the options say. Collective.
 
-    InputError when PETSc does not take them.
+    Raises:
+        InputError: PETSc does not take them.
     """
     pc = PETSc.PC().create(matrix.comm)
     pc.setOptionsPrefix(layers.prefix)
@@ -230,7 +258,7 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
                 ones.set(1.0)
                 pc.apply(ones, image)
             if pc.getType() in ("gamg", "mg") and pc.getMGLevels() < FEW_LEVELS:
-                # of none that is there
+                # There are no levels that could read their options.
                 layers.read.update(key for key in layers.own if key.startswith("mg_levels_"))
         except PETSc.Error as error:
             raise InputError(
@@ -243,39 +271,49 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
 def rigid_modes(
     A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any
 ) -> list[Any]:
-    """Return orthonormal PETSc vectors of the rigid motions.
+    """Return orthonormal PETSc vectors of the rigid motions. Collective.
 
-    They are in nodal frames, and relative at two bodies.
+    Args:
+        A: the matrix, whose space knows the nodes.
+        surface: the contact surface: unknowns are in its nodal frames, and relative at two bodies.
+        layout: of padded vectors.
+        template: a PETSc vector of their size.
     """
-    space, comm = A.space, A.algebra.comm
-    d, points = int(space.dimension), np.asarray(space.coordinates)
+    space = A.space
+    comm = A.algebra.comm
+    d = int(space.dimension)
+    points = np.asarray(space.coordinates)
     component = np.asarray(space.ids) % d
+
+    # Motions of a body of size one about its middle.
     low = -comm.max(-np.min(points, axis=0, initial=np.inf))
     high = comm.max(np.max(points, axis=0, initial=-np.inf))
     x = (points - 0.5 * (low + high)) / np.linalg.norm(high - low)
     modes = rigid_motions(np.eye(d)[component], x).T
+
+    # The unknowns of these motions.
     vectors = [template.duplicate() for _ in modes]
     for vector, mode in zip(vectors, modes, strict=True):
         unknowns = surface.in_frames(mode)  # T⁻¹ u
         if surface.coupling is not None:
             unknowns = 2.0 * unknowns - surface.coupling @ unknowns  # R⁻¹ = 2 - R
         vector.array[:] = layout.padded(unknowns)
-    return orthonormal(vectors)
+    return orthonormalise(vectors)
 
 
-def orthonormal(vectors: list[Any]) -> list[Any]:
-    """Return the vectors made orthonormal in place (Gram and Schmidt, twice).
+def orthonormalise(vectors: list[Any]) -> list[Any]:
+    """Make vectors orthonormal in place (Gram and Schmidt, twice), and return those that are left.
 
-    Those that vanish are left out.
+    One that depends on the others is left out.
     """
-    kept: list[Any] = []
+    basis: list[Any] = []
     for vector in vectors:
         before = vector.norm()
         for _ in range(2):
-            for other in kept:
+            for other in basis:
                 vector.axpy(-vector.dot(other), other)
         size = vector.norm()
-        if size > 1e-8 * before:
+        if size > DEPENDENT * before:
             vector.scale(1.0 / size)
-            kept.append(vector)
-    return kept
+            basis.append(vector)
+    return basis

@@ -19,6 +19,7 @@ from cycling.
 import numpy as np
 
 from ...core.algebra import Array, Mask, largest, total
+from ...core.matrix_checks import GOLDEN
 from .conjugate_gradients import INDEFINITE, NOT_A_NUMBER, SOLVED, STAGNATED
 from .search import FALL, Search
 
@@ -27,100 +28,135 @@ PROPORTION = 1.0  # of beta to phi; any positive number works, 1 is Dostál's ch
 # of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the
 # estimate
 STEP = 1.5
+HALVINGS = 50  # of the interval in which the search along a line finds its minimum
 
 
-class Projected:
-    """Minimise ½ xᵀA x - bᵀx with x <= bound. ``norm``: of D^-½ A D^-½."""
+class BoundedMinimum:
+    """Minimise ½ xᵀA x - bᵀx with x <= bound, with the closed springs that there are.
 
-    def __init__(self, of: Search, diagonal: Array, norm: float) -> None:
-        contact = of.contact
+    Attributes:
+        search: the step, with its contact set.
+        lower: lower bounds of r, padded.
+        q: the linear part, padded.
+    """
+
+    def __init__(self, search: Search, diagonal: Array, norm: float) -> None:
+        """Scale the problem of a step, and leave its one-sided rigid conditions to the bounds.
+
+        Args:
+            search: the step; the contact set loses what is now a bound.
+            diagonal: D of A, padded.
+            norm: largest eigenvalue of D^-½ A D^-½.
+        """
+        contact = search.contact
         rows, stiffness = contact.sprung
-        self.of, self._step = of, STEP / norm
+        self.search = search
+        self._step = STEP / norm
         diagonal = diagonal.copy()
         diagonal[rows] += stiffness
         self._root = np.sqrt(diagonal)
         self._one_sided = contact.reach & ~contact.soft & ~contact.bilateral
-        self._rows, self._bound = contact.rows[self._one_sided], contact.bound[self._one_sided]
+        self._rows = contact.rows[self._one_sided]
+        self._bound = contact.bound[self._one_sided]
         contact.closed = contact.closed & ~self._one_sided
         # 0 where held on both sides, and where there is no unknown
         self._weights = contact.weights()
         self._fixed: Mask = self._weights == 0.0
         self.lower = np.full(len(diagonal), -np.inf)
         self.lower[self._rows] = -self._root[self._rows] * self._bound
-        self.q = np.where(self._fixed, 0.0, of.load / self._root)
+        self.q = np.where(self._fixed, 0.0, search.load / self._root)
 
     def apply(self, r: Array) -> Array:
         """Return D^-½ A D^-½ r, zero in rows that cannot move."""
-        return np.where(self._fixed, 0.0, (self.of.operator @ (r / self._root)) / self._root)
+        image = (self.search.operator @ (r / self._root)) / self._root
+        return np.where(self._fixed, 0.0, image)
 
     def dot(self, x: Array, y: Array) -> float:
         """Return the inner product over all ranks."""
-        return total(self.of.comm, x @ y)
+        return total(self.search.comm, x @ y)
 
     def precondition(self, phi: Array, free: Mask) -> Array:
-        """Return D^½ w M⁻¹ w D^½ phi."""
-        masked = self.of.masked
+        """Return D^½ w M⁻¹ w D^½ phi, with w zero where r is on its bound."""
+        masked = self.search.masked
         masked.weights = np.where(free, self._weights, 0.0)
         return self._root * masked(self._root * phi)
 
     def solve(self, x: Array) -> tuple[Array, int]:
-        """Return (x, reason) of the search from x.
+        """Return (x, reason) of the descent from x.
 
         The closed set of ``contact`` is then that of x.
         """
-        of = self.of
-        x = of.contact.feasible(x)
+        contact = self.search.contact
+        x = contact.project(x)
         start = np.maximum(-self._root * x, self.lower)
         face = Face(self, start, self.apply(start) + self.q, self._step)
         reason = self._descend(face)
         x = -face.r / self._root
         closed = ~face.free[self._rows]
         x[self._rows[closed]] = self._bound[closed]
-        of.contact.closed[self._one_sided] = closed
+        contact.closed[self._one_sided] = closed
         return x, reason
 
     def _descend(self, face: "Face") -> int:
         """Advance until the projected gradient is as small as the measures of the step ask for."""
-        of, mark, since, count = self.of, np.inf, 0, 0
+        search = self.search
+        mark = np.inf  # the goal is taken anew whenever the gradient has fallen below
+        since = 0
+        count = 0
         while True:
-            norm = largest(
-                of.comm, np.max(np.abs(self._root * (face.phi + face.beta)), initial=0.0)
-            )
+            gradient = np.abs(self._root * (face.phi + face.beta))
+            norm = largest(search.comm, np.max(gradient, initial=0.0))
             if not np.isfinite(norm):
                 return NOT_A_NUMBER
             if norm <= mark:
-                mark, since = FALL * norm, count
+                mark = FALL * norm
+                since = count
                 x = -face.r / self._root
-                of.look(norm, x, np.where(self._fixed, 0.0, self._root * face.gradient))
-            if norm <= of.goal:
+                search.look(norm, x, np.where(self._fixed, 0.0, self._root * face.gradient))
+            if norm <= search.goal:
                 return SOLVED
-            if count - since >= of.patience:
+            if count - since >= search.patience:
                 return STAGNATED
             face.advance()
             count += 1
-            of.operator.work.linear_iterations += 1
+            search.operator.work.linear_iterations += 1
 
 
 class Face:
-    """Hold the iterate.
+    """Hold the iterate, and the conjugate direction on the face of the bounds that it is on.
 
-    This is r, its gradient split into phi and beta, and the conjugate direction on the present
-    face.
+    Attributes:
+        r: the iterate, padded.
+        gradient: g = q + G r.
+        free: which entries of r are off their bound.
+        phi: the free gradient.
+        beta: the chopped gradient.
     """
 
-    def __init__(self, problem: Projected, start: Array, gradient: Array, step: float) -> None:
-        self._problem, self._step = problem, step
+    def __init__(self, problem: BoundedMinimum, start: Array, gradient: Array, step: float) -> None:
+        """Begin on the face of a start.
+
+        Args:
+            problem: what is minimised.
+            start: r, within its bounds.
+            gradient: g there.
+            step: length of an expansion.
+        """
+        self._problem = problem
+        self._step = step
         self._place(start, gradient)
-        self._turn()
+        self._restart()
 
     def _place(self, r: Array, gradient: Array) -> None:
-        self.r, self.gradient = r, gradient
+        """Go to r, and split the gradient there."""
+        self.r = r
+        self.gradient = gradient
         self.free = r > self._problem.lower
         self.phi = np.where(self.free, gradient, 0.0)
         self.beta = np.where(self.free, 0.0, np.minimum(gradient, 0.0))
 
-    def _turn(self) -> None:
-        """Start the conjugate directions anew."""
+    def _restart(self) -> None:
+        """Start the conjugate directions anew, from the free gradient."""
         self._direction = self._problem.precondition(self.phi, self.free)
 
     def advance(self) -> None:
@@ -134,29 +170,37 @@ class Face:
             self._release()
 
     def _explore(self) -> None:
-        p, lower = self._direction, self._problem.lower
+        """Take a conjugate gradient step on the face, or as far as bounds allow, and expand."""
+        problem = self._problem
+        p = self._direction
+        lower = problem.lower
         image, curvature = self._curvature(p)
-        length = self._problem.dot(self.gradient, p) / curvature
+        length = problem.dot(self.gradient, p) / curvature
         blocking = p > 0.0
         steps = (self.r - lower)[blocking] / p[blocking]
-        feasible = -largest(self._problem.of.comm, -np.min(steps, initial=np.inf))
+        feasible = -largest(problem.search.comm, -np.min(steps, initial=np.inf))
         if length <= feasible:
             self._place(np.maximum(self.r - length * p, lower), self.gradient - length * image)
-            z = self._problem.precondition(self.phi, self.free)
-            self._direction = z - (self._problem.dot(z, image) / curvature) * p
-        else:
-            self._place(np.maximum(self.r - feasible * p, lower), self.gradient - feasible * image)
-            r = np.maximum(self.r - self._step * self.phi, lower)
-            self._place(r, self._problem.apply(r) + self._problem.q)  # an exact gradient
-            self._turn()
+            z = problem.precondition(self.phi, self.free)
+            self._direction = z - (problem.dot(z, image) / curvature) * p
+            return
+
+        # Expansion: as far as the first bound, and from there a projected gradient step of fixed
+        # length, which brings others onto theirs. The gradient is then formed afresh.
+        self._place(np.maximum(self.r - feasible * p, lower), self.gradient - feasible * image)
+        r = np.maximum(self.r - self._step * self.phi, lower)
+        self._place(r, problem.apply(r) + problem.q)
+        self._restart()
 
     def _release(self) -> None:
+        """Proportioning: go down along -beta, which takes entries off their bound."""
         image, curvature = self._curvature(self.beta)
         length = self._problem.dot(self.gradient, self.beta) / curvature
         self._place(self.r - length * self.beta, self.gradient - length * image)
-        self._turn()
+        self._restart()
 
     def _curvature(self, p: Array) -> tuple[Array, float]:
+        """Return G p and pᵀG p."""
         image = self._problem.apply(p)
         curvature = self._problem.dot(p, image)
         if not curvature > 0.0:
@@ -168,59 +212,92 @@ class Indefinite(Exception):
     """Say that A is not positive definite."""
 
 
-def largest_eigenvalue(of: Search, diagonal: Array, rounds: int = 15) -> float:
-    """Return the largest eigenvalue of D⁻¹A, from above by 5 % (power iteration). Collective."""
-    v = 1.0 + np.modf(0.6180339887498949 * np.arange(len(diagonal)))[0]
+def largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> float:
+    """Return the largest eigenvalue of D⁻¹A, too large by 5 %. Collective.
+
+    It is found by power iteration, from below; without the springs.
+
+    Args:
+        search: the step, whose operator is used.
+        diagonal: D of A, padded.
+        rounds: products with A.
+    """
+    v = 1.0 + np.modf(GOLDEN * np.arange(len(diagonal)))[0]
     value = 1.0
-    of.operator.set_springs(np.zeros(0, dtype=np.int64), np.zeros(0))
+    search.operator.set_springs(np.zeros(0, dtype=np.int64), np.zeros(0))
     for _ in range(rounds):
-        image = (of.operator @ v) / diagonal
-        before, after = of.comm.sum(np.array([v @ v, image @ image]))
-        value, v = float(np.sqrt(after / before)), image / np.sqrt(after)
-    of.operator.set_springs(*of.contact.sprung)
+        image = (search.operator @ v) / diagonal
+        before, after = search.comm.sum(np.array([v @ v, image @ image]))
+        value = float(np.sqrt(after / before))
+        v = image / np.sqrt(after)
+    search.operator.set_springs(*search.contact.sprung)
     return 1.05 * max(value, 1.0)
 
 
 def projected_gradients(
-    of: Search, diagonal: Array, norm: float, x: Array
+    search: Search, diagonal: Array, norm: float, x: Array
 ) -> tuple[Array, Array, int]:
-    """Return (x, residual formed afresh, reason) of the step from x.
+    """Solve a step from x. Collective.
 
-    The reason is SOLVED, or why there is no answer. Collective.
+    Args:
+        search: the step, with its contact set.
+        diagonal: D of A, padded.
+        norm: largest eigenvalue of D⁻¹A.
+        x: padded, where to begin.
+
+    Returns:
+        The answer x, its residual formed afresh, and SOLVED, or why there is no answer.
     """
-    contact, residual = of.contact, of.load
+    contact = search.contact
+    residual = search.load
     for _ in range(ROUNDS):
+        # The minimum with the closed springs as they are.
         try:
-            found, reason = Projected(of, diagonal, norm).solve(x)
+            target, reason = BoundedMinimum(search, diagonal, norm).solve(x)
         except Indefinite:
             return x, residual, INDEFINITE
-        of.take_set()
-        residual, size = of.afresh(found)
-        if reason != SOLVED or not of.certain(size):
-            return found, residual, reason if reason != SOLVED else STAGNATED
-        if not largest(of.comm, np.any(of.wrong(found, residual, 0.0) & contact.soft)):
-            return found, residual, SOLVED
-        x = contact.feasible(x)
-        x = x + _length(of, x, found - x) * (found - x)
+        search.take_set()
+        residual, size = search.form_residual(target)
+        if reason != SOLVED:
+            return target, residual, reason
+        if not search.is_certain(size):
+            return target, residual, STAGNATED
+        wrong = search.wrong_signs(target, residual, 0.0)
+        if not largest(search.comm, np.any(wrong & contact.soft)):
+            return target, residual, SOLVED
+
+        # Springs are wrong: go towards it as far as the energy falls, and close those of there.
+        x = contact.project(x)
+        x = x + _length(search, x, target - x) * (target - x)
         contact.close_springs(x)
-        of.take_set()
+        search.take_set()
     return x, residual, STAGNATED
 
 
-def _length(of: Search, x: Array, d: Array) -> float:
-    """Return the t in (0, 1] at which the energy is smallest along d.
+def _length(search: Search, x: Array, d: Array) -> float:
+    """Return the t in (0, 1] at which the energy is smallest along d. Collective.
 
-    The energy is ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)², and t a zero of its slope.
+    The energy is ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)², and t a zero of its slope, found by
+    bisection.
+
+    Args:
+        search: the step; its springs are open afterwards.
+        x: padded, where the line begins.
+        d: padded, where it leads.
     """
-    contact = of.contact
+    contact = search.contact
     contact.close_springs(None)
-    of.take_set()
-    here = of.load - (of.operator @ x)
-    there = of.load - (of.operator @ (x + d))
-    slope, curvature = of.comm.sum(np.array([-(d @ here), d @ (here - there)]))
-    low, high = 0.0, 1.0
-    for _ in range(50):
+    search.take_set()
+    here = search.load - (search.operator @ x)
+    there = search.load - (search.operator @ (x + d))
+    slope, curvature = search.comm.sum(np.array([-(d @ here), d @ (here - there)]))
+    low = 0.0
+    high = 1.0
+    for _ in range(HALVINGS):
         t = 0.5 * (low + high)
-        rising = slope + t * curvature + total(of.comm, contact.spring_slope(x, d, t)) > 0.0
-        low, high = (low, t) if rising else (t, high)
+        springs = total(search.comm, contact.spring_slope(x, d, t))
+        if slope + t * curvature + springs > 0.0:
+            high = t
+        else:
+            low = t
     return high

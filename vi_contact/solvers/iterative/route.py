@@ -1,6 +1,4 @@
-"""Solve the step on all unknowns by conjugate gradients.
-
-Nothing is factorised, condensed or gathered.
+"""Solve the step on all unknowns by conjugate gradients: no factor, nothing condensed or gathered.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
@@ -28,11 +26,11 @@ from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..petsc import PETSc
-from ..volume.failures import raised
+from ..volume.failures import petsc_failure
 from ..volume.options import OptionLayers
-from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, stopped
+from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, cg_failure
 from .contact import Contact
-from .friction import Friction
+from .friction import FrictionSolver
 from .layout import Nodewise
 from .measures import Worth
 from .operator import Operator, Work
@@ -44,12 +42,12 @@ from .preconditioners import (
     Inverse,
     Masked,
     Multigrid,
-    chosen,
+    choose,
     courant,
     defaults,
 )
 from .projected_gradients import largest_eigenvalue, projected_gradients
-from .search import Search, search
+from .search import Search, search_set
 
 log = logging.getLogger(__name__)
 AUTO = "auto"
@@ -57,9 +55,9 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Iterative:
-    """Solve each step on all unknowns by conjugate gradients, and hold the settings for it.
+    """Solve each step on all unknowns by conjugate gradients, on any number of ranks.
 
-    It does so on any number of ranks.
+    The object holds the settings.
 
     Attributes:
         preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg"
@@ -96,19 +94,21 @@ class Iterative:
         check_fields(self)
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction that does not fit.
-
-        It has no tangential direction, or a wrong number of values.
-        """
+        """Raise InputError for friction without a tangential direction, or of a wrong length."""
         check_laws("Iterative()", problem)
 
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedIterative":
-        """Choose and make the preconditioner; collective.
+        """Choose and make the preconditioner. Collective.
 
-        InputError for options that cannot
-        work.
+        Args:
+            A: the effective matrix.
+            surface: the contact surface.
+            scale: of reactions, over which compliances are divided.
+
+        Raises:
+            InputError: for options that cannot work.
         """
         return PreparedIterative(self, A, surface, scale)
 
@@ -116,58 +116,69 @@ class Iterative:
 class PreparedIterative:
     """Solve steps of one A.
 
-    ``work``: what it has done; ``kind``: its preconditioner; ``ksp``: PETSc's object.
+    Attributes:
+        work: what it has done.
+        kind: its preconditioner.
     """
 
     def __init__(
         self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> None:
-        self._settings, self.work = settings, Work()
+        """Choose and make the preconditioner: see ``Iterative.prepare``."""
+        self._settings = settings
+        self._surface = surface
+        self.work = Work()
+
+        # A in whole nodes, and what has been left of earlier solvers is freed.
         nodewise = Nodewise(A)
-        self._layout = layout = nodewise.layout
-        self.kind = self._chosen(A)
-        blocks = nodewise.blocks()
-        PETSc.garbage_cleanup(blocks.comm)
-        self._operator = Operator(blocks, self.work)
+        self._layout = nodewise.layout
+        self.kind = self._choose_preconditioner(A)
+        self._blocks = nodewise.blocks()
+        PETSc.garbage_cleanup(self._blocks.comm)
+        self._operator = Operator(self._blocks, self.work)
+
+        # The preconditioner, and whether PETSc has read all options for it.
+        self._raised = False  # whether factors of a larger diagonal are in use
         self._layers = OptionLayers(
             settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options
         )
-        self._blocks, self._raised = blocks, False
-        self._take(
-            Multigrid(nodewise, surface, self._layers, self.work)
-            if self.kind == GAMG
-            else Inverse(blocks, self._layers)
-        )
+        if self.kind == GAMG:
+            self._use(Multigrid(nodewise, surface, self._layers, self.work))
+        else:
+            self._use(Inverse(self._blocks, self._layers))
         if settings.preconditioner == AUTO:
             self._layers.excuse_known()  # they may be for a kind that another time step makes
         self._layers.refuse_unread(self._name, surface.comm)
-        self._diagonal = np.array(blocks.getDiagonal().array_r)
-        self._contact = Contact(
-            surface, scale, layout.places[surface.owned], self._diagonal, layout.missing
-        )
-        self._norm: float | None = None
-        self._surface, self._worth = surface, Worth(surface.comm, 2, settings.tolerance)
 
-    def _chosen(self, A: EffectiveMatrix) -> str:
-        """Return the preconditioner, said in the log."""
-        number, asked = courant(A), self._settings.preconditioner
-        kind = chosen(number, A.space is not None) if asked == AUTO else asked
+        # The contact set, and how small residuals have to be.
+        self._diagonal = np.array(self._blocks.getDiagonal().array_r)
+        rows = self._layout.places[surface.owned]
+        self._contact = Contact(surface, scale, rows, self._diagonal, self._layout.missing)
+        self._norm: float | None = None  # of D^-½ A D^-½, estimated when it is needed
+        self._worth = Worth(surface.comm, 2, settings.tolerance)
+
+    def _choose_preconditioner(self, A: EffectiveMatrix) -> str:
+        """Return the preconditioner, and write it into the log. Collective."""
+        number = courant(A)
+        asked = self._settings.preconditioner
+        kind = choose(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
-            layer = kind == ICC and A.algebra.comm.size > 1
+            overlaps = kind == ICC and A.algebra.comm.size > 1
             log.info(
                 "Iterative: preconditioner %s, %s at Courant number %.3g%s",
                 kind,
                 "chosen" if asked == AUTO else "asked for",
                 number,
-                "; ranks overlap by a layer" if layer else "",
+                "; ranks overlap by a layer" if overlaps else "",
             )
         return kind
 
-    def _take(self, inverse: Inverse) -> None:
+    def _use(self, inverse: Inverse) -> None:
         """Precondition with this one from now on."""
-        self._inverse, self._masked = inverse, Masked(inverse.pc, self._blocks.createVecLeft())
+        self._inverse = inverse
+        self._masked = Masked(inverse.pc, self._blocks.createVecLeft())
         self._cg = ConjugateGradients(self._operator, self._masked)
-        self.__dict__.pop("_friction", None)
+        self.__dict__.pop("_friction", None)  # made for the one before
 
     @property
     def ksp(self) -> Any:
@@ -175,7 +186,7 @@ class PreparedIterative:
         return self._cg.ksp
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step.
+        """Return the answer to a step. Collective.
 
         Raises:
             StepFailure: on all ranks, with the history of residuals, when there is no answer.
@@ -183,7 +194,7 @@ class PreparedIterative:
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:
-            # of factors that are not positive definite
+            # Factors that are not positive definite may bring forth anything.
             with np.errstate(over="ignore", invalid="ignore"):
                 return self._attempt(step)
         except StepFailure as error:
@@ -193,24 +204,26 @@ class PreparedIterative:
                     error,
                 )
         self._raised = True
-        self._take(Inverse(self._blocks, self._layers, RAISED))
+        self._use(Inverse(self._blocks, self._layers, RAISED))
         return self._attempt(step)
 
     def _attempt(self, step: StepProblem) -> StepResult:
-        """Return the step with the preconditioner that there is."""
+        """Return the answer, with the preconditioner that there is."""
         try:
-            return self._solve(step) if step.slip0 is None else self._friction.solve(step)
+            if step.slip0 is not None:
+                return self._friction.solve(step)
+            return self._solve_without_friction(step)
         except PETSc.Error as error:
             if error.__cause__ is not None:
                 # raised in one of our callbacks; PETSc before 3.22 passes it on
                 raise error.__cause__ from None
-            raise raised(self._name, error) from error
+            raise petsc_failure(self._name, error) from error
 
     @cached_property
-    def _friction(self) -> Friction:
-        """The solver of steps with friction."""
+    def _friction(self) -> FrictionSolver:
+        """Return the solver of steps with friction, made at the first of them."""
         settings = self._settings
-        return Friction(
+        return FrictionSolver(
             self._surface,
             self._contact,
             self._layout,
@@ -224,12 +237,16 @@ class PreparedIterative:
 
     @property
     def _name(self) -> str:
+        """Return the name of the solver, for messages."""
         return f"Iterative({self.kind})"
 
-    def _solve(self, step: StepProblem) -> StepResult:
-        settings, contact, layout = self._settings, self._contact, self._layout
+    def _solve_without_friction(self, step: StepProblem) -> StepResult:
+        """Return the answer: search the contact set, and where that goes in circles descend."""
+        settings = self._settings
+        contact = self._contact
+        layout = self._layout
         before = self.work.linear_iterations
-        of = Search(
+        search = Search(
             step,
             layout.padded(step.b),
             contact,
@@ -240,16 +257,17 @@ class PreparedIterative:
             tolerance=settings.tolerance,
             patience=settings.patience,
         )
-        x, residual, changes, reason = search(
-            of, self._cg, layout.padded(step.guess), settings.changes
+        x, residual, changes, reason = search_set(
+            search, self._cg, layout.padded(step.guess), settings.changes
         )
         if reason == WRONG_SIGNS:
             self.work.fallbacks += 1
             if self._norm is None:
-                self._norm = largest_eigenvalue(of, self._diagonal)
-            x, residual, reason = projected_gradients(of, self._diagonal, self._norm, x)
+                self._norm = largest_eigenvalue(search, self._diagonal)
+            x, residual, reason = projected_gradients(search, self._diagonal, self._norm, x)
         if reason != SOLVED:
-            raise stopped(self._name, reason, self.work.linear_iterations - before, of.history)
+            iterations = self.work.linear_iterations - before
+            raise cg_failure(self._name, reason, iterations, search.history)
         self._worth.keep()
         return StepResult(
             x=layout.stripped(x),

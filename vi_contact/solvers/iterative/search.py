@@ -24,10 +24,18 @@ from .operator import Operator
 from .preconditioners import Inverse, Masked
 
 FALL = 0.1  # of the residual between two looks at the signs
+REFINEMENTS = 3  # solves that go on because the residual, formed afresh, is not small enough
 
 
 class Search:
-    """Search the contact set of one step. ``history``: residuals over the forces, at every look."""
+    """Hold the contact set of one step while it is searched.
+
+    Attributes:
+        load: b, padded, with the load of closed springs.
+        scales: what residuals are relative to, at the x that was looked at last.
+        goal: residual below which the present set is solved.
+        history: residuals over the forces, at every look.
+    """
 
     def __init__(
         self,
@@ -42,10 +50,30 @@ class Search:
         tolerance: float,
         patience: int,
     ) -> None:
-        self.contact, self.operator, self.masked, self.inverse = contact, operator, masked, inverse
+        """Begin with the predicted set of a step.
+
+        Args:
+            step: the step.
+            b: its load, padded.
+            contact: the closed set.
+            operator: A with the closed springs.
+            masked: the preconditioner on the free unknowns.
+            inverse: the preconditioner of all.
+            worth: tells how small residuals have to be.
+            tolerance: relative error that an answer may have.
+            patience: linear iterations within which the residual has to fall tenfold.
+        """
+        self.contact = contact
+        self.operator = operator
+        self.masked = masked
+        self.inverse = inverse
         self.comm: Comm = step.surface.comm
-        self.b, self.tolerance, self.patience = b, tolerance, patience
-        self.measured, self.worth, self.goal = Measured(step, b), worth, 0.0
+        self.b = b
+        self.tolerance = tolerance
+        self.patience = patience
+        self.measured = Measured(step, b)
+        self.worth = worth
+        self.goal = 0.0
         self.history: list[float] = []
         self._sets: set[float] = set()
         contact.begin(step)
@@ -53,120 +81,166 @@ class Search:
         self.take_set()
 
     def take_set(self) -> bool:
-        """Take the closed set of ``contact``: mask, springs, load, preconditioner.
+        """Take the closed set of ``contact`` into mask, springs, load and preconditioner.
 
-        False for one met before.
+        Collective.
+
+        Returns:
+            Whether the set is a new one.
         """
         contact = self.contact
         self.masked.weights = contact.weights()
         self.operator.set_springs(*contact.sprung)
         self.load = contact.load(self.b)
         self.inverse.follow(contact.held)
-        name = total(self.comm, contact.fingerprint())
-        known = name in self._sets
-        self._sets.add(name)
-        return not known
+        fingerprint = total(self.comm, contact.fingerprint())
+        is_new = fingerprint not in self._sets
+        self._sets.add(fingerprint)
+        return is_new
 
-    def watch(self, iteration: int, residual: Array, at: Callable[[], Array]) -> int:
-        """Return whether conjugate gradients may stop, as PETSc takes it; 0 to go on.
+    def watch(self, iteration: int, residual: Array, solution: Callable[[], Array]) -> int:
+        """Say whether conjugate gradients may stop. Collective.
 
-        ``at()``:
-        x.
+        Args:
+            iteration: their number so far.
+            residual: padded, as they carry it along.
+            solution: makes the present x, which costs something.
+
+        Returns:
+            The reason, as PETSc takes it; 0 to go on.
         """
         norm = largest_free(self.comm, residual, self.masked.weights)
         if not np.isfinite(norm):
             return NOT_A_NUMBER
         if iteration == 0 or norm <= max(self.goal, self._mark):
-            x = at()
+            x = solution()
             self.look(norm, x, residual, iteration)
             if norm <= self.goal:
                 return SOLVED
-            if iteration and largest(self.comm, np.any(self.wrong(x, residual, norm))):
+            if iteration and largest(self.comm, np.any(self.wrong_signs(x, residual, norm))):
                 return WRONG_SIGNS
         if iteration - self._since < self.patience:
             return 0
-        self.look(norm, at(), residual, iteration)
+        self.look(norm, solution(), residual, iteration)
         return STAGNATED
 
     def look(self, norm: float, x: Array, residual: Array, iteration: int = 0) -> None:
-        """Take the references at x, and note the residual; ``goal``: how small it has to become."""
-        self._mark, self._since = FALL * norm, iteration
-        self.scales = self.measured(self.contact, x, residual, self.load)
-        self.goal = self.worth.goal(
-            norm, self.scales, x, self.contact.reactions(x, residual), begin=iteration == 0
-        )
-        self.history.append(norm / self.scales.force if self.scales.force > 0.0 else norm)
+        """Take references and goal at x, and note the residual. Collective.
 
-    def wrong(self, x: Array, residual: Array, error: float) -> Mask:
+        Args:
+            norm: the largest residual of free unknowns.
+            x: padded.
+            residual: padded, at x.
+            iteration: 0 where there is no earlier residual to compare with.
+        """
+        self._mark = FALL * norm
+        self._since = iteration
+        self.scales = self.measured(self.contact, x, residual, self.load)
+        reactions = self.contact.reactions(x, residual)
+        self.goal = self.worth.goal(norm, self.scales, x, reactions, begin=iteration == 0)
+        force = self.scales.force
+        self.history.append(norm / force if force > 0.0 else norm)
+
+    def wrong_signs(self, x: Array, residual: Array, error: float) -> Mask:
         """Return the conditions of this rank whose signs are wrong by more than the error.
 
-        The error is the largest residual.
+        Args:
+            x: padded.
+            residual: padded, at x.
+            error: the largest residual of free unknowns.
         """
-        r = self.contact.reactions(x, residual)
-        least = 0.5 * self.tolerance * self.scales.reaction
-        return self.contact.wrong(
-            x, r, error=error, least_force=least, x_ref=self.scales.displacement
+        return self.contact.wrong_signs(
+            x,
+            self.contact.reactions(x, residual),
+            error=error,
+            least_force=0.5 * self.tolerance * self.scales.reaction,
+            x_ref=self.scales.displacement,
         )
 
-    def afresh(self, x: Array) -> tuple[Array, float]:
-        """Return (residual, largest of the free unknowns), formed anew at x: one product."""
+    def form_residual(self, x: Array) -> tuple[Array, float]:
+        """Return the residual formed afresh at x, and the largest of the free unknowns.
+
+        It costs one product. Collective.
+        """
         residual = self.load - (self.operator @ x)
         self.scales = self.measured(self.contact, x, residual, self.load)
         return residual, largest_free(self.comm, residual, self.masked.weights)
 
-    def certain(self, norm: float) -> bool:
-        """Say whether a residual formed afresh is small enough."""
+    def is_certain(self, norm: float) -> bool:
+        """Say whether a residual that was formed afresh is small enough."""
         return norm <= self.tolerance * self.scales.force
 
     def change(self, wrong: Mask, x: Array, residual: Array) -> tuple[Array, Array, bool]:
-        """Change the set, and return (x, residual, whether the set is a new one).
+        """Close and open conditions. Collective.
 
-        It takes a product where a rigid support closes. One that opens leaves the residual as it
-        is, and springs change it in their rows alone.
+        It takes a product where a rigid support closes, and moves x there. One that opens leaves
+        the residual as it is, and springs change it in their rows alone.
+
+        Args:
+            wrong: (m,) the conditions that change sides.
+            x: padded; it is changed in place.
+            residual: padded, at x; it is changed in place.
+
+        Returns:
+            x, its residual, and whether the set is a new one.
         """
         contact = self.contact
         moves = largest(self.comm, np.any(wrong & ~contact.closed & ~contact.soft))
         before = contact.spring_forces(x)
         contact.change(wrong)
-        new = self.take_set()
+        is_new = self.take_set()
         if moves:
             contact.place(x)
-            return x, self.load - (self.operator @ x), new
+            return x, self.load - (self.operator @ x), is_new
         residual[contact.rows] += before - contact.spring_forces(x)
-        return x, residual, new
+        return x, residual, is_new
 
 
-def search(
-    of: Search, cg: ConjugateGradients, x: Array, changes: int
+def search_set(
+    search: Search, cg: ConjugateGradients, x: Array, changes: int
 ) -> tuple[Array, Array, int, int]:
-    """Return (x, residual, changes of the set, reason) of the search from x.
+    """Search the contact set from x. Collective.
 
-    The reason is SOLVED, or PETSc's for stopping, or WRONG_SIGNS when a set came twice or the set
-    changed more often than ``changes``. Collective.
+    Args:
+        search: the step.
+        cg: conjugate gradients on its free unknowns.
+        x: padded; it is changed in place.
+        changes: number of changes of the set, at most.
+
+    Returns:
+        x, its residual, the number of changes, and the reason: SOLVED, or PETSc's for stopping, or
+        WRONG_SIGNS when a set came twice or the set changed too often.
     """
-    contact, count, refinements = of.contact, 0, 0
+    contact = search.contact
+    count = 0
+    refinements = 0
     contact.place(x)
-    residual = of.load - (of.operator @ x)
+    residual = search.load - (search.operator @ x)
     while True:
-        x, residual, reason = cg.solve(residual, x, of.watch)
+        # Solve on the present set, until that is done or a sign is wrong.
+        x, residual, reason = cg.solve(residual, x, search.watch)
         if reason not in (SOLVED, WRONG_SIGNS):
             return x, residual, count, reason
-        norm = 0.0
+
+        # A residual that is carried along drifts from the true one: form it afresh, go on from it.
+        error = 0.0
         if reason == SOLVED:
-            residual, fresh = of.afresh(x)
-            if not of.certain(fresh) and refinements < 3:
+            residual, fresh = search.form_residual(x)
+            if not search.is_certain(fresh) and refinements < REFINEMENTS:
                 refinements += 1
                 continue
         else:
-            norm = largest_free(of.comm, residual, of.masked.weights)
-        wrong = of.wrong(x, residual, norm)
-        if not largest(of.comm, np.any(wrong)):
+            error = largest_free(search.comm, residual, search.masked.weights)
+
+        # Change the set where signs are wrong.
+        wrong = search.wrong_signs(x, residual, error)
+        if not largest(search.comm, np.any(wrong)):
             if reason == SOLVED:
                 return x, residual, count, SOLVED
             continue
         if count == changes:
             return x, residual, count, WRONG_SIGNS
         count += 1
-        x, residual, new = of.change(wrong, x, residual)
-        if not new:
+        x, residual, is_new = search.change(wrong, x, residual)
+        if not is_new:
             return x, residual, count, WRONG_SIGNS

@@ -55,9 +55,9 @@ GENERAL_ADVICE = (
 
 
 def name_of(reasons: type, reason: int) -> str:
-    """Return the longest name of a reason in one of petsc4py's classes of reasons.
+    """Return the name of a reason, such as DIVERGED_MAX_IT; of several the longest.
 
-    Such names are CONVERGED_..., DIVERGED_...
+    ``reasons`` is petsc4py's class of them.
     """
     names = [
         name
@@ -67,8 +67,18 @@ def name_of(reasons: type, reason: int) -> str:
     return max(names, key=len, default=f"reason {reason}")
 
 
-def stopped(method: str, reasons: type, reason: int, iterations: int, worst: float) -> StepFailure:
-    """Return the failure of a solver that stopped with a reason <= 0."""
+def reason_failure(
+    method: str, reasons: type, reason: int, iterations: int, worst: float
+) -> StepFailure:
+    """Return the error of a solver that stopped without an answer.
+
+    Args:
+        method: its name.
+        reasons: petsc4py's class of reasons.
+        reason: that for which it stopped, <= 0.
+        iterations: so far.
+        worst: relative residual.
+    """
     name = name_of(reasons, reason)
     words = MEANING.get(name, "no convergence")
     return StepFailure(
@@ -77,17 +87,18 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
     )
 
 
-def raised(method: str, error: Any) -> StepFailure:
-    """Return the failure of a PETSc call that raised."""
-    said = last_line(error)
+def petsc_failure(method: str, error: Any) -> StepFailure:
+    """Return the error of a method in which a call of PETSc raised one."""
+    words = last_line(error)
     code: Any = getattr(error, "ierr", "unknown")
     advice = ERRORS.get(code, UNKNOWN)
     # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
-    if re.search(r"\bnan\b", said, re.IGNORECASE):
-        said, advice = f"not a number: {said}", CHECK_NUMBERS
-    return StepFailure(f"{method} stopped with PETSc error {code} ({said}): {advice}")
+    if re.search(r"\bnan\b", words, re.IGNORECASE):
+        words = f"not a number: {words}"
+        advice = CHECK_NUMBERS
+    return StepFailure(f"{method} stopped with PETSc error {code} ({words}): {advice}")
 
 
 def last_line(error: Any) -> str:
-    """Return what is wrong, which PETSc tells at the end of its trace."""
+    """Return the end of PETSc's trace, which says what is wrong."""
     return str(error).splitlines()[-1].split("] ", 1)[-1].strip()

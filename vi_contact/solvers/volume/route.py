@@ -23,7 +23,7 @@ from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..petsc import PETSc
 from .bounded_system import BoundedSystem
-from .failures import raised
+from .failures import petsc_failure
 from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
 from .options import OptionLayers, Options, direct
@@ -182,7 +182,7 @@ class PreparedVolume:
             if error.__cause__ is not None:
                 # raised in one of our callbacks; PETSc before 3.22 passes it on
                 raise error.__cause__ from None
-            raise raised(self._name, error) from error
+            raise petsc_failure(self._name, error) from error
         except StepFailure:
             self.close()
             raise

@@ -13,7 +13,7 @@ from ...core.algebra import Array, Mask, max_abs, total
 from ...core.step import StepProblem
 from ..petsc import PETSc
 from .bounded_system import BoundedSystem
-from .failures import NOT_A_NUMBER, stopped
+from .failures import NOT_A_NUMBER, reason_failure
 
 # backward error |A z - b| / (|A| |z| + |b|), largest entries, of a solve that cannot be improved
 ROUND_OFF = 1e-14
@@ -171,7 +171,7 @@ class ScaledStep:
         """
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not self.accepts(y, F):
-            raise stopped(name, driver.reasons, reason, iterations, self.worst)
+            raise reason_failure(name, driver.reasons, reason, iterations, self.worst)
         active = self.active(y, F)
         return y, active, np.where(active, self.system.reactions(F * self.r_ref), 0.0), iterations
 
