@@ -31,7 +31,7 @@ from ..core.step import StepProblem, StepResult, refuse_limits
 from ..laws.friction import project
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_steps
-from .energetic import summed
+from .energetic import sum_products
 
 GROWN = 1e12  # change over the first one: diverged
 LOOSE = 10.0  # times the tolerance: certificates of a run, which were up to 1.1 times
@@ -149,11 +149,11 @@ class _SpaceTime:
         if first:
             self._free += np.array(
                 [
-                    summed(self._W[k : k - first : -1], lam[:first])[:, 0]
+                    sum_products(self._W[k : k - first : -1], lam[:first])[:, 0]
                     for k in range(first, window.stop)
                 ]
             )
-            v = self._v_free[first - 1] + summed(self._W[first - 1 :: -1], lam[:first])[:, 0]
+            v = self._v_free[first - 1] + sum_products(self._W[first - 1 :: -1], lam[:first])[:, 0]
             self._before = v.reshape(2, -1)[1]
 
     def violation(self, r: Array) -> Array:
