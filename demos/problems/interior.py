@@ -14,7 +14,7 @@ from vi_contact.bem.boundary_operators import (
     N_SINGLE,
     double_local,
     integrands,
-    joined_at_nodes,
+    join_at_nodes,
     tensor,
 )
 from vi_contact.bem.fundamental_solution import TimeKernels
@@ -88,7 +88,7 @@ def _matrices(
     values = double_local(mesh, c_s**2, moments[N_SINGLE:, :, None, :], element)[..., 0, :]
     single[:, point, :, element] = tensor(moments[:N_SINGLE]).transpose(2, 0, 1, 3)
     double[:, point, :, element] = values.transpose(2, 0, 1, 3)
-    return single.reshape(2 * m, 4 * n), joined_at_nodes(mesh, double, 3).reshape(2 * m, 2 * n)
+    return single.reshape(2 * m, 4 * n), join_at_nodes(mesh, double, 3).reshape(2 * m, 2 * n)
 
 
 def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> Iterator[Array]:
