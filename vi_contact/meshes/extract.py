@@ -86,7 +86,7 @@ def arrays_from_script(mesh: MeshScript) -> MeshArrays:
 
 def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     """Return the arrays that `extract` would find in a model of these grids."""
-    parts = [grid.numbered() for grid in grids]
+    parts = [grid.number_nodes() for grid in grids]
     first = np.cumsum([0] + [len(points) for points, _, _ in parts])
     body = np.repeat(np.arange(len(grids)), [len(cells) for _, cells, _ in parts])
     points = np.concatenate([points for points, _, _ in parts])
