@@ -40,7 +40,7 @@ from test_energetic import echoes, rod, smooth_integral, smooth_load  # noqa: E4
 import vi_contact as vc  # noqa: E402
 from demos.parts.problems.boundary_elements import square_problem  # noqa: E402
 from vi_contact import bem  # noqa: E402
-from vi_contact.bem.energetic import marched  # noqa: E402
+from vi_contact.bem.energetic import march_blocks  # noqa: E402
 
 LAWS = {"none": vc.Frictionless(), "Tresca": vc.Tresca(0.05), "Coulomb": vc.Coulomb(0.5)}
 FORMS = ("symmetric", "unsymmetric")
@@ -69,7 +69,7 @@ def spectrum(blocks: bem.EnergeticBlocks, form: str, steps: int) -> np.ndarray:
     """
     n = 2 * len(blocks.mesh)
     held = np.broadcast_to(np.eye(n), (steps, n, n))
-    columns = marched(
+    columns = march_blocks(
         blocks, np.ones(n, bool), np.zeros((steps, n, n)), held, symmetric=form == "symmetric"
     )[2]
     whole = np.zeros((steps, n, steps, n))

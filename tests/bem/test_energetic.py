@@ -24,7 +24,7 @@ from vi_contact.bem import (
     polygon,
     traction_forces,
 )
-from vi_contact.bem.energetic import marched
+from vi_contact.bem.energetic import march_blocks
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
@@ -179,7 +179,7 @@ def test_symmetric_form_is_positive_definite(ratio):
     small = energetic_blocks(mesh, MATERIAL, dt=0.2 * ratio, steps=steps)
     n = 2 * len(mesh)
     held = np.broadcast_to(np.eye(n), (steps, n, n))  # unit increments in step 0
-    columns = marched(small, np.ones(n, bool), np.zeros((steps, n, n)), held)[2]
+    columns = march_blocks(small, np.ones(n, bool), np.zeros((steps, n, n)), held)[2]
     whole = np.zeros((steps, n, steps, n))
     for k in range(steps):
         for j in range(k + 1):

@@ -22,7 +22,7 @@ from vi_contact.bem import (
     traction_forces,
 )
 from vi_contact.bem.element_pairs import ElementPairs
-from vi_contact.bem.energetic import marched
+from vi_contact.bem.energetic import march_blocks
 from vi_contact.bem.quadrature import point_sets
 from vi_contact.core.errors import InputError
 
@@ -172,7 +172,7 @@ def test_symmetric_form_is_positive_on_thin_bodies(name):
     n = 2 * len(mesh)
     blocks = energetic_blocks(mesh, MATERIAL, dt=H, steps=steps)
     held = np.broadcast_to(np.eye(n), (steps, n, n))
-    columns = marched(blocks, np.ones(n, bool), np.zeros((steps, n, n)), held)[2]
+    columns = march_blocks(blocks, np.ones(n, bool), np.zeros((steps, n, n)), held)[2]
     whole = np.zeros((steps, n, steps, n))
     for k in range(steps):
         for j in range(k + 1):

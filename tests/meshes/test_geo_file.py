@@ -19,7 +19,7 @@ pytest.importorskip("gmsh")
 from vi_contact.core.errors import InputError
 from vi_contact.meshes import GeoFile
 from vi_contact.meshes.extract import arrays_of
-from vi_contact.meshes.geo_script import allowed
+from vi_contact.meshes.geo_script import rewrite_script
 from vi_contact.meshes.gmsh_session import session
 
 pytestmark = pytest.mark.serial
@@ -198,8 +198,8 @@ HABITS = {  # statements that nearly every script has and that change no mesh
 def test_harmless_habits_are_left_out(tmp_path: Path, what: str) -> None:
     """What Gmsh gets is what it gets of the script without them, each word in its line; no file is
     written."""
-    plain = allowed(written(tmp_path, "H = 1;\n\n" + PLAIN))
-    script = allowed(written(tmp_path, f"H = 1;\n{HABITS[what]}\n" + PLAIN))
+    plain = rewrite_script(written(tmp_path, "H = 1;\n\n" + PLAIN))
+    script = rewrite_script(written(tmp_path, f"H = 1;\n{HABITS[what]}\n" + PLAIN))
     empty = "If ( own_H > 0 ) EndIf" if what == "a condition" else ""
     assert [line.strip() for line in script.text.splitlines()] == [
         empty if row == 1 else line.strip() for row, line in enumerate(plain.text.splitlines())
@@ -261,7 +261,7 @@ def test_a_surface_that_cannot_be_transfinite_is_meshed_freely(
 )
 def test_what_may_change_a_mesh_is_no_habit(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError, match=r"wall.geo: line 2 has .*only words of geometry"):
-        allowed(written(tmp_path, f"H = 1;\n{text}\n"))
+        rewrite_script(written(tmp_path, f"H = 1;\n{text}\n"))
 
 
 def test_all_that_is_refused_is_told_at_once(tmp_path: Path) -> None:
@@ -269,7 +269,7 @@ def test_all_that_is_refused_is_told_at_once(tmp_path: Path) -> None:
         tmp_path, 'H = 1;\nMerge "a";\nPoint(1) = {0, 0, 0, H};\nPlugin(Cut).Run; Exit;\n'
     )
     with pytest.raises(InputError) as caught:
-        allowed(path)
+        rewrite_script(path)
     said = str(caught.value)
     assert "line 2 has 'Merge', line 4 has 'Plugin', line 4 has 'Exit', and only words" in said
     assert "leave them out" in said
@@ -280,7 +280,7 @@ def test_parameters_of_a_window_are_left_out(tmp_path: Path) -> None:
     constant = (
         'DefineConstant[ L = {2, Name "Sizes/L = 3", Min 0,\nMax {4}}, n = 3, w[] = {1, 2} ];'
     )
-    script = allowed(written(tmp_path, constant + PLAIN[6:]))
+    script = rewrite_script(written(tmp_path, constant + PLAIN[6:]))
     head = script.text.split("Point")[0]
     assert (
         " ".join(head.split())
@@ -305,7 +305,7 @@ def test_numbers_are_given_to_what_a_script_does_not_set(tmp_path: Path) -> None
         match=r"line 2 uses 'L', which the script does not set: set it there, or give "
         r"numbers = \{L = …\}",
     ):
-        allowed(free)
+        rewrite_script(free)
 
 
 @pytest.mark.parametrize(
@@ -330,7 +330,7 @@ def test_numbers_without_effect_are_refused(tmp_path: Path, numbers: Any, said: 
 
 def test_gmsh_gets_no_word_but_those_of_the_lists(tmp_path: Path) -> None:
     """A script's own names are never commands, and line 7 stays line 7."""
-    text = allowed(written(tmp_path, WALL + "Exit = 3; Merge = Exit;\n")).text
+    text = rewrite_script(written(tmp_path, WALL + "Exit = 3; Merge = Exit;\n")).text
     assert "own_Exit = 3 ; own_Merge = own_Exit ;" in text
     assert [line.split()[0] for line in text.split("\n")[6:9]] == ["For", "Line", "EndFor"]
 
@@ -415,11 +415,11 @@ def test_what_is_no_script_is_refused_at_once(tmp_path: Path) -> None:
     path = written(tmp_path, "/* " * 100_000)
     start = time.process_time()
     with pytest.raises(InputError, match="line 1 has '/"):
-        allowed(path)
+        rewrite_script(path)
     assert time.process_time() - start < 1.0
     os.mkfifo(tmp_path / "pipe.geo")
     with pytest.raises(InputError, match="cannot be read .it is no file"):
-        allowed(tmp_path / "pipe.geo")
+        rewrite_script(tmp_path / "pipe.geo")
 
 
 def test_gmsh_ends_with_the_process_that_began_it(tmp_path: Path) -> None:
@@ -479,7 +479,7 @@ LOOPS = {  # the points that they make
 def test_loops_go_round_however_lines_end(tmp_path: Path, text: str) -> None:
     path = tmp_path / "loop.geo"
     path.write_bytes(text.encode())
-    made = written(tmp_path, allowed(path).text)
+    made = written(tmp_path, rewrite_script(path).text)
     with session() as gmsh:
         gmsh.merge(str(made))
         gmsh.model.geo.synchronize()

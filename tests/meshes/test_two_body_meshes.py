@@ -7,7 +7,7 @@ import pytest
 
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.meshes.cut import CutOpen, Welded, cut_open, welded
+from vi_contact.meshes.cut import CutOpen, Welded, cut_open, weld
 from vi_contact.meshes.extract import add_arrays, arrays_from_script
 from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.meshes.rows import cell_sides, number_alike
@@ -125,7 +125,7 @@ def test_scripts_and_files_give_the_same(tmp_path):
     write(Welded(tmp_path / "apart.msh", "lower_top", "upper_bottom"), tmp_path / "joined.msh")
     cut = arrays_from_script(CutOpen(tmp_path / "joined.msh", "upper_bottom", inside="upper"))
     direct = cut_open(
-        welded(arrays_from_script(mesh), "lower_top", "upper_bottom"),
+        weld(arrays_from_script(mesh), "lower_top", "upper_bottom"),
         "upper_bottom",
         inside="upper",
     )
@@ -141,7 +141,7 @@ def test_scripts_and_files_give_the_same(tmp_path):
 def test_facets_keep_their_turn():
     """Quadrilateral sides stay quadrilaterals: Gmsh would show crossed ones."""
     mesh = stacked(3)
-    joined = welded(arrays_from_script(mesh), *mesh.interface[::-1])
+    joined = weld(arrays_from_script(mesh), *mesh.interface[::-1])
     with session() as model:
         add_arrays(model, cut_open(joined, "upper_bottom", inside="upper"))
         gathered = model.model.mesh.getElementsByType(3)[1].reshape(-1, 4)
@@ -219,7 +219,7 @@ def test_refusals():
             r"towards=\(1.0, 0.0\) runs along 'line' somewhere",
         ),
         (
-            lambda: welded(arrays, "left", "right"),
+            lambda: weld(arrays, "left", "right"),
             r"group 'right' has a node at \(3, 0\), 3 m away from every node of",
         ),
     ):
@@ -267,7 +267,7 @@ def test_a_joint_between_two_cell_groups_needs_no_boundary_group(d, simplices):
     group."""
     mesh = stacked(d, simplices)
     one, two = mesh.interface
-    joined = welded(arrays_from_script(mesh), two, one)
+    joined = weld(arrays_from_script(mesh), two, one)
     named = cut_open(joined, one, inside="upper")
     for names, sides in ((("upper", "lower"), ("1", "2")), (("lower", "upper"), ("2", "1"))):
         cut = cut_open(joined, between=names)
@@ -283,7 +283,7 @@ def test_a_joint_between_two_cell_groups_needs_no_boundary_group(d, simplices):
 def test_what_cannot_be_cut_between_cell_groups():
     mesh = stacked(2)
     apart = arrays_from_script(mesh)
-    joined = welded(apart, *mesh.interface[::-1])
+    joined = weld(apart, *mesh.interface[::-1])
     for arguments, sentence in (
         ({"between": ("upper", "sea")}, "mesh has no cell group 'sea'; it has lower, upper"),
         ({"between": ("upper", "upper")}, "between is .*; give the names of two groups of cells"),
@@ -340,8 +340,8 @@ def test_welds_to_several_nodes_at_one_place_are_refused():
     with pytest.raises(
         InputError, match=r"group 'tops' has several nodes at \(1, 1\), of bodies that meet there"
     ):
-        welded(arrays, "tops", "up_bottom")
-    assert len(bodies(welded(arrays, "up_bottom", "tops"))) == 1
+        weld(arrays, "tops", "up_bottom")
+    assert len(bodies(weld(arrays, "up_bottom", "tops"))) == 1
 
 
 DAM = """

@@ -1,6 +1,6 @@
 """Describe a plane body's boundary by closed loops of straight elements.
 
-It comes with its two spaces and mass matrices.
+The mesh comes with its two spaces and the mass matrix between them.
 
 The body lies to the left of its boundary: outer loops run counter-clockwise, holes clockwise, and
 the normal points out of the body. `exterior=True` means the unbounded outside of the loops:
@@ -35,11 +35,15 @@ P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 class BoundaryMesh:
     """Describe closed loops of straight elements.
 
-    points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
-    loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the
-    boundary. exterior: the body is the unbounded outside. Raises InputError for fewer than three
-    nodes in a loop, elements of no length, a boundary that crosses or touches itself or runs the
-    wrong way round.
+    Attributes:
+        points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
+        loop_sizes: number of nodes of each loop; () for one loop of all nodes.
+        labels: (n,) integer of each element, to name parts of the boundary; none given is 0.
+        exterior: whether the body is the unbounded outside.
+
+    Raises:
+        InputError: fewer than three nodes in a loop; elements of no length; a boundary that crosses
+            or touches itself, or runs the wrong way round.
     """
 
     points: Array
@@ -50,9 +54,8 @@ class BoundaryMesh:
     def __post_init__(self) -> None:
         points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
         counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
-        sizes = tuple(
-            integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,)).tolist()
-        ) or (len(points),)
+        given_sizes = integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,))
+        sizes = tuple(given_sizes.tolist()) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
             raise InputError(
                 f"BoundaryMesh: loop_sizes is {sizes}; give at least 3 points for each loop, "
@@ -61,8 +64,9 @@ class BoundaryMesh:
         flag("BoundaryMesh", "exterior", self.exterior)
         tags = np.zeros(len(points)) if shape_of(self.labels) == (0,) else self.labels
         labels = integers("BoundaryMesh", "labels", tags, (len(points),))
-        for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "loop_sizes", sizes)
+        object.__setattr__(self, "labels", labels)
         if self.lengths.min() <= 1e-12 * self.size:
             raise InputError(
                 f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled "
@@ -77,7 +81,7 @@ class BoundaryMesh:
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """Return (n,) the node (and element) that follows each.
+        """Return the node (and element) that follows each (n,).
 
         Element i goes from node i to node after[i].
         """
@@ -88,22 +92,22 @@ class BoundaryMesh:
 
     @cached_property
     def elements(self) -> NDArray[np.int64]:
-        """Return (n, 2) first and last node of each element."""
+        """Return the first and the last node of each element (n, 2)."""
         return np.stack([np.arange(len(self.points)), self.after], axis=1)
 
     @cached_property
     def lengths(self) -> Array:
-        """Return (n,) length of each element [m]."""
+        """Return the length of each element (n,) [m]."""
         return np.hypot(*(self.points[self.after] - self.points).T)
 
     @cached_property
     def tangents(self) -> Array:
-        """Return (n, 2) unit tangents tau = (-n_2, n_1), in the direction of the loop."""
+        """Return the unit tangents (n, 2), tau = (-n_2, n_1), in the direction of the loop."""
         return (self.points[self.after] - self.points) / self.lengths[:, None]
 
     @cached_property
     def normals(self) -> Array:
-        """Return (n, 2) unit normals, out of the body."""
+        """Return the unit normals (n, 2), out of the body."""
         return np.stack([self.tangents[:, 1], -self.tangents[:, 0]], axis=1)
 
     @cached_property
@@ -118,69 +122,72 @@ class BoundaryMesh:
 
     @cached_property
     def midpoints(self) -> Array:
-        """Return (n, 2) middles of the elements [m]."""
+        """Return the middles of the elements (n, 2) [m]."""
         return 0.5 * (self.points + self.points[self.after])
 
     @cached_property
     def mass(self) -> Array:
-        """Return (4n, 2n) <u, psi>.
+        """Return the mass matrix <u, psi> (4n, 2n) [m].
 
-        Continuous displacements are tested with discontinuous tractions [m].
+        Continuous displacements are tested with discontinuous tractions.
         """
         n = len(self)
         mass = np.zeros((2, n, 2, 2, n))
+        element = np.arange(n)
         for a in range(2):
             for b in range(2):
-                for c in range(2):
-                    mass[c, np.arange(n), a, c, self.elements[:, b]] = self.lengths * P1_MASS[a, b]
+                node = self.elements[:, b]
+                entry = self.lengths * P1_MASS[a, b]
+                for component in range(2):
+                    mass[component, element, a, component, node] = entry
         return mass.reshape(4 * n, 2 * n)
 
     def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
-        """Return (n,) elements with both ends where ``chosen((m, 2) points)`` is true."""
-        function(
-            "BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)"
-        )
-        inside = mask(
-            "BoundaryMesh.elements_where",
-            "what chosen(points) returns",
-            chosen(self.points),
-            (len(self),),
-        )
+        """Return the mask (n,) of elements whose ends are both chosen.
+
+        ``chosen`` is a function of points (n, 2) that returns a mask (n,).
+        """
+        owner = "BoundaryMesh.elements_where"
+        function(owner, "chosen", chosen, "give a function of points (m, 2)")
+        inside = mask(owner, "what chosen(points) returns", chosen(self.points), (len(self),))
         return inside & inside[self.after]
 
     def nodes_of(self, elements: ArrayLike) -> NDArray[np.bool_]:
-        """Return (n,) nodes that touch one of the elements (n,) given as a boolean mask."""
+        """Return the mask (n,) of nodes that touch one of the elements of a mask (n,)."""
         chosen = self._mask(elements)
         nodes = chosen.copy()
         nodes[self.after[chosen]] = True
         return nodes
 
     def node_lengths(self, elements: ArrayLike) -> Array:
-        """Return (n,) half the lengths of the masked elements that meet at each node [m]."""
+        """Return half the lengths of the masked elements that meet at each node (n,) [m]."""
         half = 0.5 * self.lengths * self._mask(elements)
         return half + np.bincount(self.after, half, len(self))
 
     def node_normals(self, elements: ArrayLike) -> Array:
-        """Return (n, 2) unit normals at nodes.
+        """Return unit normals at nodes (n, 2).
 
         They are the means of the masked elements by their lengths; elsewhere they are zero.
         """
         weighted = self.normals * (self.lengths * self._mask(elements))[:, None]
-        sums = weighted + np.stack(
-            [np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1
-        )
+        of_element_before = [np.bincount(self.after, w, len(self)) for w in weighted.T]
+        sums = weighted + np.stack(of_element_before, axis=1)
         length = np.hypot(*sums.T)
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
 
     def node_turns(self, elements: ArrayLike) -> Array:
-        """Return (n,) angle [rad] by which the boundary turns at each node.
+        """Return the angle by which the boundary turns at each node (n,) [rad].
 
         It is taken between two masked elements; elsewhere it is zero.
         """
-        chosen, before = self._mask(elements), np.empty(len(self), dtype=np.int64)
+        chosen = self._mask(elements)
+        before = np.empty(len(self), dtype=np.int64)
         before[self.after] = np.arange(len(self))
-        one, other = self.normals[before], self.normals
-        turns = 2.0 * np.arctan2(np.hypot(*(one - other).T), np.hypot(*(one + other).T))
+
+        # Between unit vectors a and b: tan(angle/2) = |a - b| / |a + b|, exact for small angles.
+        difference = self.normals[before] - self.normals
+        total = self.normals[before] + self.normals
+        turns = 2.0 * np.arctan2(np.hypot(*difference.T), np.hypot(*total.T))
         return np.where(chosen & chosen[before], turns, 0.0)
 
     def _mask(self, elements: ArrayLike) -> NDArray[np.bool_]:
@@ -194,8 +201,10 @@ def polygon(
 
     The label of an element is the number of its side; side i goes from corner i to corner i + 1.
 
-    corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element
-    length [m], or the number of elements of every side.
+    Args:
+        corners: (m, 2) [m], counter-clockwise, or clockwise for an exterior body.
+        h: greatest length of an element [m], or the number of elements of every side (m,).
+        exterior: whether the body is the unbounded outside.
     """
     start = array("polygon", "corners", corners, (None, 2), unit="m")
     if len(start) < 3:
@@ -212,10 +221,9 @@ def polygon(
         counts = wanted.astype(int)
     counted("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
     fractions = [np.arange(count)[:, None] / count for count in counts]
-    points = np.concatenate(
-        [p + f * side for p, f, side in zip(start, fractions, sides, strict=True)]
-    )
-    return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
+    points = [p + f * side for p, f, side in zip(start, fractions, sides, strict=True)]
+    labels = np.repeat(np.arange(len(start)), counts)
+    return BoundaryMesh(np.concatenate(points), labels=labels, exterior=exterior)
 
 
 @checked
@@ -226,13 +234,17 @@ def circle(
     centre: ArrayLike = (0.0, 0.0),
     exterior: bool = False,
 ) -> BoundaryMesh:
-    """Return a disk of `count` chords, starting at its lowest point.
+    """Mesh a disk by chords, starting at its lowest point.
 
-    ``exterior`` makes the space around a round hole of it.
+    Args:
+        radius: of the circle on which the nodes lie.
+        count: number of chords.
+        centre: (2,) [m].
+        exterior: whether the body is the space around a round hole instead.
     """
     middle = array("circle", "centre", centre, (2,), unit="m")
     counted("circle", "count", count, "elements", most=MOST_ELEMENTS)
-    angle = (-2.0 * np.pi if exterior else 2.0 * np.pi) * (np.arange(count) / count) - 0.5 * np.pi
-    return BoundaryMesh(
-        middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), exterior=exterior
-    )
+    once_around = -2.0 * np.pi if exterior else 2.0 * np.pi
+    angle = once_around * (np.arange(count) / count) - 0.5 * np.pi
+    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return BoundaryMesh(middle + radius * directions, exterior=exterior)

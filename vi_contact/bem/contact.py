@@ -41,7 +41,7 @@ from ..core.step import StepProblem
 from ..core.surfaces import ContactSurface, nodal_frames
 from ..solvers.normal.uniqueness import PMatrix, p_matrix
 from .boundary_mesh import BoundaryMesh
-from .energetic import summed
+from .energetic import sum_products
 from .poincare_steklov import CondensedCompliance
 
 ObstacleMotion = Callable[[float], float | Array]
@@ -51,13 +51,14 @@ SUPPORTED = 1e-12  # of the largest flexibility: supported unknowns
 
 @dataclass(frozen=True)
 class Conditions:
-    """Hold one contact condition per row.
+    """Hold c contact conditions.
 
-    A condition has the contact node (row of CondensedCompliance), the outward normal and the
-    length.
+    A node may have two of them, such as the corner of a box in a notch.
 
-    nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a
-    box in a notch.
+    Attributes:
+        nodes: (c,) contact node of each condition, as a row of CondensedCompliance.
+        normals: (c, 2) outward unit normals.
+        lengths: (c,) of contact boundary that belongs to a condition [m].
     """
 
     nodes: Indices
@@ -77,19 +78,23 @@ class Conditions:
                 "Conditions: give one condition or more, at most two at a node, and positive "
                 "lengths"
             )
-        for name, value in (("nodes", nodes), ("normals", normals), ("lengths", lengths)):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "nodes", nodes)
+        object.__setattr__(self, "normals", normals)
+        object.__setattr__(self, "lengths", lengths)
 
 
 def conditions_on(
     mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike
 ) -> Conditions:
-    """Return the conditions of several sides.
+    """Return the conditions of several sides. A node of two sides gets one for each.
 
-    Sides are masks of elements (n,); a node of two sides gets one for each.
+    Args:
+        mesh: the boundary of the body, of n elements.
+        compliance: what ``condensed`` returns for it.
+        *sides: a mask of elements (n,) for each side.
 
-    Raises InputError for a side with nodes that were not condensed, and for more than two sides at
-    a node.
+    Raises:
+        InputError: a side with nodes that were not condensed; more than two sides at a node.
     """
     owner = "conditions_on"
     instance(owner, "mesh", mesh, BoundaryMesh, "give the BoundaryMesh of the body")
@@ -105,8 +110,11 @@ def conditions_on(
             "conditions_on: sides must belong to the contact boundary, and at most two may share a "
             "node"
         )
-    normals = [mesh.node_normals(side)[found] for side, found in zip(sides, chosen, strict=True)]
-    lengths = [mesh.node_lengths(side)[found] for side, found in zip(sides, chosen, strict=True)]
+    normals = []
+    lengths = []
+    for side, nodes_of_side in zip(sides, chosen, strict=True):
+        normals.append(mesh.node_normals(side)[nodes_of_side])
+        lengths.append(mesh.node_lengths(side)[nodes_of_side])
     return Conditions(nodes, np.concatenate(normals), np.concatenate(lengths))
 
 
@@ -114,15 +122,22 @@ def conditions_on(
 class BoundaryContact:
     """Describe a condensed body and its support.
 
-    obstacle: its gaps and directions, a fitting rigid support by default; friction: the law;
-    towards, along: how far the obstacle has moved towards the body and along its tangents at time t
-    [m]; bilateral: every point is held on the obstacle; conditions: None for one per contact node.
-    Points with two conditions do not rub.
+    Nodes with two conditions do not rub.
 
-    Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows
-    it and no conditions are given, for a symmetric compliance W[0] that is not positive definite
-    and any that is singular, supports that hold a contact direction, and bodies that penetrate
-    their obstacle.
+    Attributes:
+        compliance: the condensed body.
+        obstacle: gives gaps and directions; by default it is a rigid support that fits the body.
+        friction: the law of friction.
+        towards: how far the obstacle has moved towards the body at time t [m]; None if it rests.
+        along: how far the obstacle has moved along its tangents at time t [m]; None if it rests.
+        bilateral: whether every point is held on the obstacle.
+        conditions: None for one condition at every contact node.
+
+    Raises:
+        InputError: a contact boundary that turns by more than 30° where the obstacle follows it
+            and no conditions are given; a symmetric compliance W[0] that is not positive definite,
+            and any that is singular; supports that hold a contact direction; bodies that penetrate
+            their obstacle.
     """
 
     compliance: CondensedCompliance
@@ -156,10 +171,9 @@ class BoundaryContact:
             ("limit", "slope"),
             "give a friction law, for example Coulomb(mu)",
         )
-        for name in ("towards", "along"):
-            optional(
-                function, owner, name, getattr(self, name), "give a function of the time, or None"
-            )
+        remedy = "give a function of the time, or None"
+        optional(function, owner, "towards", self.towards, remedy)
+        optional(function, owner, "along", self.along, remedy)
         flag(owner, "bilateral", self.bilateral)
         if self.conditions is not None:
             instance(
@@ -177,18 +191,15 @@ class BoundaryContact:
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:
-        """Refuse one condition along a mean normal.
-
-        It is one at a node at which the contact boundary turns.
-        """
-        turns, points = self.compliance.turns, self.compliance.points
-        if (
-            self.conditions is not None
-            or turns is None
-            or turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9)
-        ):
+        """Refuse one condition along the mean normal of a node where the contact boundary turns."""
+        turns = self.compliance.turns
+        if self.conditions is not None or turns is None:
             return
-        corner, normals = int(np.argmax(turns)), self.compliance.normals
+        if turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9):
+            return
+        corner = int(np.argmax(turns))
+        points = self.compliance.points
+        normals = self.compliance.normals
         directions = np.asarray(self.obstacle.directions(points, normals))
         # the obstacle follows the boundary; a plane has one direction
         if np.max(np.abs(directions - normals)) <= 1e-9:
@@ -210,30 +221,34 @@ class BoundaryContact:
 
     @cached_property
     def _rows(self) -> Conditions:
+        """Return the conditions: those given, or one at every contact node."""
         if self.conditions is not None:
             return self.conditions
         return Conditions(np.arange(self.count), self.compliance.normals, self.compliance.lengths)
 
     @cached_property
     def _facing(self) -> tuple[Array, Array]:
-        """Return contact directions (c, 2) and gaps (c,)."""
+        """Return the contact directions (c, 2) and the gaps (c,) [m]."""
         rows = self._rows
         return locate_obstacle(self.obstacle, self.compliance.points[rows.nodes], rows.normals)
 
     @cached_property
     def _second(self) -> Mask:
-        """Return (c,) conditions of nodes that have one already."""
+        """Tell which of the c conditions belong to nodes that have one already."""
         second = np.ones(len(self._rows.nodes), bool)
         second[np.unique(self._rows.nodes, return_index=True)[1]] = False
         return second
 
     @cached_property
     def frames(self) -> Array:
-        """Return N (2m, 2m): v = N u.
+        """Return N (2m, 2m) of v = N u.
 
-        These are the contact directions of all nodes, then tangents or second directions.
+        Its rows are the contact directions of all nodes, then their tangents or second directions.
         """
-        m, rows, second, directions = self.count, self._rows, self._second, self._facing[0]
+        m = self.count
+        rows = self._rows
+        second = self._second
+        directions, _ = self._facing
         frames = np.tile(np.eye(2), (m, 1, 1))
         frames[rows.nodes[~second]] = nodal_frames(directions[~second]).swapaxes(1, 2)
         frames[rows.nodes[second], 1] = directions[second]
@@ -243,25 +258,31 @@ class BoundaryContact:
 
     @cached_property
     def free(self) -> Mask:
-        """Return (2m,) unknowns v that are not supported."""
+        """Tell which of the 2m unknowns v are not supported."""
         flexibility = (self.frames @ self.compliance.W[0] @ self.frames.T).diagonal()
         return np.asarray(flexibility > SUPPORTED * flexibility.max(initial=0.0))
 
     @cached_property
     def W(self) -> Array:
-        """Return (steps, f, f) compliance of the f free unknowns v."""
+        """Return the compliance (steps, f, f) of the f free unknowns v [m²/N]."""
         turned = np.matmul(np.matmul(self.frames, self.compliance.W), self.frames.T)
         return np.ascontiguousarray(turned[:, self.free][:, :, self.free])
 
     @cached_property
     def v_free(self) -> Array:
-        """Return (steps, f) motion of the free unknowns without contact."""
+        """Return the motion (steps, f) of the free unknowns without contact [m]."""
         return np.ascontiguousarray((self.compliance.u_free @ self.frames.T)[:, self.free])
 
     @cached_property
     def surface(self) -> ContactSurface:
         """Return the conditions as the contract has them; its unknowns are the free ones."""
-        rows, second, points = self._rows, self._second, self.compliance.points
+        rows = self._rows
+        second = self._second
+        count = len(rows.nodes)
+        points = self.compliance.points[rows.nodes]
+
+        # Numbers of the unknowns among the free ones; -1 for supported ones, and for tangents of
+        # nodes that have a second direction instead.
         number = np.where(self.free, np.cumsum(self.free) - 1, -1)
         owned = number[rows.nodes + self.count * second]
         if (owned < 0).any():
@@ -269,51 +290,52 @@ class BoundaryContact:
                 "BoundaryContact: a support holds a contact node in its contact direction; leave "
                 "the node out of the contact boundary, or free that direction"
             )
-        tangents = np.where(
-            np.isin(rows.nodes, rows.nodes[second]), -1, number[rows.nodes + self.count]
-        )
-        size = float(np.ptp(points, axis=0).max())
-        (directions, gap), count = self._facing, len(rows.nodes)
+        has_two = np.isin(rows.nodes, rows.nodes[second])
+        tangents = np.where(has_two, -1, number[rows.nodes + self.count])
+        size = float(np.ptp(self.compliance.points, axis=0).max())
+        directions, gap = self._facing
         surface = ContactSurface(
-            SerialComm(),
-            points[rows.nodes],
-            directions,
-            rows.lengths,
-            admissible_gap(gap, points[rows.nodes], size),
-            np.full(count, self.bilateral),
-            np.zeros(count),
-            owned,
-            np.arange(count),
-            tangents[:, None],
+            comm=SerialComm(),
+            points=points,
+            normals=directions,
+            weights=rows.lengths,
+            gap0=admissible_gap(gap, points, size),
+            bilateral=np.full(count, self.bilateral),
+            compliance=np.zeros(count),
+            owned=owned,
+            slots=np.arange(count),
+            tangents=tangents[:, None],
         )
         return surface.moving(self.towards, self.along)
 
     @cached_property
     def symmetric(self) -> bool:
-        """Tell whether W[0] is: that of the unsymmetric Poincaré-Steklov operator is not."""
+        """Tell whether W[0] is symmetric, as that of the symmetric Poincaré-Steklov operator is."""
         return max_abs(self.W[0] - self.W[0].T) <= ASYMMETRIC * max_abs(self.W[0])
 
     @cached_property
     def p_matrix(self) -> PMatrix:
-        """Tell whether the step matrix, W[0] of contact, is one.
+        """Tell whether the step matrix, W[0] of contact, is a P-matrix.
 
-        Steps then have one solution, see there.
+        Steps then have one solution (``solvers.normal.uniqueness``).
         """
         rows = np.arange(self.free.sum()) if self.frictional else self.surface.owned
-        found = p_matrix(self.W[0][np.ix_(rows, rows)])
+        answer = p_matrix(self.W[0][np.ix_(rows, rows)])
         if not (self.frictional and self.friction.slope(self.surface.weights).any()):
-            return found
-        return PMatrix(
-            found.holds,
-            found.sentence.replace(
-                "the solution is",
-                "for given limits of friction, which those of this law are not, the solution is",
-            ),
+            return answer
+        sentence = answer.sentence.replace(
+            "the solution is",
+            "for given limits of friction, which those of this law are not, the solution is",
         )
+        return PMatrix(answer.holds, sentence)
 
     @cached_property
     def matrix(self) -> EffectiveMatrix:
-        """Return the matrix A of the step."""
+        """Return the matrix A of the step, the inverse of W[0].
+
+        Raises:
+            InputError: a W[0] that has no inverse, or is not positive definite.
+        """
         first = self.W[0]
         if not first.size:
             raise InputError(
@@ -338,16 +360,19 @@ class BoundaryContact:
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
 
     def step(self, k: int, loads: Array, before: Array, active: Mask) -> StepProblem:
-        """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps.
+        """Return the problem of a step.
 
-        ``before`` is v at its start.
+        Args:
+            k: number of the step, from 0.
+            loads: (steps, f), -B_nᵀ r_n - B_tᵀ r_t of the steps before it [N/m].
+            before: (f,), v at its start [m].
+            active: (c,), the conditions to try as closed first.
         """
-        dt, surface = self.compliance.dt, self.surface
-        past = (
-            self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0]
-            if k
-            else self.v_free[0]
-        )
+        dt = self.compliance.dt
+        surface = self.surface
+        past = self.v_free[k]
+        if k:
+            past = past + sum_products(self.W[k:0:-1], loads[:k, :, None])[:, 0]
         slip0 = surface.slip_origin(before, k * dt, (k + 1) * dt) if self.frictional else None
         return StepProblem(
             A=self.matrix,
@@ -366,12 +391,12 @@ class BoundaryContact:
         )
 
     def load(self, r_n: Array, r_t: Array | None) -> Array:
-        """Return (f,) forces of the support on the free unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
+        """Return the forces (f,) of the support on the free unknowns, -B_nᵀ r_n - B_tᵀ r_t."""
         return -self.surface.reaction_load(r_n, int(self.free.sum()), r_t)
 
     def cartesian(self, loads: Array) -> Array:
-        """Return (steps, 2m) nodal forces lam on the body.
+        """Return the nodal forces lam (steps, 2m) on the body of loads (steps, f).
 
-        They are x of all contact nodes, then y, of loads (steps, f).
+        They are x of all contact nodes, then y.
         """
         return np.asarray(loads @ self.frames[self.free])

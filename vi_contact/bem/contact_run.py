@@ -35,11 +35,17 @@ def march_contact(
 ) -> "ContactRun":
     """March through all steps of the compliance.
 
-    ``solver`` is Condensed with any of its methods, by default ActiveSet, or Lemke where the
-    compliance is not symmetric.
+    Args:
+        contact: the condensed body and its support.
+        solver: Condensed with any of its methods. None takes ActiveSet, or Lemke where the
+            compliance is not symmetric.
+        tolerance: largest residual that the certificate of a step may have.
 
-    Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and
-    residuals.
+    Returns:
+        The histories, with the certificate of every step.
+
+    Raises:
+        StepFailure: a step whose certificate exceeds the tolerance, with step, time and residuals.
     """
     default = Condensed() if contact.symmetric else Condensed(Lemke())
     if not contact.symmetric and not contact.p_matrix.holds:
@@ -49,7 +55,7 @@ def march_contact(
         )
     prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
 
-    def solved(step: StepProblem) -> StepResult:
+    def solve(step: StepProblem) -> StepResult:
         result = prepared.solve(step)
         certificate = kkt_residual(step, result)
         if not certificate.worst <= tolerance:
@@ -60,19 +66,28 @@ def march_contact(
             )
         return result
 
-    return run_steps(contact, solved)
+    return run_steps(contact, solve)
 
 
 @dataclass(frozen=True)
 class ContactRun:
     """Hold the histories of c conditions at m contact nodes over all steps.
 
-    times: (steps,) ends of the steps [s]; r_n: (steps, c), r_t: (steps, c) reactions [N/m] on the
-    support during each step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip:
-    (steps, c) in each step [m]; displacement: (steps, 2m) of the contact nodes at the ends and
-    forces: (steps, 2m) on the body [N/m] in the order of CondensedCompliance; active: (steps, c).
-    certificates: of each step; iterations: (steps,) of the method in a step, or one per window of a
-    method for many steps; history: what such a method logs.
+    Attributes:
+        contact: the condensed body and its support.
+        times: (steps,) ends of the steps [s].
+        r_n: (steps, c) normal reactions on the support during each step [N/m].
+        r_t: (steps, c) tangential reactions on the support during each step [N/m].
+        gap: (steps, c) at the ends of the steps [m].
+        slip: (steps, c) in each step [m].
+        displacement: (steps, 2m) of the contact nodes at the ends of the steps [m], in the order
+            of CondensedCompliance.
+        forces: (steps, 2m) on the body during each step [N/m], in the same order.
+        active: (steps, c) whether a condition is closed.
+        certificates: of each step.
+        iterations: (steps,) of the method in a step; of a method for many steps at once, one for
+            each window.
+        history: what such a method logs.
     """
 
     contact: BoundaryContact
@@ -90,79 +105,100 @@ class ContactRun:
 
     @property
     def worst(self) -> float:
-        """Return the worst residual of any step."""
+        """Return the largest residual of all steps, a pure number."""
         return max(certificate.worst for certificate in self.certificates)
 
     @property
     def resultant(self) -> Array:
-        """Return (steps, 2) force of the support on the body [N/m]."""
+        """Return the force (steps, 2) of the support on the body [N/m]."""
         return np.asarray(self.forces.reshape(len(self.times), 2, -1).sum(axis=2))
 
     @property
     def impulse(self) -> Array:
-        """Return (steps, 2) the impulse of that force up to each time [N s/m]."""
+        """Return the impulse (steps, 2) of that force up to each time [N s/m]."""
         return np.cumsum(self.resultant, axis=0) * self.contact.compliance.dt
 
     @property
     def pressure(self) -> Array:
-        """Return (steps, c) normal traction r_n / length [Pa]."""
+        """Return the normal traction (steps, c), r_n / length [Pa]."""
         return self.r_n / self.contact.surface.weights
 
     @property
     def shear(self) -> Array:
-        """Return (steps, c) tangential traction r_t / length [Pa] of the body on the support."""
+        """Return the tangential traction (steps, c) on the support, r_t / length [Pa]."""
         return self.r_t / self.contact.surface.weights
 
     @property
     def work(self) -> Array:
-        """Return (steps,) work of all contact forces on the body up to each time [J/m]."""
+        """Return the work (steps,) of all contact forces on the body up to each time [J/m]."""
         return work(self.forces, self.displacement)
 
     @property
     def friction_loss(self) -> Array:
-        """Return (steps,) energy that friction has taken [J/m].
+        """Return the energy (steps,) that friction has taken up to each time [J/m].
 
-        It is sum r_t slip, never negative in a step.
+        It is the sum of r_t slip, which is never negative in a step.
         """
         return np.cumsum((self.r_t * self.slip).sum(axis=1))
 
 
 def run_steps(
     contact: BoundaryContact,
-    solved: Callable[[StepProblem], StepResult],
+    answer: Callable[[StepProblem], StepResult],
     *,
     iterations: Array | None = None,
     history: tuple[float, ...] = (),
 ) -> ContactRun:
-    """Take all steps, each answered by ``solved``, into a run with certificates."""
+    """Take all steps into a run with certificates.
+
+    Args:
+        contact: the condensed body and its support.
+        answer: gives the result of a step.
+        iterations: of each step or window; None takes those of the results.
+        history: what a method for many steps logs.
+    """
     surface = contact.surface
-    nothing = np.zeros((surface.count, 1))
-    x, active = np.zeros(int(contact.free.sum())), surface.gap(0.0) <= 0.0
+    x = np.zeros(int(contact.free.sum()))
+    active = surface.gap(0.0) <= 0.0
     loads = np.zeros_like(contact.v_free)
-    pairs: list[tuple[StepProblem, StepResult]] = []
+    steps: list[StepProblem] = []
+    results: list[StepResult] = []
     for k in range(len(loads)):
         step = contact.step(k, loads, x, active)
         refuse_nan(step)
-        result = solved(step)
+        result = answer(step)
         loads[k] = contact.load(result.r_n, result.r_t)
-        x, active = result.x, result.active
-        pairs.append((step, result))
-    slip = [
-        nothing if step.slip0 is None else surface.tangential_values(result.x) - step.slip0
-        for step, result in pairs
-    ]
+        x = result.x
+        active = result.active
+        steps.append(step)
+        results.append(result)
+
+    # Histories of all conditions; without friction nothing rubs and nothing is said to slide.
+    gap = []
+    slip = []
+    r_t = []
+    nothing = np.zeros((surface.count, 1))
+    for step, result in zip(steps, results, strict=True):
+        gap.append(step.bound - surface.normal_values(result.x))
+        if step.slip0 is None:
+            slip.append(nothing)
+        else:
+            slip.append(surface.tangential_values(result.x) - step.slip0)
+        r_t.append(nothing if result.r_t is None else result.r_t)
+    if iterations is None:
+        iterations = np.array([result.iterations for result in results])
     forces = contact.cartesian(loads)
     return ContactRun(
-        contact,
-        np.array([step.t for step, _ in pairs]),
-        np.array([result.r_n for _, result in pairs]),
-        np.array([nothing if result.r_t is None else result.r_t for _, result in pairs])[:, :, 0],
-        np.array([step.bound - surface.normal_values(result.x) for step, result in pairs]),
-        np.array(slip)[:, :, 0],
-        contact.compliance.displacement(forces),
-        forces,
-        np.array([result.active for _, result in pairs]),
-        tuple(kkt_residual(*pair) for pair in pairs),
-        np.array([result.iterations for _, result in pairs]) if iterations is None else iterations,
-        history,
+        contact=contact,
+        times=np.array([step.t for step in steps]),
+        r_n=np.array([result.r_n for result in results]),
+        r_t=np.array(r_t)[:, :, 0],
+        gap=np.array(gap),
+        slip=np.array(slip)[:, :, 0],
+        displacement=contact.compliance.displacement(forces),
+        forces=forces,
+        active=np.array([result.active for result in results]),
+        certificates=tuple(map(kkt_residual, steps, results)),
+        iterations=iterations,
+        history=history,
     )

@@ -43,11 +43,18 @@ SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
 
 @dataclass(frozen=True, eq=False)
 class EnergeticBlocks:
-    """Hold the blocks of density 1.
+    """Hold the blocks V^j, K^j and D^j of density 1, for j from 0 to steps - 1.
 
     They depend on the mesh, the wave speeds and the time step only.
 
-    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n).
+    Attributes:
+        mesh: the boundary, of n elements.
+        c_p: speed of pressure waves [m/s].
+        c_s: speed of shear waves [m/s].
+        dt: time step [s].
+        single: (steps, 4n, 4n) V^j.
+        double: (steps, 4n, 2n) K^j.
+        hyper: (steps, 2n, 2n) D^j.
     """
 
     mesh: BoundaryMesh
@@ -65,19 +72,25 @@ class EnergeticBlocks:
 
 
 def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
-    """Raise InputError unless 0.05 <= c_P dt / h <= 8, h the longest element."""
+    """Raise InputError unless 0.05 <= c_P dt / h <= 8, h the longest element.
+
+    Args:
+        mesh: the boundary.
+        c_p: speed of pressure waves [m/s].
+        dt: time step [s].
+    """
     number("boundary elements", "the time step dt", dt, positive=True, unit="s")
     ratio = c_p * dt / float(mesh.lengths.max())
-    if not SMALLEST_RATIO <= ratio <= GREATEST_RATIO:
-        what = (
-            "enlarge the time step or refine"
-            if ratio < SMALLEST_RATIO
-            else "reduce the time step or coarsen"
-        )
-        raise InputError(
-            f"boundary elements: c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, "
-            f"dt = {dt:.3g} s), beyond {SMALLEST_RATIO:g} to {GREATEST_RATIO:g}; {what} the mesh"
-        )
+    if SMALLEST_RATIO <= ratio <= GREATEST_RATIO:
+        return
+    if ratio < SMALLEST_RATIO:
+        remedy = "enlarge the time step or refine"
+    else:
+        remedy = "reduce the time step or coarsen"
+    raise InputError(
+        f"boundary elements: c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, "
+        f"dt = {dt:.3g} s), beyond {SMALLEST_RATIO:g} to {GREATEST_RATIO:g}; {remedy} the mesh"
+    )
 
 
 def energetic_blocks(
@@ -90,71 +103,111 @@ def energetic_blocks(
     compressed: bool | None = None,
     threads: int = 1,
 ) -> EnergeticBlocks | CompressedBlocks:
-    """Assemble the blocks of `steps` time steps of dt [s]; dense ones take 224 steps n² bytes.
+    """Assemble the blocks of all time steps; dense ones take 224 steps n² bytes.
 
-    compressed: whether to keep CompressedBlocks and solve on a circle of frequencies; None does so
-    where dense blocks would take 400 MB. threads: how many integrate; answers do not depend on it.
-    Raises InputError for a time step far too small or large for the mesh, and for a body too thin
-    or sharp for it.
+    Args:
+        mesh: the boundary, of n elements.
+        material: of the body. Its density has no effect on the blocks beyond the wave speeds.
+        dt: time step [s].
+        steps: number of time steps.
+        orders: numbers of Gauss points.
+        compressed: whether to keep ``CompressedBlocks`` and solve on a circle of frequencies. None
+            does so where dense blocks would take more than 400 MB.
+        threads: how many threads integrate. Answers do not depend on it.
+
+    Returns:
+        The blocks, dense or compressed.
+
+    Raises:
+        InputError: a time step far too small or large for the mesh; a body too thin or too sharp
+            for the mesh.
     """
     owner = "boundary elements"
     check_body(mesh, material, orders)
     steps = whole(owner, "the number of time steps", steps, least=1)
     whole(owner, "the number of threads", threads, least=1)
-    numbers = 28 * steps * len(mesh) ** 2
-    small = numbers <= DENSE if compressed is None else not flag(owner, "compressed", compressed)
-    counted(
-        owner,
-        f"{steps} steps of {len(mesh)} elements",
-        numbers,
-        "numbers",
-        most=NUMBERS * (1 if small else 10),
-    )
+    n = len(mesh)
+    numbers = 28 * steps * n**2
+    dense = numbers <= DENSE if compressed is None else not flag(owner, "compressed", compressed)
+    most = NUMBERS if dense else 10 * NUMBERS
+    counted(owner, f"{steps} steps of {n} elements", numbers, "numbers", most=most)
     check_time_step(mesh, material.c_p, dt)
-    galerkin, n, speeds = (
-        Galerkin(mesh, material.c_s, orders),
-        len(mesh),
-        (material.c_p, material.c_s),
-    )
+    galerkin = Galerkin(mesh, material.c_s, orders)
+    speeds = (material.c_p, material.c_s)
 
-    def assembled(
+    def assemble_blocks(
         among: Callable[[int], Mask] | None = None,
     ) -> Iterator[tuple[Array, Array, Array] | None]:
-        """Return V^j, K^j, D^j.
+        """Yield V^j, K^j, D^j for one step after the other.
 
-        They are right where pairs are ``among`` those of the times j - 1, j and j + 1, all of them
-        if None; there is None instead of them where there is no pair at j + 1.
+        They are right for pairs that are ``among`` those of the times j - 1, j and j + 1, or for
+        all pairs if it is None. Where there is no pair at j + 1, None is yielded instead.
         """
+        last = steps if dense else AHEAD * steps
+        return _difference_blocks(galerkin, speeds, dt, last, threads, among)
 
-        def at(i: int) -> OperatorMatrices | None:
-            some, t = copy(galerkin), i * dt
-            some.pairs = galerkin.pairs if among is None else galerkin.pairs.where(among(i))
-            if not len(some.pairs):
-                return None
-            return some.assemble(TimeKernels(t, *speeds), (speeds[1] * t, speeds[0] * t))
-
-        a, b, c, change = (np.zeros(1) for _ in range(4))
-        last = steps if small else AHEAD * steps
-        with ThreadPoolExecutor(threads) as pool:
-            for start in range(1, last + 1, threads):
-                # each at a time of its own
-                for now in pool.map(at, range(start, min(start + threads, last + 1))):
-                    if now is None:
-                        yield None
-                        continue
-                    yield now.single - a, (now.double - b) / dt, (now.hyper - c - change) / dt**2
-                    a, b, c, change = now.single, now.double, now.hyper, now.hyper - c
-
-    if not small:
-        return compressed_blocks(mesh, galerkin.pairs, speeds, dt, steps, assembled)
-    single, double, hyper = (np.empty((steps, a * n, b * n)) for a, b in ((4, 4), (4, 2), (2, 2)))
-    for j, blocks in enumerate(assembled()):
+    if not dense:
+        return compressed_blocks(mesh, galerkin.pairs, speeds, dt, steps, assemble_blocks)
+    single = np.empty((steps, 4 * n, 4 * n))
+    double = np.empty((steps, 4 * n, 2 * n))
+    hyper = np.empty((steps, 2 * n, 2 * n))
+    for j, blocks in enumerate(assemble_blocks()):
         if blocks is not None:
             single[j], double[j], hyper[j] = blocks
     return EnergeticBlocks(mesh, *speeds, dt, single, double, hyper)
 
 
-def marched(
+def _difference_blocks(
+    galerkin: Galerkin,
+    speeds: tuple[float, float],
+    dt: float,
+    last: int,
+    threads: int,
+    among: Callable[[int], Mask] | None,
+) -> Iterator[tuple[Array, Array, Array] | None]:
+    """Yield V^j, K^j, D^j: differences of the integrated operators A, B, C over their times.
+
+    Args:
+        galerkin: integrates the operators.
+        speeds: (c_P, c_S) [m/s].
+        dt: time step [s].
+        last: number of times dt, 2 dt, ... at which the operators are integrated.
+        threads: how many of them are integrated at once.
+        among: the pairs (p,) to integrate at time i dt; None for all.
+    """
+
+    def operators_at(i: int) -> OperatorMatrices | None:
+        """Return A, B, C at the time i dt, or None where no pair is wanted."""
+        t = i * dt
+        some = copy(galerkin)
+        some.pairs = galerkin.pairs if among is None else galerkin.pairs.where(among(i))
+        if not len(some.pairs):
+            return None
+        return some.assemble(TimeKernels(t, *speeds), (speeds[1] * t, speeds[0] * t))
+
+    # What was there one time before: A, B, C, and the last increment of C.
+    single_before = np.zeros(1)
+    double_before = np.zeros(1)
+    hyper_before = np.zeros(1)
+    hyper_change = np.zeros(1)
+    with ThreadPoolExecutor(threads) as pool:
+        for start in range(1, last + 1, threads):
+            times = range(start, min(start + threads, last + 1))  # one for each thread
+            for now in pool.map(operators_at, times):
+                if now is None:
+                    yield None
+                    continue
+                V = now.single - single_before
+                K = (now.double - double_before) / dt
+                D = (now.hyper - hyper_before - hyper_change) / dt**2
+                yield V, K, D
+                hyper_change = now.hyper - hyper_before
+                single_before = now.single
+                double_before = now.double
+                hyper_before = now.hyper
+
+
+def march_blocks(
     blocks: EnergeticBlocks,
     fixed: NDArray[np.bool_],
     forces: Array,
@@ -162,12 +215,22 @@ def marched(
     *,
     symmetric: bool = True,
 ) -> tuple[Array, Array, Array]:
-    """Return displacements (steps, 2n, R) at the ends of the steps, for R right-hand sides.
+    """March through all steps for R right-hand sides at once.
 
-    With them come tractions (steps, 4n, R) and nodal forces (steps, 2n, R) in the steps, reactions
-    included. The R right-hand sides are forces (steps, 2n, R), and ``prescribed`` (steps, 2n, R),
-    read at ``fixed`` unknowns (2n,) only. For density 1: divide forces by rho before, multiply
-    after.
+    Args:
+        blocks: those of the body, of density 1.
+        fixed: (2n,), which unknowns are prescribed.
+        forces: (steps, 2n, R), nodal forces over rho, means over the steps.
+        prescribed: (steps, 2n, R), displacements [m] at the ends of the steps, read at ``fixed``
+            unknowns only; None for zero.
+        symmetric: whether to march the symmetric form.
+
+    Returns:
+        Displacements (steps, 2n, R) at the ends of the steps [m], tractions over rho (steps, 4n,
+        R) and nodal forces over rho (steps, 2n, R) in the steps, reactions included.
+
+    Raises:
+        InputError: forces of more steps than the blocks have.
     """
     steps, unknowns, count = forces.shape
     if steps > blocks.steps:
@@ -175,8 +238,13 @@ def marched(
             f"boundary elements: the forces have {steps} steps and the operator {blocks.steps}; "
             "assemble it with more steps"
         )
-    mass, free = blocks.mesh.mass, ~fixed
-    v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))
+    mass = blocks.mesh.mass
+    free = ~fixed
+
+    # Eliminate the traction of a step: p = V0⁻¹ (K0 + M/2) u + ..., and with it the operator S0 of
+    # one step, from increments of displacement to nodal forces.
+    single = blocks.single[0]
+    v0 = cho_factor(0.5 * (single + single.T))
     right = blocks.double[0] + 0.5 * mass
     left = right.T if symmetric else mass.T
     v0_right = cho_solve(v0, right)
@@ -185,14 +253,22 @@ def marched(
         s0 -= blocks.hyper[0]
         s0 = 0.5 * (s0 + s0.T)
     factor = lu_factor(s0[np.ix_(free, free)]) if free.any() else None
-    u, p = np.zeros((steps, unknowns, count)), np.empty((steps, 2 * unknowns, count))
-    total, before = forces.copy(), np.zeros((unknowns, count))
+
+    u = np.zeros((steps, unknowns, count))  # increments, until they are added up at the end
+    p = np.empty((steps, 2 * unknowns, count))
+    total = forces.copy()
+    before = np.zeros((unknowns, count))  # displacement at the start of the step
     for k in range(steps):
-        past = summed(blocks.single[k:0:-1], p[:k]) - summed(blocks.double[k:0:-1], u[:k])
+        # What earlier steps have left: traction at no increment, and the nodal forces of it.
+        past = sum_products(blocks.single[k:0:-1], p[:k]) - sum_products(
+            blocks.double[k:0:-1], u[:k]
+        )
         v0_early = cho_solve(v0, 0.5 * mass @ before - past)
         known = left @ v0_early
         if symmetric and k:
             known = known + _adjoint(blocks, p[:k], u[:k])
+
+        # Solve for the free increments; then tractions, and reactions of the fixed unknowns.
         if prescribed is not None:
             u[k, fixed] = prescribed[k, fixed] - before[fixed]
         if factor is not None:
@@ -207,16 +283,22 @@ def marched(
 def _adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
     """Return the sum of K' p - D u over the k earlier steps of the symmetric form.
 
-    K' acts on the jumps of p.
+    K'^j = (K^j - K^(j-1))ᵀ: its sum with p is that of K^jᵀ with the jumps of p, but for the last
+    traction, which K^0 has not met yet.
     """
-    k, jumps = len(p), np.diff(p, axis=0, prepend=0.0)
-    adjoint = summed(blocks.double[k:0:-1].swapaxes(1, 2), jumps) - blocks.double[0].T @ p[-1]
-    return adjoint - summed(blocks.hyper[k:0:-1], u)
+    k = len(p)
+    jumps = np.diff(p, axis=0, prepend=0.0)
+    adjoint = sum_products(blocks.double[k:0:-1].swapaxes(1, 2), jumps) - blocks.double[0].T @ p[-1]
+    return adjoint - sum_products(blocks.hyper[k:0:-1], u)
 
 
-def summed(blocks: Array, values: Array) -> Array:
-    """Return sum_l blocks[l] @ values[l], in groups so that the products stay small."""
+def sum_products(blocks: Array, values: Array) -> Array:
+    """Return sum_l blocks[l] @ values[l], of (l, a, b) and (l, b, R).
+
+    Groups of steps keep the products small.
+    """
     total = np.zeros((blocks.shape[1], values.shape[2]))
     for start in range(0, len(blocks), 16):
-        total += np.matmul(blocks[start : start + 16], values[start : start + 16]).sum(axis=0)
+        group = slice(start, start + 16)
+        total += np.matmul(blocks[group], values[group]).sum(axis=0)
     return total

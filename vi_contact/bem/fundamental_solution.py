@@ -1,6 +1,6 @@
 """Evaluate the radial functions of the fundamental solution of plane-strain elastodynamics.
 
-It is that in time, of density 1.
+They are functions of time, of density 1.
 
 With (Δ - s²/c_a²) Phi_a = -delta, that is Phi_a = K0(s r/c_a) / (2 pi), a = P, S (Laplace domain),
 
@@ -14,8 +14,8 @@ integral of H(t - r/c)/sqrt(t² - r²/c²),
     F_1 = ln((t + R) c/r),  F_2 = t F_1 - R,  (n-1)² F_n = (2n-3) t F_(n-1) - R² F_(n-2),
     R = sqrt(t² - r²/c²).
 
-Zero ahead of its front (r >= c t). See docs/theory/bem.md; n = 0: Achenbach, Wave Propagation in
-Elastic Solids, 3.10.
+All are zero ahead of their front (r >= c t). See docs/theory/bem.md; for n = 0, Achenbach, Wave
+Propagation in Elastic Solids, 3.10.
 """
 
 from dataclasses import dataclass
@@ -35,9 +35,12 @@ TWO_PI = 2.0 * np.pi
 class KernelSet(NamedTuple):
     """Hold what the Galerkin layer integrates, arrays of the shape of r.
 
-    single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi =
-    Phi_S'/r, ddiff = (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p,
-    inertia_s), inertia_a = s² Phi_a (in time: Phi_a integrated twice less).
+    Attributes:
+        single: (g1, g2) of G.
+        double: (phi, dphi, ddiff, g1, g2), where phi = Phi_S, dphi = Phi_S'/r and ddiff = (Phi_P -
+            Phi_S)'/r; a prime is d/dr.
+        hyper: the same, then (inertia_p, inertia_s) with inertia_a = s² Phi_a, which in time is
+            Phi_a integrated twice less.
     """
 
     single: tuple[NDArray, ...]
@@ -62,9 +65,14 @@ def check_speeds(kernels: Any) -> None:
 class TimeKernels:
     """Evaluate kernels at a time t [s].
 
-    They are G integrated once (single layer), twice (double) and three times (hypersingular).
+    The kernels are integrated in time once (single layer), twice (double layer) and three times
+    (hypersingular operator), as tractions that are constant and displacements that are linear in a
+    time step need it.
 
-    That is what functions constant in time (traction) and linear in time (displacement) need.
+    Attributes:
+        t: time since the impulse [s].
+        c_p: speed of pressure waves [m/s].
+        c_s: speed of shear waves [m/s].
     """
 
     t: Annotated[float, Positive, Unit("s")]
@@ -75,19 +83,27 @@ class TimeKernels:
         check_speeds(self)
 
     def __call__(self, r: Array) -> KernelSet:
-        """Return the kernels at distances r [m] > 0; zero where r >= c_p t."""
-        t, slow, fast = self.t, 1.0 / self.c_s**2, 1.0 / self.c_p**2
+        """Return the kernels at distances r > 0 [m]; they are zero where r >= c_p t."""
+        t = self.t
+        slow = 1.0 / self.c_s**2
+        fast = 1.0 / self.c_p**2
+        inverse = 1.0 / r**2
+
+        # Single layer: F_1 of both waves. dQ_2 = (R_P - R_S)/r² is written so that behind the
+        # fronts no two nearly equal numbers are subtracted.
         root_s, f1_s = front_functions(r, t, self.c_s)
         root_p, f1_p = front_functions(r, t, self.c_p)
-        inverse = 1.0 / r**2
         dq2 = np.where(
             root_s > 0.0, (slow - fast) / np.maximum(root_s + root_p, 1e-300), root_p * inverse
         )
         dq3 = 0.5 * (f1_s * slow - f1_p * fast + t * dq2)
         single = tensor(f1_s * slow, f1_p * fast, dq3)
-        f2_s, f2_p = t * f1_s - root_s, t * f1_p - root_p
+
+        # Double layer, F_2, and below the hypersingular operator, F_3, by recursion:
         # (n-1)² dQ_n = (2n-3) t dQ_(n-1) - t² dQ_(n-2) + [(r F'_(n-2) + 2 F_(n-2))/c²] S minus P,
         # where r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
+        f2_s = t * f1_s - root_s
+        f2_p = t * f1_p - root_p
         dq4 = (
             5.0 * t * dq3
             - t**2 * dq2
@@ -120,12 +136,24 @@ class TimeKernels:
 
 
 def front_functions(r: Array, t: float, c: float) -> tuple[Array, Array]:
-    """Return (R, F_1) = (sqrt(t² - r²/c²), ln((t + R) c/r)), both zero ahead of the front."""
+    """Return R = sqrt(t² - r²/c²) and F_1 = ln((t + R) c/r), both zero ahead of the front.
+
+    Args:
+        r: distances [m].
+        t: time [s].
+        c: speed of the wave [m/s].
+    """
     q = np.minimum(r / (c * t), 1.0)
     root = np.sqrt((1.0 - q) * (1.0 + q))
     return t * root, np.log((1.0 + root) / q)
 
 
 def tensor(f_s: Array, f_p: Array, dq: Array) -> tuple[Array, Array]:
-    """Return (g1, g2) from F_n^S/c_S², F_n^P/c_P² and dQ_(n+2)."""
+    """Return the radial functions (g1, g2) of G integrated n times in time.
+
+    Args:
+        f_s: F_n / c_S² of shear waves.
+        f_p: F_n / c_P² of pressure waves.
+        dq: dQ_(n+2).
+    """
     return (f_s - dq) / TWO_PI, (f_s - f_p - 2.0 * dq) / TWO_PI

@@ -2,8 +2,9 @@
 
 One part of their interface is in contact, another is welded.
 
-Each body has its own mesh, material and operator; only the condensed motion of interface nodes
-meets. With the forces lam on body 1 and -lam on body 2 the relative displacement is
+Each body has its own mesh, material and operator; the bodies know each other only by the condensed
+motion of interface nodes. With the forces lam on body 1 and -lam on body 2 the relative
+displacement is
 
     w = u_1 - u_2 = (W_1 + W_2) * lam + (u_1,free - u_2,free)
 
@@ -11,9 +12,13 @@ the condensed motion of one body on a rigid support. Welded nodes have w = g in 
 the end of every step; their forces are eliminated, and what is left is a CondensedCompliance of the
 contact nodes alone.
 
-Jumps may be given on the whole interface, with n the normal of body 1: welded nodes have u_1 - u_2
-= g, contact nodes (u_1 - u_2 - g).n <= 0 and slip u_t,1 - u_t,2 - g_t; p_1 + p_2 = f everywhere,
-where lam is p_1 and f - p_1 acts on body 2: friction limits p_1. The source has u_perp = -u.n, so
+Jumps may be given on the whole interface, with n the normal of body 1:
+
+    u_1 - u_2 = g                                              at welded nodes
+    (u_1 - u_2 - g).n <= 0,    slip = u_t,1 - u_t,2 - g_t      at contact nodes
+    p_1 + p_2 = f                                              everywhere
+
+Here lam is p_1, which friction limits, and f - p_1 acts on body 2. The source has u_perp = -u.n, so
 that g_perp = -g.n.
 """
 
@@ -30,7 +35,7 @@ from ..core.errors import InputError
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.surfaces import nodal_frames
 from .contact import ASYMMETRIC, SUPPORTED, BoundaryContact, Conditions
-from .energetic import summed
+from .energetic import sum_products
 from .loads import traction_forces
 from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
 
@@ -42,15 +47,21 @@ OfPlace = Callable[[Array, float], Array]
 class TwoBodies:
     """Describe two boundary value problems whose ``contact`` elements face each other.
 
-    They do so node on node.
+    Every node of one interface has a partner at its place on the other.
 
-    welded: (n_1,) elements of body 1 on the transmission interface, part of its ``contact``; nodes
-    that touch one of them are welded. jump: g [m], a function of (points (m, 2), t) that returns
-    (m, 2), or (steps, 2, m) at the interface nodes of body 1, ascending, at the ends of steps;
-    traction: f likewise, [Pa] from a function or nodal forces [N/m], means over steps; None: zero.
+    Attributes:
+        one: body 1.
+        two: body 2.
+        welded: (n_1,) whether an element of body 1, part of its ``contact``, is welded to body 2.
+            Nodes that touch such an element are welded.
+        jump: g [m], a function of (points (m, 2), t) that returns (m, 2); or (steps, 2, m) at the
+            interface nodes of body 1, ascending, at the ends of steps. None is zero.
+        traction: f likewise: a function [Pa], or nodal forces [N/m], means over the steps. None is
+            zero.
 
-    Raises InputError for nodes without a partner, different steps, welds outside the interface, and
-    histories of other shapes.
+    Raises:
+        InputError: nodes without a partner; different steps; welds outside the interface;
+            histories of other shapes.
     """
 
     one: BoundaryProblem
@@ -60,43 +71,35 @@ class TwoBodies:
     traction: OfPlace | Array | None = None
 
     def __post_init__(self) -> None:
-        for name in ("one", "two"):
-            provides(
-                "TwoBodies",
-                name,
-                getattr(self, name),
-                ("operator", "contact", "condensed", "solve"),
-                "give a BoundaryProblem",
-            )
-        optional(mask, "TwoBodies", "welded", self.welded, (len(self.one.operator.mesh),))
-        steps = [len(body.forces) for body in (self.one, self.two)]
-        if steps[0] != steps[1]:
+        owner = "TwoBodies"
+        needed = ("operator", "contact", "condensed", "solve")
+        provides(owner, "one", self.one, needed, "give a BoundaryProblem")
+        provides(owner, "two", self.two, needed, "give a BoundaryProblem")
+        optional(mask, owner, "welded", self.welded, (len(self.one.operator.mesh),))
+        steps_of_one = len(self.one.forces)
+        steps_of_two = len(self.two.forces)
+        if steps_of_one != steps_of_two:
             raise InputError(
-                f"TwoBodies: one has forces of {steps[0]} steps and two of {steps[1]}; give both "
-                "as many"
+                f"TwoBodies: one has forces of {steps_of_one} steps and two of {steps_of_two}; "
+                "give both as many"
             )
         for name in ("jump", "traction"):
             if not callable(getattr(self, name)):
-                shape = (len(self.one.forces), 2, len(self.one.contact_nodes))
-                optional(array, "TwoBodies", name, getattr(self, name), shape)
+                shape = (steps_of_one, 2, len(self.one.contact_nodes))
+                optional(array, owner, name, getattr(self, name), shape)
 
     def jumps(self, t: float) -> Array:
-        """Return g (2, m) at the interface nodes of body 1 at time t.
+        """Return g (2, m) [m] at the interface nodes of body 1 at time t [s].
 
-        Histories are linear in a step.
+        Given histories start at zero and are linear in a step.
         """
         nodes = self.one.contact_nodes
         if self.jump is None:
             return np.zeros((2, len(nodes)))
         if callable(self.jump):
             points = self.one.operator.mesh.points[nodes]
-            return array(
-                "TwoBodies",
-                f"the jump at t = {t:.6g} s",
-                self.jump(points, t),
-                points.shape,
-                unit="m",
-            ).T
+            name = f"the jump at t = {t:.6g} s"
+            return array("TwoBodies", name, self.jump(points, t), points.shape, unit="m").T
         ends = np.concatenate([np.zeros((1, 2, len(nodes))), self.jump])
         place = min(max(t / self.one.operator.dt, 0.0), len(ends) - 1.0)
         k = min(int(place), len(ends) - 2)
@@ -104,37 +107,39 @@ class TwoBodies:
 
     @cached_property
     def _partner(self) -> Indices:
-        """Return (m,) the node of body 2, among its interface nodes, at each of body 1."""
-        one, two = (body.operator.mesh.points[body.contact_nodes] for body in (self.one, self.two))
-        return matching(one, two)
+        """Return the node of body 2, among its interface nodes, at each of body 1 (m,)."""
+        points_of_one = self.one.operator.mesh.points[self.one.contact_nodes]
+        points_of_two = self.two.operator.mesh.points[self.two.contact_nodes]
+        return match_points(points_of_one, points_of_two)
 
     @cached_property
     def _two(self) -> BoundaryProblem:
-        """Return body 2 with the given jump of tractions, all of it, among its loads."""
+        """Return body 2 with the whole of the given jump of tractions among its loads."""
         if self.traction is None:
             return self.two
-        mesh, nodes = self.one.operator.mesh, self.one.contact_nodes
+        nodes = self.one.contact_nodes
         loads = self.traction
         if callable(loads):
             law: OfPlace = loads
-            loads = traction_forces(
-                mesh,
+            all_nodes = traction_forces(
+                self.one.operator.mesh,
                 lambda points, _, t: law(points, t),
                 dt=self.one.operator.dt,
                 steps=len(self.one.forces),
                 elements=self.one.contact,
-            )[:, :, nodes]
+            )
+            loads = all_nodes[:, :, nodes]
         forces = np.array(self.two.forces, float)
-        pieces = (1,) * (forces.ndim - 3)  # of a step, where the operator has such
-        forces[..., self.two.contact_nodes[self._partner]] += np.reshape(
-            loads, (len(loads), *pieces, 2, len(nodes))
-        )
+        pieces = (1,) * (forces.ndim - 3)  # an axis for the pieces of a step, where there are some
+        partners = self.two.contact_nodes[self._partner]
+        forces[..., partners] += np.reshape(loads, (len(loads), *pieces, 2, len(nodes)))
         return replace(self.two, forces=forces)
 
     @cached_property
     def relative(self) -> CondensedCompliance:
         """Return W_1 + W_2 on all interface nodes, in the order and with the normals of body 1."""
-        one, two = self.one.condensed(), self._two.condensed()
+        one = self.one.condensed()
+        two = self._two.condensed()
         if one.W.shape != two.W.shape or abs(one.dt - two.dt) > 1e-12 * one.dt:
             raise InputError(
                 f"TwoBodies: {len(one.W)} steps of {one.dt:.6g} s and {len(one.nodes)} nodes face "
@@ -150,25 +155,28 @@ class TwoBodies:
 
     @cached_property
     def _weld(self) -> "Weld":
-        relative, interface = self.relative, np.asarray(self.one.contact, bool)
-        elements = (
-            np.zeros(len(interface), bool) if self.welded is None else np.asarray(self.welded, bool)
-        )
-        if (elements & ~interface).any():
+        """Return what welds the bodies; with no welded element, it leaves all nodes to contact."""
+        interface = np.asarray(self.one.contact, bool)
+        welded = np.zeros(len(interface), bool)
+        if self.welded is not None:
+            welded = np.asarray(self.welded, bool)
+        if (welded & ~interface).any():
             raise InputError(
                 "TwoBodies: `welded` has elements of body 1 that are not in its `contact`; add "
                 "them there"
             )
+        # Lengths and normals of contact nodes are those of the elements in contact alone.
         mesh = self.one.operator.mesh
-        contact = interface & ~elements
+        nodes = self.relative.nodes
+        contact = interface & ~welded
         relative = replace(
-            relative,
-            lengths=mesh.node_lengths(contact)[relative.nodes],
-            normals=mesh.node_normals(contact)[relative.nodes],
+            self.relative,
+            lengths=mesh.node_lengths(contact)[nodes],
+            normals=mesh.node_normals(contact)[nodes],
         )
-        dt, steps = relative.dt, len(relative.W)
-        jumps = np.array([self.jumps((k + 1) * dt).ravel() for k in range(steps)])
-        return Weld(relative, mesh.nodes_of(elements)[relative.nodes], jumps)
+        dt = relative.dt
+        jumps = np.array([self.jumps((k + 1) * dt).ravel() for k in range(len(relative.W))])
+        return Weld(relative, mesh.nodes_of(welded)[nodes], jumps)
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact nodes, for BoundaryContact.
@@ -188,48 +196,61 @@ class TwoBodies:
 
         The normal part of the given jump is how far body 2 has moved towards body 1 beforehand, its
         tangential part how far it has slid.
+
+        Args:
+            friction: the law of friction; None for none.
+            conditions: None for one condition at every contact node.
+            bilateral: whether every point is held on the other body.
         """
         compliance = self.condensed()
-        chosen = np.arange(len(compliance.nodes)) if conditions is None else conditions.nodes
-        frames = nodal_frames(compliance.normals if conditions is None else conditions.normals)
-        places = np.flatnonzero(np.isin(self.relative.nodes, compliance.nodes))[chosen]
+        friction = friction or Frictionless()
+        if self.jump is None:
+            return BoundaryContact(
+                compliance, friction=friction, conditions=conditions, bilateral=bilateral
+            )
+        touching = np.flatnonzero(np.isin(self.relative.nodes, compliance.nodes))
+        if conditions is None:
+            places = touching
+            frames = nodal_frames(compliance.normals)
+        else:
+            places = touching[conditions.nodes]
+            frames = nodal_frames(conditions.normals)
 
         def part(t: float, column: int) -> Array:
+            """Return the part (c,) of the jump along the normals (0) or the tangents (1)."""
             return np.asarray(np.sum(self.jumps(t)[:, places].T * frames[:, :, column], axis=1))
 
         return BoundaryContact(
             compliance,
-            friction=friction or Frictionless(),
+            friction=friction,
             conditions=conditions,
             bilateral=bilateral,
-            towards=None if self.jump is None else lambda t: -part(t, 0),
-            along=None if self.jump is None else lambda t: part(t, 1)[:, None],
+            towards=lambda t: -part(t, 0),
+            along=lambda t: part(t, 1)[:, None],
         )
 
     def solve(self, forces: Array | None = None) -> tuple[BoundaryMotion, BoundaryMotion]:
-        """Return the motions of both bodies under loads.
+        """Return the motions of both bodies under loads, contact forces and forces of the welds.
 
-        Contact forces (steps, 2m_c) act on body 1, and the forces of the welds on both.
+        The contact forces (steps, 2m_c) [N/m] are those on body 1; None is for no contact.
         """
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])
-        forces = (
-            np.zeros(shape)
-            if forces is None
-            else array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
-        )
+        if forces is None:
+            forces = np.zeros(shape)
+        else:
+            forces = array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
         on_one = self._weld.forces(forces)
-        two_nodes = self.two.operator.mesh.points[self.two.contact_nodes]
-        back = matching(two_nodes, relative.points)
-        return self.one.solve(on_one), self._two.solve(
-            -on_one[:, np.concatenate([back, back + len(back)])]
-        )
+        points_of_two = self.two.operator.mesh.points[self.two.contact_nodes]
+        back = match_points(points_of_two, relative.points)
+        on_two = -on_one[:, np.concatenate([back, back + len(back)])]
+        return self.one.solve(on_one), self._two.solve(on_two)
 
 
-def matching(points: Array, others: Array) -> Indices:
-    """Return (m,) number of the point of ``others`` (m, 2).
+def match_points(points: Array, others: Array) -> Indices:
+    """Return the number of that point of ``others`` (m, 2) which is at each of ``points`` (m, 2).
 
-    It is the one at each of ``points`` (m, 2); where there is none, InputError is raised.
+    Raises InputError where there is none.
     """
     distance = np.hypot(*(points[:, None] - others).transpose(2, 0, 1))
     nearest = distance.argmin(axis=1)
@@ -243,10 +264,10 @@ def matching(points: Array, others: Array) -> Indices:
     return nearest
 
 
-def inverse(matrix: Array) -> Callable[[Array], Array]:
-    """Return b -> matrix⁻¹ b.
+def factorise(matrix: Array) -> Callable[[Array], Array]:
+    """Return the function b -> matrix⁻¹ b.
 
-    It uses Cholesky's factors or, for a matrix of the unsymmetric form, LU factors.
+    It has Cholesky's factors or, for a matrix of the unsymmetric form, LU factors.
     """
     if max_abs(matrix - matrix.T) > ASYMMETRIC * max_abs(matrix):
         return partial(lu_solve, lu_factor(matrix))
@@ -254,52 +275,69 @@ def inverse(matrix: Array) -> Callable[[Array], Array]:
 
 
 class Weld:
-    """Hold the relative displacement of masked nodes (m,) at given jumps (steps, 2m).
+    """Hold the relative displacement of some nodes at given jumps.
 
-    ``contact`` is what is left of a compliance when the weld forces are eliminated.
+    Attributes:
+        contact: what is left of a compliance when the weld forces are eliminated.
     """
 
     def __init__(self, compliance: CondensedCompliance, nodes: Mask, jumps: Array) -> None:
-        W, steps = compliance.W, len(compliance.W)
+        """Eliminate the weld forces.
+
+        Args:
+            compliance: the relative motion of all m interface nodes.
+            nodes: (m,), which of them are welded.
+            jumps: (steps, 2m), their relative displacements at the ends of the steps [m].
+        """
+        W = compliance.W
+        steps = len(W)
         flexibility = W[0].diagonal()
-        self._welded = welded = np.tile(nodes, 2) & (flexibility > SUPPORTED * flexibility.max())
-        self._touching = touching = np.tile(~nodes, 2)
-        inner, cross, across = (
-            W[:, welded][:, :, welded],
-            W[:, welded][:, :, touching],
-            W[:, touching][:, :, welded],
-        )
-        known = np.concatenate([cross, (compliance.u_free - jumps)[:, welded, None]], axis=2)
-        # (steps, |I|, 2m_c + 1) weld forces after unit contact forces in step 0, in the last column
-        # without any
-        self._responses = responses = np.zeros_like(known)
-        left = np.concatenate(
-            [W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2
-        )
+        welded = np.tile(nodes, 2) & (flexibility > SUPPORTED * flexibility.max())
+        touching = np.tile(~nodes, 2)
+        self._welded = welded
+        self._touching = touching
+
+        # Relative displacement of welded unknowns after unit contact forces in step 0, and in the
+        # last column without any; and after unit weld forces.
+        from_contact = W[:, welded][:, :, touching]
+        without = (compliance.u_free - jumps)[:, welded, None]
+        known = np.concatenate([from_contact, without], axis=2)
+        from_welds = W[:, welded][:, :, welded]
+
+        # The same of contact unknowns, as if nothing were welded.
+        contact_W = W[:, touching][:, :, touching]
+        left = np.concatenate([contact_W, compliance.u_free[:, touching, None]], axis=2)
+
+        # Weld forces that bring the welded unknowns to their jumps, step by step, and what they
+        # move the contact unknowns by.
+        self._responses = np.zeros_like(known)
         if welded.any():
-            solve = inverse(inner[0])
+            solve = factorise(from_welds[0])
             for k in range(steps):
-                early = summed(inner[k:0:-1], responses[:k]) if k else 0.0
-                responses[k] = -solve(known[k] + early)
-            left += np.array([summed(across[k::-1], responses[: k + 1]) for k in range(steps)])
-        kept = {
-            name: getattr(compliance, name)[~nodes]
-            for name in ("nodes", "points", "normals", "lengths")
-        }
-        W, u_free = np.ascontiguousarray(left[:, :, :-1]), np.ascontiguousarray(left[:, :, -1])
-        self.contact = replace(compliance, W=W, u_free=u_free, **kept)
+                early = sum_products(from_welds[k:0:-1], self._responses[:k]) if k else 0.0
+                self._responses[k] = -solve(known[k] + early)
+            to_contact = W[:, touching][:, :, welded]
+            moved = [
+                sum_products(to_contact[k::-1], self._responses[: k + 1]) for k in range(steps)
+            ]
+            left += np.array(moved)
+        self.contact = replace(
+            compliance,
+            W=np.ascontiguousarray(left[:, :, :-1]),
+            u_free=np.ascontiguousarray(left[:, :, -1]),
+            nodes=compliance.nodes[~nodes],
+            points=compliance.points[~nodes],
+            normals=compliance.normals[~nodes],
+            lengths=compliance.lengths[~nodes],
+        )
 
     def forces(self, contact_forces: Array) -> Array:
-        """Return (steps, 2m): contact forces (steps, 2m_c).
-
-        With them come the weld forces that go with them.
-        """
-        everything = np.zeros((len(contact_forces), len(self._welded)))
-        everything[:, self._touching] = contact_forces
+        """Return the forces (steps, 2m) of contact (steps, 2m_c) and of the welds [N/m]."""
+        forces = np.zeros((len(contact_forces), len(self._welded)))
+        forces[:, self._touching] = contact_forces
         if self._welded.any():
+            columns = contact_forces[:, :, None]
             for k in range(len(contact_forces)):
-                follow = summed(self._responses[k::-1, :, :-1], contact_forces[: k + 1, :, None])[
-                    :, 0
-                ]
-                everything[k, self._welded] = self._responses[k, :, -1] + follow
-        return everything
+                follow = sum_products(self._responses[k::-1, :, :-1], columns[: k + 1])
+                forces[k, self._welded] = self._responses[k, :, -1] + follow[:, 0]
+        return forces

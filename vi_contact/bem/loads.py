@@ -21,46 +21,46 @@ def traction_forces(
     elements: ArrayLike | None = None,
     order: int = 4,
 ) -> Array:
-    """Return (steps, 2, n) nodal forces [N/m].
+    """Return the nodal forces (steps, 2, n) of a traction, means over each step [N/m].
 
-    They are the means over each step of traction(points, normals, t) -> (m, 2) [Pa].
-
-    points, normals: (m, 2); elements: mask (n,) of loaded ones, None: all; order: Gauss points in
-    time and along each.
+    Args:
+        mesh: the boundary, of n elements.
+        traction: a function of (points (m, 2), normals (m, 2), t) that returns (m, 2) [Pa].
+        dt: time step [s].
+        steps: number of steps.
+        elements: mask (n,) of the loaded elements; None for all.
+        order: number of Gauss points in each step, and along each element.
     """
     owner = "traction_forces"
     instance(owner, "mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
     function(owner, "traction", traction, "give a function (points, normals, t) -> (m, 2) in Pa")
-    dt, steps = (
-        number(owner, "dt", dt, positive=True, unit="s"),
-        whole(owner, "steps", steps, least=1),
-    )
+    dt = number(owner, "dt", dt, positive=True, unit="s")
+    steps = whole(owner, "steps", steps, least=1)
     counted(owner, "steps", 2 * steps * len(mesh), "numbers")
-    everywhere = np.ones(len(mesh), bool)
-    chosen = np.flatnonzero(
-        everywhere if elements is None else mask(owner, "elements", elements, (len(mesh),))
-    )
+    loaded = np.ones(len(mesh), bool)
+    if elements is not None:
+        loaded = mask(owner, "elements", elements, (len(mesh),))
     x, w = gauss(whole(owner, "order", order, least=1, most=MOST_POINTS))
-    start, end = mesh.points[chosen, None], mesh.points[mesh.after[chosen], None]
+
+    # Gauss points along the loaded elements.
+    first = np.flatnonzero(loaded)
+    second = mesh.after[first]
+    start = mesh.points[first, None]
+    end = mesh.points[second, None]
     places = (start + x[:, None] * (end - start)).reshape(-1, 2)
-    normals = np.repeat(mesh.normals[chosen], order, axis=0)
-    weight = mesh.lengths[chosen, None] * w
+    normals = np.repeat(mesh.normals[first], order, axis=0)
+    weight = mesh.lengths[first, None] * w
+
     forces = np.zeros((steps, 2, len(mesh)))
     for k in range(steps):
-        at_times = [
-            array(
-                owner,
-                f"the traction at t = {t:.6g} s",
-                traction(places, normals, t),
-                places.shape,
-                unit="Pa",
-            )
-            for t in (k + x) * dt
-        ]
-        loads = (
-            np.tensordot(w, np.stack(at_times), 1).reshape(len(chosen), order, 2)
-            * weight[:, :, None]
-        )
-        for nodes, shape in ((chosen, 1.0 - x), (mesh.after[chosen], x)):
-            forces[k][:, nodes] += np.einsum("eqc,q->ce", loads, shape)
+        # Mean over the step, then the integral with the shape functions of both ends.
+        tractions = []
+        for t in (k + x) * dt:
+            name = f"the traction at t = {t:.6g} s"
+            values = traction(places, normals, t)
+            tractions.append(array(owner, name, values, places.shape, unit="Pa"))
+        mean = np.tensordot(w, np.stack(tractions), 1).reshape(len(first), order, 2)
+        loads = mean * weight[:, :, None]
+        forces[k][:, first] += np.einsum("eqc,q->ce", loads, 1.0 - x)
+        forces[k][:, second] += np.einsum("eqc,q->ce", loads, x)
     return forces

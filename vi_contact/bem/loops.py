@@ -1,7 +1,4 @@
-"""Check closed loops of segments.
-
-They are checked for which way round they run, what they enclose and whether they cross.
-"""
+"""Check closed loops of segments: which way round they run, what they enclose, where they cross."""
 
 import numpy as np
 
@@ -20,9 +17,10 @@ def signed_area(points: Array) -> float:
 
 def inside(point: Array, loop: Array) -> bool:
     """Tell whether the point lies inside the loop, by counting crossings of a ray."""
-    a, b = loop, np.roll(loop, -1, axis=0)
-    spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    a, b = a[spans], b[spans]
+    after = np.roll(loop, -1, axis=0)
+    spans = (loop[:, 1] > point[1]) != (after[:, 1] > point[1])
+    a = loop[spans]
+    b = after[spans]
     crossing = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
     return bool(np.count_nonzero(crossing > point[0]) % 2)
 
@@ -32,16 +30,19 @@ def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
 
     Outer loops do, holes do not; the reverse holds if exterior.
     """
-    depths = [sum(inside(loop[0], other) for other in loops if other is not loop) for loop in loops]
-    return [(depth % 2 == 0) != exterior for depth in depths]
+    forward = []
+    for loop in loops:
+        around = [other for other in loops if other is not loop and inside(loop[0], other)]
+        is_outer = len(around) % 2 == 0
+        forward.append(is_outer != exterior)
+    return forward
 
 
 def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) -> None:
     """Raise InputError when a loop does not keep the body on its left."""
     loops = np.split(points, np.cumsum(sizes)[:-1])
-    for i, (loop, forward) in enumerate(
-        zip(loops, should_run_forward(loops, exterior=exterior), strict=True)
-    ):
+    ways = should_run_forward(loops, exterior=exterior)
+    for i, (loop, forward) in enumerate(zip(loops, ways, strict=True)):
         if (signed_area(loop) > 0.0) != forward:
             raise InputError(
                 f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the "
@@ -57,7 +58,8 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
     for i, loop in enumerate(np.split(points, np.cumsum(sizes)[:-1])):
         with np.errstate(all="ignore"):
             extent = np.ptp(loop, axis=0)
-            smallest, largest = extent.min() ** 2, extent @ extent
+            smallest = extent.min() ** 2
+            largest = extent @ extent
         if not (smallest > 0.0 and np.isfinite(largest)):
             raise InputError(
                 f"BoundaryMesh: loop {i} is {extent[0]:.3g} m wide and {extent[1]:.3g} m high, "
@@ -67,13 +69,15 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
 
 
 def check_simple(points: Array, after: Indices) -> None:
-    """Raise InputError when two elements cross.
+    """Raise InputError when two elements cross, or a node lies on an element of other nodes."""
+    a = points
+    b = points[after]
+    index = np.arange(len(points))
 
-    It does so too when a node lies on an element of which it is no end.
-    """
-    a, b, index = points, points[after], np.arange(len(points))
+    # Nodes on elements: every node with every element but the two that it is an end of.
     distance = distances(points[:, None], a, b)
-    distance[index, index] = distance[after, index] = np.inf
+    distance[index, index] = np.inf
+    distance[after, index] = np.inf
     node, element = np.unravel_index(int(distance.argmin()), distance.shape)
     if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
         raise InputError(
@@ -82,9 +86,12 @@ def check_simple(points: Array, after: Indices) -> None:
         )
 
     def side(p: Array, q: Array, x: Array) -> Array:
-        along, away = (q - p)[:, None], x - p[:, None]
+        """Return on which side of each segment (p, q) each point x is: the sign of a product."""
+        along = (q - p)[:, None]
+        away = x - p[:, None]
         return np.asarray(along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0])
 
+    # Two elements cross where each one splits the ends of the other.
     splits = side(a, b, a) * side(a, b, b) < 0.0
     neighbours = (
         (after[:, None] == index)
@@ -101,10 +108,14 @@ def check_simple(points: Array, after: Indices) -> None:
 
 
 def distances(x: Array, start: Array, end: Array) -> Array:
-    """Return the distances (...) of points x (..., 2) from segments from start to end.
+    """Return the distances (...) of points from segments [m].
 
-    Their shapes have to fit.
+    Args:
+        x: (..., 2), points.
+        start: (..., 2), where the segments begin, of a shape that fits.
+        end: (..., 2), where they end.
     """
     along = end - start
     share = np.clip(((x - start) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
-    return np.hypot(*np.moveaxis(x - start - share[..., None] * along, -1, 0))
+    away = x - start - share[..., None] * along
+    return np.hypot(*np.moveaxis(away, -1, 0))

@@ -2,9 +2,11 @@
 
 With it come boundary value problems, and what contact needs of them.
 
-S maps the history of boundary displacements to nodal forces. Symmetric form S = (K' + 1/2) V⁻¹ (K +
-1/2) - D (default: its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2)
-(positivity not guaranteed).
+S maps the history of boundary displacements to nodal forces. It has two forms:
+
+    S = (K' + 1/2) V⁻¹ (K + 1/2) - D    symmetric, the default: its space-time matrix is positive
+                                        definite
+    S = V⁻¹ (K + 1/2)                   unsymmetric: nothing guarantees that it is
 """
 
 from dataclasses import dataclass
@@ -30,8 +32,8 @@ from ..core.quantities import Positive, Unit
 from ..solvers.normal.lcp import EPS
 from .boundary_mesh import BoundaryMesh
 from .compressed import CompressedBlocks
-from .energetic import EnergeticBlocks, marched, summed
-from .frequency_circle import on_circle
+from .energetic import EnergeticBlocks, march_blocks, sum_products
+from .frequency_circle import solve_on_circle
 
 GROWN = 1e-3  # of the motion: what rounding errors may grow to
 # of the largest force: what motions of the unsymmetric form may miss in the equation that they do
@@ -59,21 +61,41 @@ class BodyOperator(Protocol):
     def motion(
         self, forces: Array, fixed: Mask, prescribed: Array | None
     ) -> tuple[Array, Array, Array]:
-        """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n).
+        """Return the motion of the body under forces and prescribed displacements.
 
-        Reactions are included. They are those under forces (steps, pieces of a step, 2n) and
-        prescribed displacements (steps, 2n) of fixed unknowns (2n,).
+        Args:
+            forces: (steps, pieces of a step, 2n), nodal forces [N/m].
+            fixed: (2n,), which unknowns are prescribed.
+            prescribed: (steps, 2n), their displacements [m] at the ends of the steps; None for
+                zero.
+
+        Returns:
+            Displacements (steps, 2n) [m], tractions (steps, 4n) [Pa] and nodal forces (steps, 2n)
+            [N/m], reactions included.
         """
 
     def condense(
         self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
     ) -> tuple[Array, Array]:
-        """Return W and u_free of CondensedCompliance for these unknowns."""
+        """Return W and u_free of ``CondensedCompliance`` for some unknowns.
+
+        Args:
+            forces: (steps, pieces of a step, 2n), nodal forces of the loads [N/m].
+            fixed: (2n,), which unknowns are prescribed.
+            prescribed: (steps, 2n), their displacements [m]; None for zero.
+            unknowns: numbers of the unknowns that may come into contact.
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class PoincareSteklov:
-    """Hold S of a body of density rho, from blocks of density 1."""
+    """Hold S of a body of density rho, from blocks of density 1.
+
+    Attributes:
+        blocks: what ``energetic_blocks`` returns.
+        rho: density of the body [kg/m³].
+        symmetric: which of the two forms of S is used.
+    """
 
     blocks: EnergeticBlocks | CompressedBlocks
     rho: Annotated[float, Positive, Unit("kg/m³"), "the mass density rho"]
@@ -106,27 +128,45 @@ class PoincareSteklov:
     def motion(
         self, forces: Array, fixed: Mask, prescribed: Array | None
     ) -> tuple[Array, Array, Array]:
-        """Return the motion by one march, or on a circle of frequencies; forces: (steps, 1, 2n)."""
+        """Return the motion by one march, or on a circle of frequencies.
+
+        Args:
+            forces: (steps, 1, 2n), nodal forces [N/m], means over the steps.
+            fixed: (2n,), which unknowns are prescribed.
+            prescribed: (steps, 2n), their displacements [m] at the ends of the steps; None for
+                zero.
+
+        Returns:
+            Displacements (steps, 2n) [m], tractions (steps, 4n) [Pa] and nodal forces (steps, 2n)
+            [N/m], reactions included.
+
+        Raises:
+            StepFailure: a motion of the unsymmetric form that misses the equation that it does not
+                use.
+        """
+        pulls = forces[:, 0] / self.rho
         if isinstance(self.blocks, CompressedBlocks):
-            pulls, nothing = forces[:, 0] / self.rho, np.arange(0)
-            u, p, total = on_circle(self.blocks, fixed, pulls, prescribed, nothing, self.symmetric)[
-                1:
-            ]
+            no_units = np.arange(0)
+            _, u, p, total = solve_on_circle(
+                self.blocks, fixed, pulls, prescribed, no_units, symmetric=self.symmetric
+            )
         else:
-            given = None if prescribed is None else prescribed[:, :, None]
-            found = marched(
+            columns = march_blocks(
                 self.blocks,
                 fixed,
-                forces.swapaxes(1, 2) / self.rho,
-                given,
+                pulls[:, :, None],
+                None if prescribed is None else prescribed[:, :, None],
                 symmetric=self.symmetric,
             )
-            u, p, total = (values[:, :, 0] for values in found)
-        missed = (
-            0.0
-            if self.symmetric
-            else max_abs(self._other_equation(u, p) - total[-1]) / (max_abs(total) or 1.0)
-        )
+            u, p, total = (values[:, :, 0] for values in columns)
+        if not self.symmetric:
+            self._refuse_missed(u, p, total)
+        return u, self.rho * p, self.rho * total
+
+    def _refuse_missed(self, u: Array, p: Array, total: Array) -> None:
+        """Raise StepFailure where a motion misses the equation that its form does not use."""
+        error = max_abs(self._other_equation(u, p) - total[-1])
+        missed = error / (max_abs(total) or 1.0)
         if not missed <= MISSED:
             raise StepFailure(
                 f"boundary elements: after {len(u)} steps the motion of the unsymmetric form "
@@ -134,53 +174,67 @@ class PoincareSteklov:
                 f"{MISSED:g} is the limit; take the symmetric form, fewer steps, another time "
                 "step, or a finer mesh"
             )
-        return u, self.rho * p, self.rho * total
 
     def _other_equation(self, u: Array, p: Array) -> Array:
-        """Return (2n,) Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l.
+        """Return Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l (2n,) of the last step.
 
-        It is that of the last step; in the symmetric form, these are forces.
+        In the symmetric form, these are the forces of that step. K' p is summed as Kᵀ times the
+        jumps of p.
         """
-        changes, jumps = (np.diff(values, axis=0, prepend=0.0) for values in (u, p))
+        changes = np.diff(u, axis=0, prepend=0.0)
+        jumps = np.diff(p, axis=0, prepend=0.0)
         half = 0.5 * self.mesh.mass.T
         if isinstance(self.blocks, CompressedBlocks):
-            adjoint, hyper = self.blocks.applied(p[::-1], changes[::-1], jumps[::-1])[2:]
+            _, _, adjoint, hyper = self.blocks.applied(p[::-1], changes[::-1], jumps[::-1])
             return np.asarray(half @ p[-1] + adjoint - hyper)
-        double, hyper = (
-            blocks[len(u) - 1 :: -1] for blocks in (self.blocks.double, self.blocks.hyper)
-        )
-        past = summed(double.swapaxes(1, 2), jumps[..., None]) - summed(hyper, changes[..., None])
-        return half @ p[-1] + past[:, 0]
+        latest_first = slice(len(u) - 1, None, -1)
+        adjoint = sum_products(self.blocks.double[latest_first].swapaxes(1, 2), jumps[..., None])
+        hyper = sum_products(self.blocks.hyper[latest_first], changes[..., None])
+        return half @ p[-1] + (adjoint - hyper)[:, 0]
 
     def condense(
         self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
     ) -> tuple[Array, Array]:
-        """Return W and u_free of CondensedCompliance for these unknowns.
+        """Return W and u_free of ``CondensedCompliance`` for some unknowns.
 
-        They come from one march with 2m + 1 columns, or so.
+        Args:
+            forces: (steps, 1, 2n), nodal forces of the loads [N/m].
+            fixed: (2n,), which unknowns are prescribed.
+            prescribed: (steps, 2n), their displacements [m]; None for zero.
+            unknowns: numbers of the unknowns that may come into contact.
+
+        Returns:
+            W (steps, 2m, 2m) [m²/N] and u_free (steps, 2m) [m].
+
+        Raises:
+            StepFailure: rounding errors that grow too far in the unsymmetric form.
         """
+        pulls = forces[:, 0] / self.rho
         if isinstance(self.blocks, CompressedBlocks):
-            W, moved, *_ = on_circle(
-                self.blocks, fixed, forces[:, 0] / self.rho, prescribed, unknowns, self.symmetric
+            W, moved, *_ = solve_on_circle(
+                self.blocks, fixed, pulls, prescribed, unknowns, symmetric=self.symmetric
             )
             return W / self.rho, moved[:, unknowns]
+
+        # One march: a column for each unit force in step 0, and a last one for the loads.
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
         columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho
-        columns[:, :, -1] = forces[:, 0] / self.rho
-        given = (
-            None
-            if prescribed is None
-            else np.concatenate([0.0 * columns[..., :-1], prescribed[..., None]], axis=2)
-        )
-        u = marched(self.blocks, fixed, columns, given, symmetric=self.symmetric)[0][:, unknowns]
-        _refuse_growth(u[..., : 0 if self.symmetric else -1])
-        return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
+        columns[:, :, -1] = pulls
+        given = None
+        if prescribed is not None:
+            given = np.zeros_like(columns)
+            given[:, :, -1] = prescribed
+        u, _, _ = march_blocks(self.blocks, fixed, columns, given, symmetric=self.symmetric)
+        after_units = u[:, unknowns, :-1]
+        if not self.symmetric:
+            _refuse_growth(after_units)
+        return np.ascontiguousarray(after_units), np.ascontiguousarray(u[:, unknowns, -1])
 
 
 def _refuse_growth(moved: Array) -> None:
     """Raise StepFailure where motions (steps, n, r) after unit forces in step 0 grow too far.
 
-    They do where rounding shows.
+    Rounding errors of the first step grow with them, until they show.
     """
     size = np.abs(moved).max(axis=(1, 2), initial=0.0)
     if not size.max() * EPS <= GROWN * size[0]:
@@ -196,9 +250,11 @@ def _refuse_growth(moved: Array) -> None:
 class BoundaryMotion:
     """Hold the answer of a boundary value problem.
 
-    times: (steps,) ends of the steps [s]; displacement: (steps, 2, n) there [m]; traction: (steps,
-    2, n, 2) in each step [Pa], at both ends of each element; forces: (steps, 2, n) nodal forces
-    [N/m], reactions included.
+    Attributes:
+        times: (steps,) ends of the steps [s].
+        displacement: (steps, 2, n) of the nodes at these times [m].
+        traction: (steps, 2, n, 2) in each step, at both ends of each element [Pa].
+        forces: (steps, 2, n) nodal forces in each step, reactions included [N/m].
     """
 
     times: Array
@@ -208,32 +264,42 @@ class BoundaryMotion:
 
     @property
     def work(self) -> Array:
-        """Return (steps,) work of all forces up to each time [J/m].
+        """Return the work (steps,) of all forces up to each time [J/m].
 
-        It is the energy of the body (symmetric form: >= 0).
+        It is the energy of the body, which is never negative in the symmetric form.
         """
         return work(self.forces, self.displacement)
 
 
 def work(forces: Array, displacement: Array) -> Array:
-    """Return (steps,) work up to each time of forces during the steps.
+    """Return the work (steps,) up to each time of forces in the steps.
 
-    Displacements are those at the ends of the steps; the work is 0 at t_0.
+    Both arrays have the steps first. Displacements are those at the ends of the steps, and zero at
+    t_0.
     """
     terms = forces * np.diff(displacement, axis=0, prepend=0.0)
-    return np.cumsum(terms.sum(axis=tuple(range(1, terms.ndim))))
+    all_but_steps = tuple(range(1, terms.ndim))
+    return np.cumsum(terms.sum(axis=all_but_steps))
 
 
 @dataclass(frozen=True)
 class CondensedCompliance:
     """Hold u_c at t_(k+1) = sum_(l<=k) W[k-l] lam[l] + u_free[k], all that contact needs to know.
 
-    W: (steps, 2m, 2m) [m²/N], displacement of the contact unknowns (x of all nodes, then y) at the
-    end of step j after a unit nodal force [N/m] during step 0; u_free: (steps, 2m) [m] without
-    contact forces; nodes: (m,) numbers in the mesh; points, normals: (m, 2) places [m] and outward
-    unit normals; lengths: (m,) [m] of contact boundary that belongs to a node, traction = force /
-    length; dt [s]; turns: (m,) angle [rad] by which the contact boundary turns at a node, None
-    where nobody knows. Rows and columns of supported unknowns are zero.
+    The contact unknowns are x of all m contact nodes, then y. Rows and columns of supported
+    unknowns are zero.
+
+    Attributes:
+        W: (steps, 2m, 2m) displacements at the end of step j after a unit nodal force [N/m] during
+            step 0 [m²/N].
+        u_free: (steps, 2m) displacements without contact forces [m].
+        nodes: (m,) numbers of the contact nodes in the mesh.
+        points: (m, 2) their places [m].
+        normals: (m, 2) their outward unit normals.
+        lengths: (m,) of contact boundary that belongs to a node [m]; traction = force / length.
+        dt: time step [s].
+        turns: (m,) angle by which the contact boundary turns at a node [rad]; None where it is not
+            known.
     """
 
     W: Array
@@ -251,30 +317,37 @@ class CondensedCompliance:
         steps = len(array(owner, "W", self.W, (None, 2 * m, 2 * m), unit="m²/N"))
         if not steps:
             raise InputError(f"{owner}: W has no step; give one or more")
-        for name, shape in (
-            ("u_free", (steps, 2 * m)),
-            ("points", (m, 2)),
-            ("normals", (m, 2)),
-            ("lengths", (m,)),
-        ):
-            array(owner, name, getattr(self, name), shape)
+        array(owner, "u_free", self.u_free, (steps, 2 * m))
+        array(owner, "points", self.points, (m, 2))
+        array(owner, "normals", self.normals, (m, 2))
+        array(owner, "lengths", self.lengths, (m,))
         check_fields(self)
 
     def displacement(self, forces: Array) -> Array:
         """Return (steps, 2m) displacements under nodal contact forces (steps, 2m)."""
-        past = [summed(self.W[k::-1], forces[: k + 1, :, None])[:, 0] for k in range(len(forces))]
-        return self.u_free[: len(forces)] + np.array(past)
+        moved = []
+        for k in range(len(forces)):
+            moved.append(sum_products(self.W[k::-1], forces[: k + 1, :, None])[:, 0])
+        return self.u_free[: len(forces)] + np.array(moved)
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryProblem:
     """Describe a body with supports, loads and a boundary that may come into contact.
 
-    operator: its S, such as PoincareSteklov; forces: (steps, 2, n) nodal forces of the loads [N/m]
-    (loads.py), means over the steps, or of the shape that the operator asks for (``load_shape``);
-    fixed: (2, n) supported unknowns; prescribed: (steps, 2, n) their displacement [m] at the ends
-    of the steps, zero if None; contact: (n,) mask of the elements of the contact boundary.
-    Everything else is free of traction. Raises InputError for wrong shapes and what is no mask.
+    What is neither loaded nor supported nor in contact is free of traction.
+
+    Attributes:
+        operator: S of the body, such as PoincareSteklov.
+        forces: (steps, 2, n) nodal forces of the loads (loads.py), means over the steps [N/m]; or
+            of the shape that the operator asks for (``load_shape``).
+        fixed: (2, n) whether an unknown is supported; None for no support.
+        prescribed: (steps, 2, n) displacements of the supported unknowns at the ends of the steps
+            [m]; None for zero.
+        contact: (n,) whether an element is part of the contact boundary; None for no contact.
+
+    Raises:
+        InputError: wrong shapes, and masks that are none.
     """
 
     operator: BodyOperator
@@ -284,14 +357,17 @@ class BoundaryProblem:
     contact: Mask | None = None
 
     def __post_init__(self) -> None:
-        owner, names = "BoundaryProblem", ("load_shape", "motion", "condense")
+        owner = "BoundaryProblem"
+        names = ("load_shape", "motion", "condense")
         provides(owner, "operator", self.operator, names, "give PoincareSteklov(…)")
-        n, wanted = len(self.operator.mesh), self.operator.load_shape(len(shape_of(self.forces)))
-        object.__setattr__(self, "forces", array(owner, "forces", self.forces, wanted, unit="N/m"))
+        n = len(self.operator.mesh)
+        load_shape = self.operator.load_shape(len(shape_of(self.forces)))
+        forces = array(owner, "forces", self.forces, load_shape, unit="N/m")
+        object.__setattr__(self, "forces", forces)
         if not len(self.forces):
             raise InputError(f"{owner}: forces is empty; give the forces of one step or more")
-        for name, shape in (("fixed", (2, n)), ("contact", (n,))):
-            optional(mask, owner, name, getattr(self, name), shape)
+        optional(mask, owner, "fixed", self.fixed, (2, n))
+        optional(mask, owner, "contact", self.contact, (n,))
         optional(array, owner, "prescribed", self.prescribed, (len(self.forces), 2, n), unit="m")
 
     @property
@@ -309,11 +385,13 @@ class BoundaryProblem:
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
     def _given(self, contact_forces: ArrayLike | None = None) -> tuple[Array, Mask, Array | None]:
-        """Return nodal forces (steps, pieces of a step, 2n).
+        """Return what the operator asks for: forces, fixed unknowns (2n,), their motion.
 
-        Those of contact are added. With them come the fixed unknowns and their motion.
+        The forces (steps, pieces of a step, 2n) are those of the loads and of contact; the motion
+        is (steps, 2n) or None.
         """
-        steps, n = len(self.forces), len(self.operator.mesh)
+        steps = len(self.forces)
+        n = len(self.operator.mesh)
         forces = np.array(self.forces, float).reshape(steps, -1, 2, n)
         if contact_forces is not None:
             shape = (steps, 2 * len(self.contact_nodes))
@@ -322,41 +400,39 @@ class BoundaryProblem:
             )
             forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
         fixed = np.zeros((2, n), bool) if self.fixed is None else np.asarray(self.fixed, bool)
-        prescribed = (
-            None
-            if self.prescribed is None
-            else np.asarray(self.prescribed, float).reshape(steps, -1)
-        )
+        prescribed = None
+        if self.prescribed is not None:
+            prescribed = np.asarray(self.prescribed, float).reshape(steps, -1)
         return forces.reshape(steps, -1, 2 * n), fixed.ravel(), prescribed
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
-        """Return the motion under loads and nodal contact forces (steps, 2m).
+        """Return the motion under loads and nodal contact forces (steps, 2m) [N/m].
 
-        These are ordered as in CondensedCompliance.
+        The contact forces are ordered as in CondensedCompliance; None is for no contact.
         """
         u, p, forces = self.operator.motion(*self._given(contact_forces))
         n = len(self.operator.mesh)
         return BoundaryMotion(
-            self.times, u.reshape(-1, 2, n), p.reshape(-1, 2, n, 2), forces.reshape(-1, 2, n)
+            times=self.times,
+            displacement=u.reshape(-1, 2, n),
+            traction=p.reshape(-1, 2, n, 2),
+            forces=forces.reshape(-1, 2, n),
         )
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact unknowns and their motion without contact."""
-        mesh, nodes, elements = (
-            self.operator.mesh,
-            self.contact_nodes,
-            np.asarray(self.contact, bool),
-        )
-        W, u_free = self.operator.condense(
-            *self._given(), np.concatenate([nodes, nodes + len(mesh)])
-        )
+        mesh = self.operator.mesh
+        nodes = self.contact_nodes
+        elements = np.asarray(self.contact, bool)
+        unknowns = np.concatenate([nodes, nodes + len(mesh)])
+        W, u_free = self.operator.condense(*self._given(), unknowns)
         return CondensedCompliance(
-            W,
-            u_free,
-            nodes,
-            mesh.points[nodes],
-            mesh.node_normals(elements)[nodes],
-            mesh.node_lengths(elements)[nodes],
-            self.operator.dt,
-            mesh.node_turns(elements)[nodes],
+            W=W,
+            u_free=u_free,
+            nodes=nodes,
+            points=mesh.points[nodes],
+            normals=mesh.node_normals(elements)[nodes],
+            lengths=mesh.node_lengths(elements)[nodes],
+            dt=self.operator.dt,
+            turns=mesh.node_turns(elements)[nodes],
         )

@@ -1,6 +1,4 @@
-"""Interpolate in time what is left behind the last wave from a few steps.
-
-It comes with a bound of the error.
+"""Interpolate what is left behind the last wave from a few steps, with a bound of the error.
 
 Entries of a block are integrals of radial functions f_j(r) over distances r, and behind the last
 wave the points of these integrals do not move: what interpolates all f_j(r), 0 < r <= r_max, from
@@ -21,55 +19,96 @@ from .fundamental_solution import TimeKernels
 
 SHARE = 5e-10  # of its greatest value behind the last wave: what may be lost of a radial function
 SAMPLES = 16  # distances at which functions are compared
-DEGREES = (0, 0, 1, 0, 0, 1, 1, 2, 1, 1, 2, 2, 0, 0)  # of homogeneity in (r, t), gradients times r
+# The radial functions, in the order of KernelSet: 2 of the single layer, 5 of the double layer, 7
+# of the hypersingular operator. Their degrees of homogeneity in (r, t), gradients times r:
+DEGREES = (0, 0, 1, 0, 0, 1, 1, 2, 1, 1, 2, 2, 0, 0)
+GRADIENTS = [3, 4, 8, 9]
 
 
 def tail(
     start: int, steps: int, dt: float, speeds: tuple[float, float], h: float
 ) -> tuple[Indices, Array, Array]:
-    """Return the kept steps (q,) of the tail from `start` to `steps`.
+    """Choose the steps of the tail that are kept.
 
-    With them come weights (length, q) that give all its steps, and bounds (3,) of the errors of
-    entries of V, K and D; ``speeds`` are (c_P, c_S) [m/s], ``h`` is the longest element [m].
+    Args:
+        start: first step of the tail.
+        steps: the step behind the last one.
+        dt: time step [s].
+        speeds: (c_P, c_S) [m/s].
+        h: length of the longest element [m].
+
+    Returns:
+        The kept steps (q,), the weights (length, q) that give all steps of the tail from them, and
+        bounds (3,) of the errors of entries of V, K and D.
     """
     if start >= steps:
         return np.empty(0, int), np.empty((0, 0)), np.zeros(3)
     reach = (start - 1) * dt * speeds[1] - h
-    places = (
-        np.sin(0.5 * np.pi * (np.arange(count) + 0.5) / count) ** 2
-        for count in (SAMPLES, 3 * SAMPLES + 1)
-    )
-    table, check = (_table(reach * place, start, steps, dt, speeds) for place in places)
+    table = _radial_functions(reach * _places(SAMPLES), start, steps, dt, speeds)
+
+    # Interpolative decomposition: a QR factorisation with pivots of the table, each function over
+    # its greatest value, puts the steps that tell most in front. R gives the others by them.
     flat = (table / np.abs(table).max((0, 2))[:, None]).reshape(len(table), -1)
     r, order = qr(flat.T, mode="r", pivoting=True, check_finite=False)
     rank = int(np.count_nonzero(np.abs(np.diag(r)) > SHARE * np.abs(r[0, 0])))
-    weights = np.concatenate([np.eye(rank), solve_triangular(r[:rank, :rank], r[:rank, rank:]).T])[
-        np.argsort(order)
-    ]
+    others = solve_triangular(r[:rank, :rank], r[:rank, rank:]).T
+    weights = np.concatenate([np.eye(rank), others])[np.argsort(order)]
     weights += (1.0 - weights.sum(1))[:, None] / rank
-    lost = np.abs(check - np.tensordot(weights, check[order[:rank]], 1)).max((0, 2))
-    mu = speeds[1] ** 2  # from here on: errors of entries, gradients being times r
-    phi, gradient, tensor = (
-        lost[[2, 7]],
-        lost[[3, 8]] + lost[[4, 9]],
-        lost[[0, 5, 10]] + lost[[1, 6, 11]],
-    )
-    double = 0.25 * h**2 * gradient[0] + 0.5 * h * (phi[0] + 2.0 * mu * tensor[1])
-    hyper = 0.25 * h**2 * (lost[12] + lost[13]) + 4.0 * mu * (phi[1] + mu * tensor[2])
-    bounds = [0.25 * h**2 * tensor[0], 2.0 * double, 4.0 * (hyper + 2.0 * mu * h * gradient[1])]
-    return start + order[:rank], weights, np.array(bounds)
+    kept = order[:rank]
+
+    # What is lost is measured at other places than the samples.
+    check = _radial_functions(reach * _places(3 * SAMPLES + 1), start, steps, dt, speeds)
+    lost = np.abs(check - np.tensordot(weights, check[kept], 1)).max((0, 2))
+    return start + kept, weights, _bounds(lost, speeds[1] ** 2, h)
 
 
-def _table(r: Array, start: int, steps: int, dt: float, speeds: tuple[float, float]) -> Array:
-    """Return (steps, 14, points) the radial functions of the blocks.
+def _places(count: int) -> Array:
+    """Return Chebyshev's places (count,) in [0, 1]."""
+    return np.sin(0.5 * np.pi * (np.arange(count) + 0.5) / count) ** 2
 
-    They come from functions that are homogeneous in r and t.
+
+def _bounds(lost: Array, mu: float, h: float) -> Array:
+    """Return the bounds (3,) of the errors of entries of V, K and D.
+
+    An entry is an integral over two elements of at most the length h, whose shape functions are at
+    most 1 and whose slopes are at most 1/h.
+
+    Args:
+        lost: (14,), errors of the radial functions, gradients times r.
+        mu: c_S² [m²/s²].
+        h: length of the longest element [m].
+    """
+    # Of the operators that have them: Phi_S, both gradients together, both parts of the tensor G.
+    phi_double, phi_hyper = lost[[2, 7]]
+    gradient_double, gradient_hyper = lost[[3, 8]] + lost[[4, 9]]
+    tensor_single, tensor_double, tensor_hyper = lost[[0, 5, 10]] + lost[[1, 6, 11]]
+    inertia = lost[12] + lost[13]
+
+    double = 0.25 * h**2 * gradient_double + 0.5 * h * (phi_double + 2.0 * mu * tensor_double)
+    hyper = 0.25 * h**2 * inertia + 4.0 * mu * (phi_hyper + mu * tensor_hyper)
+    bounds = [
+        0.25 * h**2 * tensor_single,
+        2.0 * double,
+        4.0 * (hyper + 2.0 * mu * h * gradient_hyper),
+    ]
+    return np.array(bounds)
+
+
+def _radial_functions(
+    r: Array, start: int, steps: int, dt: float, speeds: tuple[float, float]
+) -> Array:
+    """Return the radial functions of the blocks (steps, 14, points) at distances r (points,) [m].
+
+    The kernels are homogeneous in r and t: those at t = 1 and r/t give all others.
     """
     t = dt * np.arange(start - 1, steps + 1)[:, None]
     q = r / t
     kernels = TimeKernels(1.0, *speeds)(q)
     values = np.stack([*kernels.single, *kernels.double, *kernels.hyper], 1)
-    values[:, [3, 4, 8, 9]] *= q[:, None]
+    values[:, GRADIENTS] *= q[:, None]
     values *= t[:, :, None] ** np.array(DEGREES)[:, None]
-    rates, second = np.diff(values, axis=0)[1:], np.diff(values[:, 7:], 2, axis=0)
-    return np.concatenate([rates[:, :2], rates[:, 2:7] / dt, second / dt**2], axis=1)
+
+    # Blocks are differences in time: the first of V and K, the second of D.
+    first = np.diff(values, axis=0)[1:]
+    second = np.diff(values[:, 7:], 2, axis=0)
+    return np.concatenate([first[:, :2], first[:, 2:7] / dt, second / dt**2], axis=1)

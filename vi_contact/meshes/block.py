@@ -1,6 +1,4 @@
-"""Mesh a bar, rectangle or box.
-
-It is evenly divided and, if wanted, bent by a smooth map and turned; it is the body of most tests.
+"""Mesh a bar, rectangle or box, evenly divided, bent by a smooth map and turned as wanted.
 
 Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y),
 "back", "front" (z, front towards the viewer). A bar has the first two, a rectangle four, a box
@@ -27,9 +25,18 @@ SIDES = (("left", "right"), ("bottom", "top"), ("back", "front"))
 class BlockMesh:
     """Describe a mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
-    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle`
-    [rad] about the origin (the z axis in space). `deform` takes and returns points (n, d) [m].
-    InputError if the sizes make no box.
+    A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned.
+
+    Attributes:
+        lengths: (d,) of the sides [m].
+        divisions: (d,) number of cells along each side.
+        simplices: whether rectangles and boxes are split along a diagonal.
+        corner: (d,) where the lowest corner is [m]; None for the origin.
+        deform: function of points (n, d) that returns points (n, d) [m]; None for no change.
+        angle: of a turn about the origin, or about the z axis in space [rad].
+
+    Raises:
+        InputError: sizes that make no box.
     """
 
     lengths: Annotated[tuple[float, ...], Unit("m")] = (1.0, 1.0)
@@ -53,7 +60,7 @@ class BlockMesh:
             )
 
     def points(self) -> Array:
-        """Return all nodes, (n_1+1, ..., n_d+1, d) [m]."""
+        """Return all nodes (n_1+1, ..., n_d+1, d) [m]."""
         nodes = lattice(self.lengths, self.divisions)
         if self.corner is not None:
             nodes = nodes + np.asarray(self.corner)
@@ -67,10 +74,12 @@ class BlockMesh:
                 )
             nodes = moved.reshape(nodes.shape)
         if self.angle:
-            x, y, c, s = nodes[..., 0], nodes[..., 1], math.cos(self.angle), math.sin(self.angle)
-            nodes = np.concatenate(
-                [np.stack([c * x - s * y, s * x + c * y], axis=-1), nodes[..., 2:]], axis=-1
-            )
+            x = nodes[..., 0]
+            y = nodes[..., 1]
+            c = math.cos(self.angle)
+            s = math.sin(self.angle)
+            turned = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+            nodes = np.concatenate([turned, nodes[..., 2:]], axis=-1)
         return nodes
 
     def build(self, gmsh: Any) -> None:
@@ -83,10 +92,7 @@ class BlockMesh:
 
 
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
-    """Raise InputError unless there are 1 to 3 positive lengths [m].
-
-    Each needs a positive number of divisions.
-    """
+    """Raise InputError unless there are 1 to 3 positive lengths [m] and numbers of divisions."""
     if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
         raise InputError(
             f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of "

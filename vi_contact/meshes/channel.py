@@ -1,6 +1,6 @@
-"""Mesh a U-shaped channel in a soil layer on bedrock.
+"""Mesh a U-shaped channel in a soil layer on bedrock, Fig. 6 of the boundary method.
 
-It is that of Fig. 6 of the boundary method: two bodies with nodes of their own.
+The channel and the soil are two bodies with nodes of their own.
 
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x =
 0, width), "surface" (y = depth); the interface from both sides, "channel_left", "channel_base",
@@ -28,14 +28,25 @@ from vi_contact.meshes.rows import Mask, Rows
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelMesh:
-    """Describe a layer, width x depth, and a channel in it.
+    """Describe a soil layer and a channel in it.
 
-    The channel is `outer_width` x `height`, of `wall` and `slab`.
+    Every part is divided evenly into rectangles or their halves; with ``far`` the mesh has
+    irregular triangles.
 
-    `left` is x of the outer left side of the channel, which is in the middle by default. Every part
-    is divided evenly into rectangles of about `size`, or with `triangles` into their halves.
-    With `far` the mesh has irregular triangles, which grow from `size` at the channel to `far`
-    at bedrock and sides. Raises InputError for sizes that make no such layer.
+    Attributes:
+        width: of the layer [m].
+        depth: of the layer [m].
+        outer_width: of the channel, from outer side to outer side [m].
+        height: of the channel, which ends at the surface [m].
+        wall: thickness of its walls [m].
+        slab: thickness of its slab [m].
+        left: x of the outer left side of the channel [m]; None for a channel in the middle.
+        size: of the cells, or of those at the channel [m].
+        far: size of irregular triangles at bedrock and sides [m]; None for an even mesh.
+        triangles: whether rectangles are halved.
+
+    Raises:
+        InputError: sizes that make no such layer.
     """
 
     width: Annotated[float, Positive, Unit("m")] = 24.0
@@ -66,23 +77,16 @@ class ChannelMesh:
             raise InputError(
                 f"far is {self.far} m: give at least the cell size at the channel, {self.size} m"
             )
-        grid = self.width / self.size * (self.depth / self.size)
-        around = (self.outer_width + 2.0 * self.height) / self.size + self.width / (
-            self.far or self.size
-        )
-        cells = (
-            grid
-            if self.far is None
-            else max(around, self.width / self.far * (self.depth / self.far))
-        )
+        if self.far is None:
+            cells = self.width / self.size * (self.depth / self.size)
+        else:
+            around = (self.outer_width + 2.0 * self.height) / self.size + self.width / self.far
+            cells = max(around, self.width / self.far * (self.depth / self.far))
         counted("channel", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     @property
     def x(self) -> tuple[float, ...]:
-        """Return the ends of the layer, outer and inner sides of the walls.
-
-        They go from left to right [m].
-        """
+        """Return, from left to right, the ends of the layer and the sides of both walls [m]."""
         left = 0.5 * (self.width - self.outer_width) if self.left is None else self.left
         right = left + self.outer_width
         return 0.0, left, left + self.wall, right - self.wall, right, self.width
@@ -94,54 +98,72 @@ class ChannelMesh:
 
     def build(self, gmsh: Any) -> None:
         """Add both bodies to Gmsh's current model."""
-        x, y, size = self.x, self.y, self.size
+        x = self.x
+        y = self.y
+        size = self.size
         if self.far is None:
             add_arrays(gmsh, channel_grid(x, y, size, triangles=self.triangles))
             return
-        sides = ("left", "base", "right")
-        u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]  # what both bodies share
+        # The U that both bodies share, divided alike on both.
+        u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]
+        shared = [max(round(math.dist(start, end) / size), 1) for start, end in pairwise(u)]
+
         inside = [(x[3], y[3]), (x[3], y[2]), (x[2], y[2]), (x[2], y[3])]
         names = [
-            *(f"channel_{side}" for side in sides),
+            "channel_left",
+            "channel_base",
+            "channel_right",
             "channel_top",
-            *["channel_inside"] * 3,
+            "channel_inside",
+            "channel_inside",
+            "channel_inside",
             "channel_top",
         ]
-        # on both bodies
-        shared = [max(round(math.dist(one, two) / size), 1) for one, two in pairwise(u)]
         add_outline(gmsh.model, "channel", u + inside, names, [size] * 8, shared)
+
         layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
         names = [
-            *(f"soil_{side}" for side in sides),
+            "soil_left",
+            "soil_base",
+            "soil_right",
             "surface",
             "right_side",
             "bedrock",
             "left_side",
             "surface",
         ]
-        add_outline(gmsh.model, "soil", u + layer, names, [size] * 4 + [self.far] * 4, shared)
+        sizes = [size] * 4 + [self.far] * 4
+        add_outline(gmsh.model, "soil", u + layer, names, sizes, shared)
         gmsh.model.mesh.generate(2)
 
 
 def channel_grid(
     x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False
 ) -> MeshArrays:
-    """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh`.
-
-    The cells are of about `size` [m].
+    """Divide channel and soil into cells of about one size.
 
     Diagonals of triangles run upwards to the middle of the channel on both sides of it: symmetric
     layers stay so.
+
+    Args:
+        x: (6,), vertical lines of `ChannelMesh` [m].
+        y: (4,), horizontal lines of `ChannelMesh` [m].
+        size: of the cells [m].
+        triangles: whether rectangles are halved.
     """
-    xs, ys = _divided(x, size), _divided(y, size)
-    middle_x, middle_y = (0.5 * (line[1:] + line[:-1]) for line in (xs, ys))
+    # All boxes of one grid: those of the channel, those that are cut out inside it, the others.
+    xs = _divide(x, size)
+    ys = _divide(y, size)
+    middle_x = 0.5 * (xs[1:] + xs[:-1])
+    middle_y = 0.5 * (ys[1:] + ys[:-1])
     right, up = np.meshgrid(middle_x, middle_y, indexing="ij")
     notch = (x[1] < right) & (right < x[4]) & (up > y[1])
     inside = (x[2] < right) & (right < x[3]) & (up > y[2])
-    bodies = [
-        _body(xs, ys, kept, 0.5 * (x[1] + x[4]), triangles) for kept in (notch & ~inside, ~notch)
-    ]
-    (points, cells, corner), (soil_points, soil_cells, soil_corner) = bodies
+    middle = 0.5 * (x[1] + x[4])
+    points, cells, corner = _body(xs, ys, notch & ~inside, middle, triangles)
+    soil_points, soil_cells, soil_corner = _body(xs, ys, ~notch, middle, triangles)
+
+    # Boundary groups, as lines (x, y) of the grid.
     interface = {"left": [(x[1:2], y[1:])], "base": [(x[1:5], y[1:2])], "right": [(x[4:5], y[1:])]}
     channel_lines = {f"channel_{side}": line for side, line in interface.items()} | {
         "channel_top": [(x[1:3], y[3:]), (x[3:5], y[3:])],
@@ -154,11 +176,13 @@ def channel_grid(
         "surface": [(x[:2], y[3:]), (x[4:], y[3:])],
     }
     soil_corner = np.where(soil_corner < 0, -1, soil_corner + len(points))
-    facets = {
-        name: np.concatenate([_along(xs, ys, number, *line) for line in lines])
-        for number, table in ((corner, channel_lines), (soil_corner, soil_lines))
-        for name, lines in table.items()
-    }
+    facets = {}
+    for number, table in ((corner, channel_lines), (soil_corner, soil_lines)):
+        for name, lines in table.items():
+            on_lines = [_along(xs, ys, number, *line) for line in lines]
+            facets[name] = np.concatenate(on_lines)
+
+    # Both bodies in one mesh, the channel first.
     channel = np.arange(len(cells) + len(soil_cells)) < len(cells)
     cells = np.concatenate([cells, soil_cells + len(points)])
     return MeshArrays(
@@ -170,35 +194,43 @@ def channel_grid(
     )
 
 
-def _divided(places: Sequence[float], size: float) -> Array:
+def _divide(places: Sequence[float], size: float) -> Array:
     """Divide every part between two places evenly into cells of about `size`."""
-    parts = [
-        low + (high - low) * np.arange(n) / n
-        for low, high in pairwise(places)
-        for n in [max(round((high - low) / size), 1)]
-    ]
+    parts = []
+    for low, high in pairwise(places):
+        n = max(round((high - low) / size), 1)
+        parts.append(low + (high - low) * np.arange(n) / n)
     return np.append(np.concatenate(parts), places[-1])
 
 
 def _body(
-    xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool
+    xs: Array, ys: Array, chosen: Mask, middle: float, triangles: bool
 ) -> tuple[Array, Rows, Rows]:
-    """Return (points, cells, numbers of the points) of the kept boxes.
+    """Mesh the chosen boxes of a grid.
 
-    The numbers are those of the point at every node of the grid, -1 for none.
+    Args:
+        xs: (n + 1,), vertical lines of the grid [m].
+        ys: (m + 1,), horizontal lines of the grid [m].
+        chosen: (n, m), which boxes are part of the body.
+        middle: x on both sides of which diagonals rise to it [m].
+        triangles: whether boxes are halved.
+
+    Returns:
+        The points, the cells, and the number of the point at every node (n + 1, m + 1) of the grid,
+        -1 for none.
     """
-    column, row = np.nonzero(kept)
-    around = (
-        np.stack([column, column + 1, column + 1, column]),
-        np.stack([row, row, row + 1, row + 1]),
-    )
+    column, row = np.nonzero(chosen)
+    columns_around = np.stack([column, column + 1, column + 1, column])
+    rows_around = np.stack([row, row, row + 1, row + 1])
+    around = (columns_around, rows_around)
     used = np.zeros((len(xs), len(ys)), dtype=bool)
     used[around] = True
     number = np.where(used, np.cumsum(used).reshape(used.shape) - 1, -1)
     place = np.argwhere(used)
     boxes = number[around].T
     if triangles:
-        rising, falling = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]
+        rising = [[0, 1, 2], [0, 2, 3]]
+        falling = [[0, 1, 3], [1, 2, 3]]
         on_left = 0.5 * (xs[column] + xs[column + 1]) < middle
         boxes = np.where(on_left[:, None, None], boxes[:, rising], boxes[:, falling]).reshape(-1, 3)
     return (
@@ -209,12 +241,16 @@ def _body(
 
 
 def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
-    """Return the facets of a body on a straight line.
+    """Return the facets of a body on a straight line of the grid.
 
-    It goes from x[0] to x[-1] at one y, or from y[0] to y[-1] at one x.
+    Args:
+        xs: vertical lines of the grid [m].
+        ys: horizontal lines of the grid [m].
+        number: of the point at every node of the grid.
+        x: from x[0] to x[-1], or one x [m].
+        y: from y[0] to y[-1], or one y [m].
     """
-    i, j = (
-        np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y))
-    )
+    i = np.flatnonzero((xs >= x[0]) & (xs <= x[-1]))
+    j = np.flatnonzero((ys >= y[0]) & (ys <= y[-1]))
     nodes = number[np.ix_(i, j)].reshape(-1)
     return np.column_stack([nodes[:-1], nodes[1:]])

@@ -20,6 +20,12 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     """Raise InputError for cells of no volume and for twisted ones.
 
     A twisted cell has det J of both signs at the corners.
+
+    Args:
+        points: (n_points, d) [m].
+        cells: (n_cells, n_vertices), rows of points.
+        cell: name of the kind of cells.
+        source: name of the mesh in messages.
     """
     corners = np.array(CORNERS[cell])
     x = points[cells[:, corners]]  # (n_cells, n_corners, 1 + d, d)
@@ -36,15 +42,23 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
 
 
 def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
-    """Raise InputError where three cells share a facet or two lie on one side of it.
+    """Raise InputError where three cells share a facet, or two of them lie on one side of it.
 
-    Such two are neighbours.
+    Args:
+        points: (n_points, d) [m].
+        cells: (n_cells, n_vertices), rows of points.
+        cell: name of the kind of cells.
+        source: name of the mesh in messages.
     """
     sides, owner = cell_sides(cells, cell)
     (number,) = number_alike(sides)
     x = points[sides[:, : points.shape[1]]]
-    height = ((points[cells].mean(axis=1)[owner] - x[:, 0]) * _normals(x)).sum(axis=1)
-    count, balance = np.bincount(number), np.bincount(number, weights=np.sign(height))
+    centres = points[cells].mean(axis=1)
+    height = ((centres[owner] - x[:, 0]) * _normals(x)).sum(axis=1)
+
+    # Of two cells on either side of a facet the signs add up to zero.
+    count = np.bincount(number)
+    balance = np.bincount(number, weights=np.sign(height))
     wrong = (count > 2) | ((count == 2) & (balance != 0.0))
     bad = np.zeros(len(cells), dtype=bool)
     bad[owner[wrong[number]]] = True
@@ -52,10 +66,19 @@ def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
 
 
 def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) -> None:
-    """Raise InputError if a facet of a group, given as rows of points, is no side of a cell."""
-    sides, *named = number_alike(cell_sides(cells, cell)[0], *groups.values())
+    """Raise InputError if a facet of a group is no side of a cell.
+
+    Args:
+        groups: facets by the names of groups, as rows of points.
+        cells: (n_cells, n_vertices), rows of points.
+        cell: name of the kind of cells.
+        source: name of the mesh in messages.
+    """
+    all_sides, _ = cell_sides(cells, cell)
+    sides, *named = number_alike(all_sides, *groups.values())
     for name, numbers in zip(groups, named, strict=True):
-        if missing := int(np.sum(~found_in(numbers, sides))):
+        missing = int(np.sum(~found_in(numbers, sides)))
+        if missing:
             facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
             raise InputError(
                 f"boundary group '{name}' of {source} has {facets} no side of a cell: remove "
@@ -64,9 +87,9 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
 
 
 def _normals(x: Array) -> Array:
-    """Return the normals of facets through their first d vertices.
+    """Return the normals (n, d) of facets through their first d vertices (n, d, d).
 
-    It is (n, d, d) -> (n, d), of any length and direction.
+    They have any length and direction.
     """
     d = x.shape[-1]
     if d == 1:
@@ -77,8 +100,19 @@ def _normals(x: Array) -> Array:
 
 
 def refuse_cells(bad: Mask, what: str, points: Array, cells: Rows, source: str) -> None:
-    """Raise InputError that counts the bad cells and says where the first one is."""
-    if bad.any():
-        count, have = ("1 cell", "has") if bad.sum() == 1 else (f"{bad.sum()} cells", "have")
-        where = ", ".join(f"{x:.6g}" for x in points[cells[bad.argmax()]].mean(axis=0))
-        raise InputError(f"{count} of {source} {have} {what}, first at ({where}): mesh it again")
+    """Raise InputError that counts the bad cells and says where the first one is.
+
+    Args:
+        bad: (n_cells,), the cells to refuse.
+        what: what they have.
+        points: (n_points, d) [m].
+        cells: (n_cells, n_vertices), rows of points.
+        source: name of the mesh.
+    """
+    if not bad.any():
+        return
+    centre = points[cells[bad.argmax()]].mean(axis=0)
+    where = ", ".join(f"{x:.6g}" for x in centre)
+    number = bad.sum()
+    who = f"1 cell of {source} has" if number == 1 else f"{number} cells of {source} have"
+    raise InputError(f"{who} {what}, first at ({where}): mesh it again")

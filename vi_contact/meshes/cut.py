@@ -1,6 +1,4 @@
-"""Make joints and cracks.
-
-Nodes along an inner boundary are doubled, or those of two bodies welded into one.
+"""Make joints and cracks: double the nodes along an inner boundary, or weld those of two bodies.
 
 Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented
 along the joint and conforming there, gets them by `CutOpen`; bodies meshed one by one have them
@@ -22,11 +20,15 @@ from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_ali
 
 @dataclass(frozen=True)
 class CutOpen:
-    """Describe the mesh of `source`, cut open.
+    """Describe the mesh of a script or of a file, cut open along an inner boundary.
 
-    The source is a script or a file. It is cut along its inner boundary group, or between two
-    groups of cells, which need no boundary group then: their joint is called "<first>_<second>",
-    side 1 is the first's.
+    Attributes:
+        source: the mesh.
+        group: inner boundary group along which it is cut.
+        inside: group of cells on side 1 of the cut.
+        towards: vector that leads from side 1 to side 2, in the place of ``inside``.
+        between: two groups of cells, in the place of a group. Their joint is called
+            "<first>_<second>", and side 1 is the first's.
     """
 
     source: Source
@@ -37,9 +39,12 @@ class CutOpen:
 
     def build(self, gmsh: Any) -> None:
         """Add the mesh to Gmsh's current model."""
-        arrays = arrays_of(self.source)
         cut = cut_open(
-            arrays, self.group, inside=self.inside, towards=self.towards, between=self.between
+            arrays_of(self.source),
+            self.group,
+            inside=self.inside,
+            towards=self.towards,
+            between=self.between,
         )
         add_arrays(gmsh, cut)
 
@@ -54,7 +59,7 @@ class Welded:
 
     def build(self, gmsh: Any) -> None:
         """Add the mesh to Gmsh's current model."""
-        add_arrays(gmsh, welded(arrays_of(self.source), self.first, self.second))
+        add_arrays(gmsh, weld(arrays_of(self.source), self.first, self.second))
 
 
 def cut_open(
@@ -67,11 +72,7 @@ def cut_open(
 ) -> MeshArrays:
     """Double the nodes along an inner boundary.
 
-    Its two sides become the groups "<group>_1", "<group>_2".
-
-    Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads
-    across the boundary: give one of them. With `between`, two groups of cells, the boundary is all
-    that lies between them, `group` is "<first>_<second>" and side 1 that of the first.
+    Its two sides become the groups "<group>_1" and "<group>_2".
 
     Cells around a node of the boundary keep a common node as long as they hang together through
     other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one
@@ -79,8 +80,21 @@ def cut_open(
     `towards` in turn, so that round the crossing every node is on side 1 of both its pairs, or on
     side 2 of both.
 
-    InputError for a group that does not exist or lies on the outside, sides that cannot be told,
-    cell groups without a common facet, and names of sides that the mesh has already.
+    Args:
+        arrays: the mesh.
+        group: the inner boundary.
+        inside: the group of cells on side 1.
+        towards: the vector that leads from side 1 across the boundary. Give it or ``inside``.
+        between: two groups of cells, in the place of ``group``, ``inside`` and ``towards``. The
+            boundary is all that lies between them, its name "<first>_<second>", and side 1 that of
+            the first.
+
+    Returns:
+        The mesh with both sides in the place of the boundary group.
+
+    Raises:
+        InputError: a group that does not exist or lies on the outside; sides that cannot be told;
+            cell groups without a common facet; names of sides that the mesh has already.
     """
     if (group is None) == (between is None):
         raise InputError(
@@ -101,13 +115,13 @@ def cut_open(
             f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a "
             "vector"
         )
+
+    # Sides of cells, with equal numbers for the same facet; every inner facet has two of them.
     sides, owner = cell_sides(arrays.cells, arrays.cell)
     side, *numbers = number_alike(sides, *arrays.facet_groups.values())
     named = dict(zip(arrays.facet_groups, numbers, strict=True))
     wanted = named[group]
-    order = np.argsort(side, kind="stable")
-    inner = np.flatnonzero(side[order][1:] == side[order][:-1])
-    one, other = order[inner], order[inner + 1]  # rows of sides: the two of every inner facet
+    one, other = _twins(side)
     cut = np.isin(side[one], wanted)
     if cut.sum() < len(np.unique(wanted)):
         raise InputError(
@@ -115,47 +129,71 @@ def cut_open(
             "boundaries only"
         )
     first = _on_first_side(arrays, group, owner[one[cut]], owner[other[cut]], inside, towards)
-    cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
+    cells, points = _double_nodes(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
 
-    def moved(rows: Rows, number: Rows, at: Rows) -> Rows:
-        """Return the facets `rows` as the cells beside them know them now.
+    def renew(rows: Rows, number: Rows, on: Rows) -> Rows:
+        """Return facets as the cells beside them know them now.
 
-        The rows are those of these numbers; `at` are rows of sides.
+        Args:
+            rows: the facets of a group, as it was.
+            number: their numbers.
+            on: sides of cells, as rows of ``sides``, on which the facets are wanted.
         """
         known, place = np.unique(number, return_index=True)
-        before = rows[place[np.searchsorted(known, side[at])]]
-        match = arrays.cells[owner[at]][:, None, :] == before[:, :, None]
-        return np.asarray(np.take_along_axis(cells[owner[at]], match.argmax(axis=2), axis=1))
+        before = rows[place[np.searchsorted(known, side[on])]]
+        match = arrays.cells[owner[on]][:, None, :] == before[:, :, None]
+        return np.asarray(np.take_along_axis(cells[owner[on]], match.argmax(axis=2), axis=1))
 
+    # All other groups keep their facets, each once or, where a cut has parted it, twice.
     groups = {}
     for name, rows in arrays.facet_groups.items():
-        found = moved(rows, named[name], np.flatnonzero(np.isin(side, named[name])))
-        groups[name] = found[np.sort(np.unique(number_alike(found)[0], return_index=True)[1])]
-    del groups[group]
-    near, far = np.where(first, one[cut], other[cut]), np.where(first, other[cut], one[cut])
-    groups |= {f"{group}_1": moved(facets, wanted, near), f"{group}_2": moved(facets, wanted, far)}
+        if name == group:
+            continue
+        renewed = renew(rows, named[name], np.flatnonzero(np.isin(side, named[name])))
+        (alike,) = number_alike(renewed)
+        _, first_of_each = np.unique(alike, return_index=True)
+        groups[name] = renewed[np.sort(first_of_each)]
+    side_1 = np.where(first, one[cut], other[cut])
+    side_2 = np.where(first, other[cut], one[cut])
+    groups[f"{group}_1"] = renew(facets, wanted, side_1)
+    groups[f"{group}_2"] = renew(facets, wanted, side_2)
     return replace(arrays, points=points, cells=cells, facet_groups=groups)
 
 
-def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
+def _twins(number: Rows) -> tuple[Rows, Rows]:
+    """Return the places of equal numbers, of which no more than two are alike."""
+    order = np.argsort(number, kind="stable")
+    inner = np.flatnonzero(np.diff(number[order]) == 0)
+    return order[inner], order[inner + 1]
+
+
+def weld(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     """Replace every node of the group `second` by the node of `first` at its place.
 
-    Both groups remain, as the same inner boundary. InputError for nodes of `second` without a
-    partner (1e-9 of size).
+    Both groups remain, as the same inner boundary.
+
+    Args:
+        arrays: the mesh.
+        first: boundary group whose nodes stay.
+        second: boundary group whose nodes are replaced.
+
+    Raises:
+        InputError: nodes of `second` without a partner within 1e-9 of the size, or with several.
     """
-    one, two = (np.unique(_group(arrays, name)) for name in (first, second))
-    size = float(np.ptp(arrays.points, axis=0).max())
     from scipy.spatial import cKDTree  # late: it takes a while
 
-    distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
-    there = cKDTree(arrays.points[one]).query_ball_point(
-        arrays.points[two], 1e-9 * size, return_length=True
-    )
-    for node in two[there > 1][:1]:
+    one = np.unique(_group(arrays, first))
+    two = np.unique(_group(arrays, second))
+    size = float(np.ptp(arrays.points, axis=0).max())
+    tree = cKDTree(arrays.points[one])
+    distance, nearest = tree.query(arrays.points[two])
+    partners = tree.query_ball_point(arrays.points[two], 1e-9 * size, return_length=True)
+    several = two[partners > 1]
+    if len(several):
         raise InputError(
-            f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet "
-            f"there, and '{second}' can be welded to one only: weld these bodies first, or give "
-            f"'{second}' first"
+            f"group '{first}' has several nodes at {at(arrays.points[several[0]])}, of bodies that "
+            f"meet there, and '{second}' can be welded to one only: weld these bodies first, or "
+            f"give '{second}' first"
         )
     if distance.max(initial=0.0) > 1e-9 * size:
         where = at(arrays.points[two[np.argmax(distance)]])
@@ -173,6 +211,7 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
 
 
 def _group(arrays: MeshArrays, name: str) -> Rows:
+    """Return the facets of a boundary group, or raise InputError if there is none."""
     if arrays.cells.shape[1] > vertex_count(arrays.cell):
         raise InputError(
             "a mesh of second order cannot be cut or welded: mesh it with Mesh.ElementOrder = 1"
@@ -189,9 +228,10 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
 def _joint(
     arrays: MeshArrays, between: Sequence[str], inside: str | None, towards: Sequence[float] | None
 ) -> tuple[MeshArrays, str, str]:
-    """Return (the mesh with a boundary group of all facets, its name, the group of side 1).
+    """Make a boundary group of all facets between two cell groups.
 
-    The facets are those between two cell groups.
+    Returns:
+        The mesh with this group, the name of the group, the cell group on side 1.
     """
     names = tuple(between) if not isinstance(between, str) else ()
     if len(names) != 2 or names[0] == names[1]:
@@ -221,21 +261,18 @@ def _joint(
         )
     sides, owner = cell_sides(arrays.cells[:, : vertex_count(arrays.cell)], arrays.cell)
     (number,) = number_alike(sides)
-    order = np.argsort(number, kind="stable")
-    inner = np.flatnonzero(np.diff(number[order]) == 0)
-    one, other = order[inner], order[inner + 1]
-    across = (first[owner[one]] & second[owner[other]]) | (second[owner[one]] & first[owner[other]])
+    one, other = _twins(number)
+    forward = first[owner[one]] & second[owner[other]]
+    backward = second[owner[one]] & first[owner[other]]
+    across = forward | backward
     if not across.any():
         raise InputError(
             f"cell groups '{names[0]}' and '{names[1]}' have no common facet, so that there is "
             "nothing to cut: bodies with nodes of their own touch by their boundaries, "
             "contact_pair(…)"
         )
-    return (
-        replace(arrays, facet_groups=arrays.facet_groups | {joint: sides[one[across]]}),
-        joint,
-        names[0],
-    )
+    groups = arrays.facet_groups | {joint: sides[one[across]]}
+    return replace(arrays, facet_groups=groups), joint, names[0]
 
 
 def _on_first_side(
@@ -246,7 +283,16 @@ def _on_first_side(
     inside: str | None,
     towards: Sequence[float] | None,
 ) -> Mask:
-    """Tell for every cut facet whether the first of its two cells is on side 1."""
+    """Tell for every cut facet whether the first of its two cells is on side 1.
+
+    Args:
+        arrays: the mesh.
+        group: name of the boundary.
+        one: (n,), first cell of every cut facet.
+        other: (n,), second cell of every cut facet.
+        inside: the group of cells on side 1.
+        towards: the vector from side 1 to side 2; it is read where ``inside`` is None.
+    """
     if inside is not None:
         if inside not in arrays.cell_groups:
             raise InputError(
@@ -271,33 +317,41 @@ def _on_first_side(
     return np.asarray(ahead > 0.0)
 
 
-def _doubled(
+def _double_nodes(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
 ) -> tuple[Rows, Array]:
     """Give each node a copy for every part of its cells that facets connect.
 
-    The facets are the rows `one` and `other`; the result is (cells, points).
+    Args:
+        arrays: the mesh.
+        nodes: (m,), nodes of the cut.
+        sides: vertices of all sides of cells.
+        owner: the cells of these sides.
+        one: sides, as rows of ``sides``, that hang together with those of ``other``.
+        other: the same number of sides.
+
+    Returns:
+        The cells and the points with the copies.
     """
+    # One entry for every node of the cut in every cell around it, known by the key of both.
     n = len(arrays.points)
     around, column = np.nonzero(np.isin(arrays.cells, nodes))
     node = arrays.cells[around, column]
     key = around * n + node  # ascending within a cell's row only
     order = np.argsort(key)
 
-    def place(rows: Rows) -> Rows:
-        """Return the places among `key` of the vertices of sides that are nodes of the cut."""
+    def entries_on(rows: Rows) -> Rows:
+        """Return the entries of the vertices of some sides that are nodes of the cut."""
         vertices = sides[rows]
-        return order[
-            np.searchsorted(
-                key[order], (owner[rows][:, None] * n + vertices)[np.isin(vertices, nodes)]
-            )
-        ]
+        keys = owner[rows][:, None] * n + vertices
+        keys_of_cut = keys[np.isin(vertices, nodes)]
+        return order[np.searchsorted(key[order], keys_of_cut)]
 
-    links = place(one), place(other)
-    part = connected(len(key), *links)
+    # Entries hang together across facets that are not cut. The part of the first cell around a node
+    # keeps the node; all others get new ones, in the order of the old.
+    part = connected(len(key), entries_on(one), entries_on(other))
     _, first = np.unique(node, return_index=True)
-    keeps = np.isin(part, part[first])  # the part of the first cell around a node keeps it
-    # new nodes in order of the old
+    keeps = np.isin(part, part[first])
     _, number = np.unique(node[~keeps] * len(key) + part[~keeps], return_inverse=True)
     cells = arrays.cells.copy()
     cells[around[~keeps], column[~keeps]] = n + number

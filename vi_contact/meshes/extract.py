@@ -1,7 +1,6 @@
-"""Turn Gmsh's current model into plain arrays.
+"""Turn Gmsh's current model into plain arrays, and arrays into a model.
 
-Nodes are renumbered, groups named, and what solvers choke on is refused; there is also the way
-back.
+Nodes are renumbered, groups named, and what solvers choke on is refused.
 
 DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on
 missing groups, so nothing of them is used. Vertices stay in Gmsh's order here.
@@ -9,6 +8,7 @@ missing groups, so nothing of them is used. Vertices stay in Gmsh's order here.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -31,19 +31,19 @@ from vi_contact.meshes.rows import (
 
 Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]
-"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements.
-
-With them comes the entity (n,) that holds each.
-"""
+"""Gmsh's number of a type -> node tags (n, n_vertices) of its elements, and their entities (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
     """Hold a mesh without its library.
 
-    `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_nodes) rows of
-    points, vertices first. Groups by name: of cells as masks (n_cells,), of facets as rows of
-    points (n_facets, n_facet_vertices).
+    Attributes:
+        cell: UFL's name of the kind of cells.
+        points: (n_points, d) [m].
+        cells: (n_cells, n_nodes) rows of points, vertices first.
+        cell_groups: masks (n_cells,) by name.
+        facet_groups: rows of points (n_facets, n_facet_vertices) by name.
     """
 
     cell: str
@@ -56,7 +56,7 @@ class MeshArrays:
 def arrays_from_file(path: str | Path) -> MeshArrays:
     """Read a mesh file in Gmsh's own format, MSH 2 to 4, text or binary.
 
-    InputError like `copied` and `extract`.
+    Raises InputError like `safe_copy` and `extract`.
     """
     file = Path(path)
     with TemporaryDirectory(prefix="vi_contact-") as folder:
@@ -65,8 +65,8 @@ def arrays_from_file(path: str | Path) -> MeshArrays:
             try:
                 gmsh.merge(str(copy))
             except Exception as error:  # the only class Gmsh raises
-                said = str(error).replace(str(copy), file.name)
-                raise InputError(f"Gmsh cannot read mesh file {file}: {said}") from error
+                fault = str(error).replace(str(copy), file.name)
+                raise InputError(f"Gmsh cannot read mesh file {file}: {fault}") from error
             return extract(gmsh, str(file))
 
 
@@ -86,27 +86,32 @@ def arrays_from_script(mesh: MeshScript) -> MeshArrays:
 
 def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     """Return the arrays that `extract` would find in a model of these grids."""
-    parts = [grid.numbered() for grid in grids]
-    first = np.cumsum([0] + [len(points) for points, _, _ in parts])
-    body = np.repeat(np.arange(len(grids)), [len(cells) for _, cells, _ in parts])
-    points = np.concatenate([points for points, _, _ in parts])
-    cells = np.concatenate([first[i] + cells for i, (_, cells, _) in enumerate(parts)])
-    facets = {
-        name: first[i] + rows
-        for i, (_, _, sides) in enumerate(parts)
-        for name, rows in sides.items()
-    }
-    cell = next(name for name, (number, _) in GMSH_NUMBERS.items() if number == grids[0].kinds[-1])
+    points_of_grids = []
+    cells_of_grids = []
+    facets = {}
+    first = 0  # number of the first point of a grid
+    for grid in grids:
+        grid_points, grid_cells, grid_sides = grid.number_nodes()
+        points_of_grids.append(grid_points)
+        cells_of_grids.append(first + grid_cells)
+        for name, rows in grid_sides.items():
+            facets[name] = first + rows
+        first += len(grid_points)
+    points = np.concatenate(points_of_grids)
+    cells = np.concatenate(cells_of_grids)
+    body = np.repeat(np.arange(len(grids)), [len(part) for part in cells_of_grids])
+    names = {number: name for name, (number, _) in GMSH_NUMBERS.items()}
+    cell = names[grids[0].kinds[-1]]
     _check_finite(points, source)
     check_cells(points, cells, cell, source)
     check_folds(points, cells, cell, source)
     check_sides(facets, cells, cell, source)
-    return MeshArrays(
-        cell, points, cells, {grid.body: body == i for i, grid in enumerate(grids)}, facets
-    )
+    groups = {grid.body: body == i for i, grid in enumerate(grids)}
+    return MeshArrays(cell, points, cells, groups, facets)
 
 
 def _check_finite(points: Array, source: str) -> None:
+    """Raise InputError for coordinates that are not finite numbers."""
     if not np.isfinite(points).all():
         raise InputError(
             f"{source} has nodes whose coordinates are not numbers: write it again from Gmsh"
@@ -117,42 +122,44 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     """Return the mesh of Gmsh's current model; `source` names it in error messages.
 
     As in Gmsh, the mesh is what the physical groups of the highest dimension hold; without any, all
-    cells are taken, as a group "all". Nodes no cell uses are dropped, the others numbered from 0 in
-    the order of their tags. Raises InputError for a model without cells; mixed cells, or of an
-    order above 2; cells without volume, twisted, or folded over a neighbour; a mesh of triangles or
-    quadrilaterals outside the plane z = 0; named facets that are no sides of cells.
+    cells are taken, as a group "all". Nodes that no cell uses are dropped, the others numbered from
+    0 in the order of their tags.
+
+    Raises:
+        InputError: a model without cells; mixed cells, or cells of an order above 2; cells without
+            volume, twisted, or folded over a neighbour; triangles or quadrilaterals outside the
+            plane z = 0; named facets that are no sides of cells.
     """
+    # What the groups of the highest dimension hold, and the groups of facets.
     model = gmsh.model
-    d = max(
-        (model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]),
-        default=0,
-    )
-    body, sides = _named_entities(model, d), _named_entities(model, d - 1)
-    if both := body.keys() & sides.keys():
+    kinds, _, _ = model.mesh.getElements()
+    d = max((model.mesh.getElementProperties(kind)[1] for kind in kinds), default=0)
+    body = _named_entities(model, d)
+    sides = _named_entities(model, d - 1)
+    both = body.keys() & sides.keys()
+    if both:
         raise InputError(
             f"{source} calls both cells and facets '{min(both)}': give one of the groups another "
             "name"
         )
-    named = sorted({entity for entities in body.values() for entity in entities})
+    named = sorted(set(chain.from_iterable(body.values())))
     elements = _elements(model, d, named or [entity for _, entity in model.getEntities(d)])
+
+    # Points in the order of their tags, and cells as rows of them, each once.
     cell, number, side = _kind(model, elements, d, source)
     nodes, entity = elements[number]
     tags, cells = np.unique(nodes, return_inverse=True)
     points = _flat(_coordinates(model, tags, source), d, source)
     cells = cells.reshape(nodes.shape).astype(np.int64)
-    kept, position = _without_repeats(cells)
+    kept, position = _drop_repeats(cells)
     cells = cells[kept]
     corners = cells[:, : vertex_count(cell)]
     check_cells(points, corners, cell, source)
     check_folds(points, corners, cell, source)
     if cells.shape[1] > corners.shape[1]:
-        refuse_cells(
-            _folded(model, number, entity, d)[kept],
-            "a fold between its curved sides",
-            points,
-            cells,
-            source,
-        )
+        folded = _find_folded(model, number, entity, d)[kept]
+        refuse_cells(folded, "a fold between its curved sides", points, cells, source)
+
     cell_groups = {} if body else {"all": np.ones(len(cells), dtype=bool)}
     for name, entities in body.items():
         cell_groups[name] = np.zeros(len(cells), dtype=bool)
@@ -173,47 +180,46 @@ def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
     A group without a name is called by its number.
     """
     groups: dict[str, list[int]] = {}
-    for _, tag in model.getPhysicalGroups(dim) if dim >= 0 else ():
+    if dim < 0:
+        return groups
+    for _, tag in model.getPhysicalGroups(dim):
         name = model.getPhysicalName(dim, tag) or str(tag)
-        groups.setdefault(name, []).extend(
-            int(entity) for entity in model.getEntitiesForPhysicalGroup(dim, tag)
-        )
+        entities = model.getEntitiesForPhysicalGroup(dim, tag)
+        groups.setdefault(name, []).extend(int(entity) for entity in entities)
     return groups
 
 
 def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     """Return the elements of the entities."""
-    parts: dict[int, list[tuple[Rows, int]]] = {}
+    nodes_of_kind: dict[int, list[Rows]] = {}
+    entities_of_kind: dict[int, list[int]] = {}
     for entity in entities:
         kinds, tags, nodes = model.mesh.getElements(dim, entity)
-        for kind, tag, node in zip(kinds, tags, nodes, strict=True):
-            parts.setdefault(int(kind), []).append(
-                (np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity)
-            )
-    return {
-        kind: (
-            np.concatenate([r for r, _ in found]),
-            np.repeat([e for _, e in found], [len(r) for r, _ in found]),
-        )
-        for kind, found in parts.items()
-    }
+        for kind, tags_of_kind, flat in zip(kinds, tags, nodes, strict=True):
+            rows = np.asarray(flat, dtype=np.int64).reshape(len(tags_of_kind), -1)
+            nodes_of_kind.setdefault(int(kind), []).append(rows)
+            entities_of_kind.setdefault(int(kind), []).append(entity)
+    elements = {}
+    for number, parts in nodes_of_kind.items():
+        counts = [len(rows) for rows in parts]
+        elements[number] = (np.concatenate(parts), np.repeat(entities_of_kind[number], counts))
+    return elements
 
 
 def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
     """Return the one type of cell there is: UFL's name, Gmsh's number, that of its sides."""
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
-    names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
-    known = {
-        number: (cell, side)
-        for kinds in (GMSH_NUMBERS, SECOND_ORDER)
-        for cell, (number, side) in kinds.items()
-    }
-    high = [
-        kind
-        for kind in elements
-        if model.mesh.getElementProperties(kind)[2] > 1 and kind not in known
-    ]
+    known = {}
+    for kinds in (GMSH_NUMBERS, SECOND_ORDER):
+        for cell, (number, side) in kinds.items():
+            known[number] = (cell, side)
+    names = {}
+    high = []  # kinds of an order above the first that are not known
+    for kind in elements:
+        names[kind], _, order, *_ = model.mesh.getElementProperties(kind)
+        if order > 1 and kind not in known:
+            high.append(kind)
     if high:
         raise InputError(
             f"{source} has cells of an order above 2, or without all mid-points "
@@ -225,27 +231,32 @@ def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, 
             f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of "
             "one type"
         )
-    if (only := next(iter(elements))) not in known:
+    (only,) = elements
+    if only not in known:
         raise InputError(
             f"{source} has cells of type {names[only]}: use {', '.join(GMSH_NUMBERS)} cells"
         )
-    return known[only][0], only, known[only][1]
+    cell, side = known[only]
+    return cell, only, side
 
 
-def _folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
-    """Tell which curved cells of entities are folded.
+def _find_folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
+    """Tell which curved cells are folded: they have Jacobians of both signs.
 
-    They are in this order; a folded one has Jacobians of both signs at points of quadrature.
+    Args:
+        model: Gmsh's current model.
+        kind: Gmsh's number of the cells.
+        entity: (n_cells,), the entity of each, those of one entity one behind the other.
+        dim: dimension of the cells.
     """
     places, _ = model.mesh.getIntegrationPoints(kind, "Gauss4")
-    bad = []
-    for one in dict.fromkeys(entity.tolist()):
-        jacobians = np.reshape(
-            model.mesh.getJacobians(kind, places, one)[0], (-1, len(places) // 3, 3, 3)
-        )
+    folded = []
+    for tag in dict.fromkeys(entity.tolist()):
+        flat, _, _ = model.mesh.getJacobians(kind, places, tag)
+        jacobians = np.reshape(flat, (-1, len(places) // 3, 3, 3))
         det = np.linalg.det(jacobians[:, :, :dim, :dim])
-        bad.append((det.min(axis=1) <= 0.0) & (det.max(axis=1) >= 0.0))
-    return np.concatenate(bad)
+        folded.append((det.min(axis=1) <= 0.0) & (det.max(axis=1) >= 0.0))
+    return np.concatenate(folded)
 
 
 def _coordinates(model: Any, tags: Rows, source: str) -> Array:
@@ -269,7 +280,8 @@ def _flat(points: Array, d: int, source: str) -> Array:
     """Return the first d coordinates; the others must be zero."""
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
-        plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
+        plane = "plane z = 0" if d == 2 else "axis y = z = 0"
+        missing = "volume" if d == 2 else "surface"
         raise InputError(
             f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: "
             f"move it there, or name the {missing} as a physical group so that Gmsh saves its cells"
@@ -277,12 +289,13 @@ def _flat(points: Array, d: int, source: str) -> Array:
     return np.ascontiguousarray(points[:, :d])
 
 
-def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
-    """Return the rows kept, and the place of every row among these.
+def _drop_repeats(rows: Rows) -> tuple[Rows, Rows]:
+    """Return which rows are kept, and the place of every row among these.
 
     Of rows with the same members the first is kept.
     """
-    _, first, place = np.unique(number_alike(rows)[0], return_index=True, return_inverse=True)
+    (number,) = number_alike(rows)
+    _, first, place = np.unique(number, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
@@ -296,44 +309,56 @@ def _facets(
 
     Nodes that are at no point are -1.
 
+    Args:
+        model: Gmsh's current model.
+        entities: of the group.
+        kind: Gmsh's number of the sides of the cells.
+        tags: of the nodes of the points, ascending.
+        points: (n_points, d) [m].
+        what: name of the group in messages.
+
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is
     then meshed by itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands
     for the one point at its place.
     """
-    found = _elements(model, model.mesh.getElementProperties(kind)[1], entities)
-    if not found:
+    _, dimension, _, _, _, vertices, *_ = model.mesh.getElementProperties(kind)
+    elements = _elements(model, dimension, entities)
+    if not elements:
         return np.empty((0, 1), dtype=np.int64)
-    if list(found) != [kind]:
+    if list(elements) != [kind]:
         raise InputError(
             f"{what} is not of the shapes of the cells' sides: mesh body and boundary together"
         )
-    nodes = found[kind][0][:, : model.mesh.getElementProperties(kind)[5]]
+    all_nodes, _ = elements[kind]
+    nodes = all_nodes[:, :vertices]
     place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)
     rows = np.where(tags[place] == nodes, place, -1)
-    if (rows < 0).any():
-        rows[rows < 0] = _at_same_place(
-            _coordinates(model, nodes[rows < 0], what)[:, : points.shape[1]], points
-        )
-    return rows[_without_repeats(rows)[0]]
+    unknown = rows < 0
+    if unknown.any():
+        places = _coordinates(model, nodes[unknown], what)[:, : points.shape[1]]
+        rows[unknown] = _points_at(places, points)
+    kept, _ = _drop_repeats(rows)
+    return rows[kept]
 
 
-def _at_same_place(places: Array, points: Array) -> Rows:
-    """Find for each place the one point there.
+def _points_at(places: Array, points: Array) -> Rows:
+    """Return the one point at each place.
 
-    It is -1 if there is none or more than one (two bodies in touch).
+    It is -1 where there is none, or more than one, as where two bodies touch.
     """
-    tolerance = 1e-10 * np.ptp(points, axis=0).max()
     from scipy.spatial import cKDTree  # late: few meshes need it
 
+    tolerance = 1e-10 * np.ptp(points, axis=0).max()
     distance, nearest = cKDTree(points).query(places, k=2)
-    return np.where((distance[:, 0] <= tolerance) & (distance[:, 1] > tolerance), nearest[:, 0], -1)
+    only_one = (distance[:, 0] <= tolerance) & (distance[:, 1] > tolerance)
+    return np.where(only_one, nearest[:, 0], -1)
 
 
 def arrays_of(source: Source) -> MeshArrays:
-    """Return the arrays of a mesh file or of a script; InputError like `extract`."""
-    return (
-        arrays_from_file(source) if isinstance(source, str | Path) else arrays_from_script(source)
-    )
+    """Return the arrays of a mesh file or of a script, or raise InputError like `extract`."""
+    if isinstance(source, str | Path):
+        return arrays_from_file(source)
+    return arrays_from_script(source)
 
 
 def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
@@ -362,9 +387,18 @@ def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
 
 
 def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Mask]) -> None:
-    """Add the physical groups of elements that may be in several."""
+    """Add the physical groups of elements that may be in several.
+
+    Args:
+        gmsh: the module.
+        dim: dimension of the elements.
+        kind: Gmsh's number of the elements.
+        rows: the elements, as rows of points.
+        groups: masks of these by name.
+    """
     if not groups:
         return
+    # Elements in the same groups make one entity.
     table = np.column_stack(list(groups.values()))
     signatures, place = np.unique(table, axis=0, return_inverse=True)
     entities = []
@@ -373,10 +407,6 @@ def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Ma
         own = rows[place.reshape(-1) == number]
         gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + own.reshape(-1))
     for column, name in enumerate(groups):
-        held = [
-            entity
-            for entity, signature in zip(entities, signatures, strict=True)
-            if signature[column]
-        ]
-        if held:
-            gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, held), name)
+        members = np.array(entities)[signatures[:, column]].tolist()
+        if members:
+            gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, members), name)

@@ -14,7 +14,6 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any
@@ -23,11 +22,13 @@ from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import number, shown
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Between, Positive, Unit
-from vi_contact.meshes.geo_script import PREFIX, allowed
+from vi_contact.meshes.geo_script import PREFIX, rewrite_script
 from vi_contact.meshes.gmsh_session import options, session
 from vi_contact.meshes.mesh_file import safe_copy
 
 MOST = 8  # how often a mesh may be refined
+PR_SET_PDEATHSIG = 1  # of prctl.h: the signal that a process gets when its parent ends
+MESH = "made.msh"  # the file in which the process that meshes leaves the mesh
 log = logging.getLogger(__name__)
 _NOT_TRANSFINITE = re.compile(
     r"(?:Error|Warning)\s*: ((?:Surface|Volume) \d+) cannot be meshed using the transfinite "
@@ -77,51 +78,59 @@ class GeoFile:
 
     def build(self, gmsh: Any) -> None:
         """Mesh the script beside this process and read the mesh into Gmsh's current model."""
-        with TemporaryDirectory(prefix="vi_contact-") as folder:
-            script = allowed(self.path, self.numbers)
-            if script.left_out:
-                places = ", ".join(f"line {line} {words}" for line, words in script.left_out)
-                log.warning("%s: left out, as it changes no mesh: %s", self.path, places)
+        script = rewrite_script(self.path, self.numbers)
+        if script.left_out:
+            places = ", ".join(f"line {line} {words}" for line, words in script.left_out)
+            log.warning("%s: left out, as it changes no mesh: %s", self.path, places)
+        with TemporaryDirectory(prefix="vi_contact-") as name:
+            folder = Path(name)
             Path(folder, "script.geo").write_text(script.text, encoding="utf-8")
-            code = (
-                "import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import "
-                f"mesh_here; mesh_here({self.refine}, {self.time_limit})"
-            )
-            command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
-            try:
-                done = subprocess.run(
-                    command,
-                    cwd=folder,
-                    text=True,
-                    errors="replace",
-                    stdin=subprocess.DEVNULL,
-                    capture_output=True,
-                    timeout=self.time_limit,
-                )
-            except subprocess.TimeoutExpired:
-                raise InputError(
-                    f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger "
-                    "cells, or give a longer time_limit"
-                ) from None
-            if done.returncode:
-                how = (
-                    f"signal {-done.returncode}"
-                    if done.returncode < 0
-                    else f"status {done.returncode}"
-                )
-                said = (
-                    done.stderr.strip().splitlines() or [f"it ended without a word, with {how}"]
-                )[-1]
-                # for a text that Gmsh throws
-                if said.strip().startswith(("terminate called", "what()")):
-                    said = (
-                        "it stopped at a formula or size: check Field[…].F, and that "
-                        "Mesh.MeshSize… is positive"
-                    )
-                raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace(PREFIX, '')}")
-            for note in done.stdout.splitlines():
+            ended = self._run_gmsh(folder)
+            if ended.returncode:
+                fault = _fault_of(ended).replace(PREFIX, "")
+                raise InputError(f"{self.path}: Gmsh cannot mesh it: {fault}")
+            for note in ended.stdout.splitlines():
                 log.warning("%s: %s", self.path, note)
-            gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
+            gmsh.merge(str(safe_copy(folder / MESH, folder)))
+
+    def _run_gmsh(self, folder: Path) -> subprocess.CompletedProcess[str]:
+        """Mesh the script of this folder in a process of its own, and wait for its end."""
+        code = (
+            "import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import "
+            f"mesh_here; mesh_here({self.refine}, {self.time_limit})"
+        )
+        command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
+        try:
+            return subprocess.run(
+                command,
+                cwd=folder,
+                text=True,
+                errors="replace",
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=self.time_limit,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(
+                f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger "
+                "cells, or give a longer time_limit"
+            ) from None
+
+
+def _fault_of(ended: subprocess.CompletedProcess[str]) -> str:
+    """Return in words why the process that meshed did not succeed: the last line it printed."""
+    lines = ended.stderr.strip().splitlines()
+    if not lines:
+        status = ended.returncode
+        how = f"signal {-status}" if status < 0 else f"status {status}"
+        return f"it ended without a word, with {how}"
+    fault = lines[-1]
+    # Gmsh throws a text where it cannot evaluate a formula, and C++ then prints one of these.
+    if fault.strip().startswith(("terminate called", "what()")):
+        return (
+            "it stopped at a formula or size: check Field[…].F, and that Mesh.MeshSize… is positive"
+        )
+    return fault
 
 
 def mesh_here(refine: int, time_limit: float) -> None:
@@ -129,12 +138,12 @@ def mesh_here(refine: int, time_limit: float) -> None:
 
     This is for a process of its own, which ends with its parent or its time.
     """
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     signal.setitimer(signal.ITIMER_REAL, time_limit + 1.0)
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+    half_of_memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
-        resource.setrlimit(limit, (memory, memory))
-    # errors are read from Gmsh's log
+        resource.setrlimit(limit, (half_of_memory, half_of_memory))
+    # Gmsh goes on after an error; its log says at the end which ones there were.
     with session() as gmsh, options(gmsh, {"General.AbortOnError": 0}):
         gmsh.logger.start()
         try:
@@ -150,22 +159,25 @@ def mesh_here(refine: int, time_limit: float) -> None:
                 gmsh.model.mesh.refine()
             if refine:  # which leaves cells of first order
                 gmsh.model.mesh.setOrder(int(gmsh.option.getNumber("Mesh.ElementOrder")))
-            gmsh.write("made.msh")
+            gmsh.write(MESH)
         finally:
-            _tell_errors(gmsh.logger.get())
+            _end_at_errors(gmsh.logger.get())
 
 
-def _tell_errors(lines: Sequence[str]) -> None:
-    """Print a note where Gmsh left a transfinite mesh out.
+def _end_at_errors(lines: Sequence[str]) -> None:
+    """End the process at the first error in Gmsh's log.
 
-    At any other error of its log, the process ends.
+    Where Gmsh only left a transfinite mesh out, a note is printed instead.
     """
-    for before, line in pairwise(["", *lines]):
-        # Gmsh itself goes on with a free mesh; from 4.14 on it only warns
-        if match := _NOT_TRANSFINITE.match(line):
-            print(f"{match[1]} is meshed freely, not transfinite: {match[2]}")
-            continue
-        if not line.startswith("Error"):
-            continue
-        group = before.partition(": in")[2]
-        sys.exit(f"{line} {'in' if ': in the group' in before else ''}{group}".rstrip())
+    before = ""
+    for line in lines:
+        # Gmsh itself goes on with a free mesh; from 4.14 on it only warns.
+        not_transfinite = _NOT_TRANSFINITE.match(line)
+        if not_transfinite:
+            print(f"{not_transfinite[1]} is meshed freely, not transfinite: {not_transfinite[2]}")
+        elif line.startswith("Error"):
+            # The script prints the name of a group before Gmsh looks for its members.
+            where = before.partition(": in")[2]
+            named = ": in the group" in before
+            sys.exit(f"{line} {'in' if named else ''}{where}".rstrip())
+        before = line

@@ -29,7 +29,7 @@ from vi_contact.meshes.geo_words import (
 )
 
 LARGEST = 2_000_000  # bytes of a script
-TOLD = 20  # how many refused places one message names
+MOST_PLACES = 20  # how many refused places one message names
 PREFIX = "own_"  # before the names that a script sets
 
 _UNSEEN_OPTIONS = frozenset(("General", "Print", "PostProcessing", "View"))  # all options of these
@@ -82,7 +82,7 @@ class Script:
     left_out: tuple[tuple[int, str], ...]
 
 
-def allowed(path: Path, numbers: Mapping[str, float] | None = None) -> Script:
+def rewrite_script(path: Path, numbers: Mapping[str, float] | None = None) -> Script:
     """Return the script in listed words alone, each in its line.
 
     Args:
@@ -96,11 +96,11 @@ def allowed(path: Path, numbers: Mapping[str, float] | None = None) -> Script:
     """
     text = _read(path)
     given = dict(numbers or {})
-    tokens = _tokens(text)
+    tokens = _cut(text)
     _refuse_numbers_without_effect(path, tokens, given)
     own = (set(_SET.findall(text)) | set(given)) - WORDS
-    kept, left_out = _leave_out(tokens)
-    written = "".join(_write(path, _without_parameters(kept), own))
+    statements, left_out = _leave_out(tokens)
+    written = "".join(_write(path, _drop_parameters(statements), own))
     values = "".join(f"{PREFIX}{name} = {float(value)!r}; " for name, value in given.items())
     return Script(values + _GROUP.sub(_CHECKED, written) + "\n", tuple(left_out))
 
@@ -122,14 +122,15 @@ def _read(path: Path) -> str:
     return re.sub("\r\n?", "\n", text)
 
 
-def _tokens(text: str) -> list[Token]:
+def _cut(text: str) -> list[Token]:
     """Cut a text into tokens."""
     tokens = []
     place = 0
     line = 1
     while place < len(text):
         match = _TOKEN.match(text, place)
-        kind, word = (str(match.lastgroup), match[0]) if match else ("", text[place])
+        word = match[0] if match else text[place]
+        kind = str(match.lastgroup) if match else ""
         place += len(word)
         line += word.count("\n")
         tokens.append(Token(kind, word, line))
@@ -137,9 +138,9 @@ def _tokens(text: str) -> list[Token]:
 
 
 def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, str]]]:
-    """Return the tokens without the statements that change no mesh.
+    """Return the tokens without the statements that change no mesh, and what these were.
 
-    With them comes (line, beginning) of each of these statements.
+    Each of these statements is told by its line and its beginning.
     """
     kept: list[Token] = []
     left_out: list[tuple[int, str]] = []
@@ -150,19 +151,20 @@ def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, st
         end = _end_of_unseen(tokens, place) if _can_begin(before) else place
         if end == place:
             kept.append(token)
-            before = before if token.kind == "blank" else token.word
+            if token.kind != "blank":
+                before = token.word
             place += 1
             continue
         # Line ends stay, so that what Gmsh says of a line is true of the user's script.
         statement = tokens[place:end]
-        kept += [one for one in statement if one.kind == "blank"]
+        kept += [token for token in statement if token.kind == "blank"]
         left_out.append((token.line, _beginning(statement)))
         place = end
     return kept, left_out
 
 
 def _can_begin(before: str) -> bool:
-    """Whether a statement can begin after this word."""
+    """Tell whether a statement can begin after this word."""
     return before in ("", ";", "}", ")", "EndIf", "EndFor", "Else")
 
 
@@ -175,13 +177,9 @@ def _beginning(statement: Sequence[Token]) -> str:
 
 
 def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
-    """Return the place after the statement at ``start`` if it changes no mesh.
-
-    Else it is ``start``.
-    """
-    heads = [token.word for token in tokens[start : start + 12] if token.kind != "blank"][:3]
-    heads += [""] * (3 - len(heads))
-    first, second, third = heads
+    """Return the place after the statement at ``start`` if it changes no mesh, else ``start``."""
+    ahead = [token.word for token in tokens[start : start + 12] if token.kind != "blank"]
+    first, second, third = [*ahead, "", "", ""][:3]
     if first == "Recursive":
         first = second
     option = second == "."
@@ -193,16 +191,22 @@ def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
         or (option and first == "Mesh" and third in UNSEEN_OF_MESH)
         or (option and first == "Geometry" and third in UNSEEN_OF_GEOMETRY)
     )
-    return _end_of_statement(tokens, start, braces=first in _UNSEEN_BRACES) if unseen else start
+    if not unseen:
+        return start
+    return _end_of_statement(tokens, start, braces=first in _UNSEEN_BRACES)
 
 
 def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
     """Return the place after the statement that begins at ``start``.
 
-    It is ``start`` where the statement does not end.
+    Args:
+        tokens: of the script.
+        start: where the statement begins.
+        braces: whether a closing brace ends it too, unless another brace opens behind it, as in
+            Color {1, 2, 3} { Line{1}; }
 
-    braces: whether a closing brace ends it too, unless another brace opens behind it: Color {1, 2,
-    3} { Line{1}; }
+    Returns:
+        The place, or ``start`` where the statement does not end.
     """
     level = 0
     for place in range(start, len(tokens)):
@@ -211,15 +215,13 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
             return start  # what is no word of a script is refused, wherever it stands
         if token.kind != "sign":
             continue
-        level += (token.word in "([{") - (token.word in ")]}")
+        level += _level_change(token.word)
         if level < 0:
             return start
         if level == 0 and token.word == ";":
             return place + 1
         if level == 0 and braces and token.word == "}":
-            after = place + 1
-            while after < len(tokens) and tokens[after].kind == "blank":
-                after += 1
+            after = _next_word(tokens, place + 1)
             following = tokens[after].word if after < len(tokens) else ""
             if following == ";":
                 return after + 1
@@ -228,38 +230,50 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
     return start
 
 
-def _without_parameters(tokens: Sequence[Token]) -> list[Token]:
-    """Replace definitions of parameters.
+def _level_change(word: str) -> int:
+    """Return how a sign changes the number of open brackets: 1, -1 or 0."""
+    if word in ("(", "[", "{"):
+        return 1
+    return -1 if word in (")", "]", "}") else 0
 
-    The tokens are returned with DefineConstant[ h = {1, Name "size", Min 0} ] as DefineConstant[ h
-    = 1 ].
 
-    What follows the value tells a window how to show it, and a text could name a file.
+def _next_word(tokens: Sequence[Token], place: int) -> int:
+    """Return the first place, from ``place`` on, of a token that is no blank."""
+    while place < len(tokens) and tokens[place].kind == "blank":
+        place += 1
+    return place
+
+
+def _drop_parameters(tokens: Sequence[Token]) -> list[Token]:
+    """Return the tokens without the parameters of definitions.
+
+    DefineConstant[ h = {1, Name "size", Min 0} ] becomes DefineConstant[ h = 1 ]. What follows the
+    value tells a window how to show it, and a text could name a file.
     """
     kept: list[Token] = []
     place = 0
     inside = False  # the brackets of a DefineConstant
     level = 0
-    words = ["", ""]
+    before = ""  # the last word that is no blank
     while place < len(tokens):
         token = tokens[place]
-        if words[-1] == "DefineConstant" and token.word in ("[", "("):
+        if before == "DefineConstant" and token.word in ("[", "("):
             inside = True
             level = 0
         if inside:
-            level += (token.word in ("(", "[", "{")) - (token.word in (")", "]", "}"))
+            level += _level_change(token.word)
             inside = level > 0
-        if inside and words[-1] == "=" and token.word == "{":
+        if inside and before == "=" and token.word == "{":
             value, after = _value_and_end(tokens, place)
             if value is not None:
                 kept += value
-                words.append("}")
+                before = "}"
                 level -= 1  # the closing brace is dropped too
                 place = after
                 continue
         kept.append(token)
         if token.kind != "blank":
-            words.append(token.word)
+            before = token.word
         place += 1
     return kept
 
@@ -267,7 +281,8 @@ def _without_parameters(tokens: Sequence[Token]) -> list[Token]:
 def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | None, int]:
     """Return the tokens of the value in {value, parameters}, and the place after the closing brace.
 
-    None for braces without parameters: a list of numbers. Line ends among the parameters stay.
+    Line ends among the parameters stay. Braces without parameters hold a list of numbers: for them
+    the answer is None, and the place is ``start``.
     """
     level = 0
     comma = 0  # the first one at the level of the braces
@@ -277,11 +292,11 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
         token = tokens[place]
         if token.kind == "blank":
             continue
-        level += (token.word in ("(", "[", "{")) - (token.word in (")", "]", "}"))
+        level += _level_change(token.word)
         if level == 0:
             if not named:
                 return None, start
-            blanks = [one for one in tokens[comma:place] if one.kind == "blank"]
+            blanks = [token for token in tokens[comma:place] if token.kind == "blank"]
             return [*tokens[start + 1 : comma], *blanks], place + 1
         if level == 1 and token.word == "," and not comma:
             comma = place
@@ -291,9 +306,15 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
 
 
 def _write(path: Path, tokens: Sequence[Token], own: set[str]) -> Iterator[str]:
-    """Yield the words that Gmsh gets; InputError for all that are not allowed.
+    """Yield the words that Gmsh gets, behind line ends where it needs them.
 
-    ``own``: names of the script.
+    Args:
+        path: the script, for messages.
+        tokens: what is left of it.
+        own: names that the script sets, which get a prefix.
+
+    Raises:
+        InputError: words that are not allowed, all of them.
     """
     refused: list[tuple[Token, bool]] = []  # with whether it is a value that nobody has set
     words = ["", "", ""]
@@ -303,37 +324,49 @@ def _write(path: Path, tokens: Sequence[Token], own: set[str]) -> Iterator[str]:
     begins = False
     ends = False
     for place, token in enumerate(tokens):
-        kind, word, _ = token
+        kind = token.kind
+        word = token.word
         if kind == "blank":
-            ends = ends and "\n" not in word
-            yield "\n" * word.count("\n")
+            line_ends = word.count("\n")
+            if line_ends:
+                ends = False
+            yield "\n" * line_ends
             continue
         if skipping:
             skipping = word != ";"
         elif not _fits(kind, word, words, own):
             refused.append((token, _is_value(tokens, place, words)))
             skipping = word != ";"
-        yield "\n" * ends
-        yield f" {PREFIX if word in own and words[-1] != '.' else ''}{word}"
+        if ends:
+            yield "\n"
+        is_own = word in own and words[-1] != "."
+        yield f" {PREFIX}{word}" if is_own else f" {word}"
         words.append(word)
-        level = 0 if word == "For" else level + (word in "([{") - (word in ")]}")
-        ends = word == "EndFor" or (begins and level == 0 and word in ")]}")
+        level = 0 if word == "For" else level + _level_change(word)
+        ends = word == "EndFor" or (begins and level == 0 and word in (")", "]", "}"))
         begins = (begins or word == "For") and not ends
     if refused:
         raise InputError(f"{path}: {_sentence(refused)}")
 
 
 def _fits(kind: str, word: str, words: Sequence[str], own: set[str]) -> bool:
-    """Whether a token may stand behind these words."""
+    """Tell whether a token may stand behind these words.
+
+    Args:
+        kind: of the token.
+        word: its text.
+        words: what stands before it, three words or more.
+        own: names that the script sets.
+    """
     if kind == "text":
         names_a_group = words[-1] == "(" and (words[-2] == "SetFactory" or words[-3] == "Physical")
         is_formula = list(words[-3:]) == [".", "F", "="] and bool(_ARITHMETIC.fullmatch(word))
         means_all = word == '"*"' and words[-2] in ("Transfinite", "Recombine")
         return names_a_group or is_formula or means_all
     if kind == "name" and words[-1] == ".":
-        return word in (
-            MESH_OPTIONS if words[-2] == "Mesh" else FIELD_OPTIONS if words[-2] == "]" else ()
-        )
+        is_mesh_option = words[-2] == "Mesh" and word in MESH_OPTIONS
+        is_field_option = words[-2] == "]" and word in FIELD_OPTIONS
+        return is_mesh_option or is_field_option
     if kind == "name":
         return word in WORDS or word in own
     return kind == "sign" and (word != "." or words[-1] in ("Mesh", "]"))
@@ -346,10 +379,10 @@ def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool
     """
     before = words[-1]
     is_field = list(words[-2:]) == ["]", "="] and "Field" in words[-6:]
-    token = tokens[place]
-    after = next((one.word for one in tokens[place + 1 :] if one.kind != "blank"), "")
+    next_place = _next_word(tokens, place + 1)
+    after = tokens[next_place].word if next_place < len(tokens) else ""
     return (
-        token.kind == "name"
+        tokens[place].kind == "name"
         and not _can_begin(before)
         and before != "."
         and not is_field
@@ -358,13 +391,15 @@ def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool
 
 
 def _sentence(refused: Sequence[tuple[Token, bool]]) -> str:
-    """Say all that is refused, with its lines, and the remedy of each kind."""
+    """Return the sentence of all that is refused, with its lines, and the remedy of each kind."""
     values = dict.fromkeys(token.word for token, is_value in refused if is_value)
     others = [token for token, is_value in refused if not is_value]
     parts = []
     if others:
-        places = ", ".join(f"line {token.line} has {shown(token.word)}" for token in others[:TOLD])
-        more = f", and {len(others) - TOLD} more" if len(others) > TOLD else ""
+        some = others[:MOST_PLACES]
+        places = ", ".join(f"line {token.line} has {shown(token.word)}" for token in some)
+        rest = len(others) - MOST_PLACES
+        more = f", and {rest} more" if rest > 0 else ""
         them = "them" if len(others) > 1 else "it"
         parts.append(
             f"{places}{more}, and only words of geometry, sizes, groups and arithmetic are meshed "
@@ -390,10 +425,10 @@ def _refuse_numbers_without_effect(
     set_at: dict[str, int] = {}
     for before, token, after in zip(words, words[1:], words[2:], strict=False):
         if define or before.word == "DefineConstant":
-            define += (token.word in ("(", "[", "{")) - (token.word in (")", "]", "}"))
+            define += _level_change(token.word)
         elif token.kind == "name" and after.word in ("=", "In") and before.word != ".":
             set_at.setdefault(token.word, token.line)
-    if words and len(words) > 1 and words[0].kind == "name" and words[1].word == "=":
+    if len(words) > 1 and words[0].kind == "name" and words[1].word == "=":
         set_at.setdefault(words[0].word, words[0].line)
     for name in numbers:
         if name not in used:

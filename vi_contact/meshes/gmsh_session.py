@@ -1,7 +1,4 @@
-"""Run a quiet, reproducible Gmsh for the length of a with-block.
-
-In it, build a mesh and write it.
-"""
+"""Run a quiet, reproducible Gmsh for the length of a with-block, and write meshes to files."""
 
 import ctypes
 import inspect
@@ -13,7 +10,9 @@ from typing import Any, Protocol
 
 from vi_contact.core.errors import InputError
 
-M_PERTURB = -6  # of malloc.h
+M_PERTURB = -6  # of malloc.h: the option that says with which byte new memory is filled
+ALMOST_ZERO = 0xFF  # glibc fills with the complement of the byte: with zeros
+STDERR = 2  # the descriptor that C++ prints errors to
 # Options of Gmsh while it meshes for this package: quiet and reproducible, whatever the user's own
 # session has.
 _OPTIONS: Mapping[str, float] = {
@@ -44,10 +43,13 @@ class MeshScript(Protocol):
 
 @contextmanager
 def session(name: str = "vi_contact") -> Iterator[Any]:
-    """Give the gmsh module with an empty current model; all traces are removed afterwards.
+    """Give the gmsh module with an empty current model, and remove all traces afterwards.
 
-    A Gmsh the caller has already initialised is borrowed: its models, current model and options are
-    left as they were. Raises InputError if Gmsh is not installed.
+    A Gmsh that the caller has already initialised is borrowed: its models, current model and
+    options are left as they were.
+
+    Raises:
+        InputError: Gmsh is not installed.
     """
     try:
         import gmsh
@@ -57,10 +59,10 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
         ) from error
     borrowed = _is_initialised(gmsh)
     if not borrowed:
-        known = inspect.signature(gmsh.initialize).parameters
-        # or newer Gmsh takes over SIGINT
-        keep_signals = {"interruptible": False} if "interruptible" in known else {}
-        gmsh.initialize([], readConfigFiles=False, **keep_signals)
+        settings = {"readConfigFiles": False}
+        if "interruptible" in inspect.signature(gmsh.initialize).parameters:
+            settings["interruptible"] = False  # or newer Gmsh takes over SIGINT
+        gmsh.initialize([], **settings)
     current = gmsh.model.getCurrent()
     try:
         with options(gmsh, _OPTIONS):
@@ -77,20 +79,20 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
 @contextmanager
 def options(gmsh: Any, wanted: Mapping[str, float]) -> Iterator[None]:
     """Set Gmsh's options for the length of a with-block."""
-    kept = {option: gmsh.option.getNumber(option) for option in wanted}
+    before = {option: gmsh.option.getNumber(option) for option in wanted}
     try:
         for option, value in wanted.items():
             gmsh.option.setNumber(option, value)
         yield
     finally:
-        for option, value in kept.items():
+        for option, value in before.items():
             gmsh.option.setNumber(option, value)
 
 
 def write(mesh: MeshScript, path: str | Path) -> None:
-    """Build the mesh and write it to a file of any format.
+    """Build the mesh and write it to a file.
 
-    The format is the one that Gmsh gives to that suffix (.msh: format 4.1, text).
+    The format is the one that Gmsh gives to the suffix; .msh is format 4.1, text.
     """
     target = Path(path)
     if not target.parent.is_dir():
@@ -105,23 +107,24 @@ def write(mesh: MeshScript, path: str | Path) -> None:
 def _is_initialised(gmsh: Any) -> bool:
     """Tell whether Gmsh runs.
 
-    4.8 (Debian 12) lists no model before initialize() and complains after finalize(), from C++ and
-    past sys.stderr, by an option that it has not set yet, and ends the process if that is 4: new
-    memory is zeroed so that it is not.
+    Gmsh 4.8 (Debian 12) has no function for that, but it lists no model before initialize(). After
+    finalize() it complains, from C++ and past sys.stderr. How it complains depends on an option
+    that it has not set yet, and if that is 4 it ends the process: new memory is zeroed so that it
+    is not.
     """
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    # of glibc: 0xFF fills with about 0
-    perturb = getattr(ctypes.CDLL(None), "mallopt", lambda option, value: 0)
-    kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(sink, 2)
-    perturb(M_PERTURB, 0xFF)
+    fill_new_memory = getattr(ctypes.CDLL(None), "mallopt", lambda option, value: 0)
+    stderr = os.dup(STDERR)
+    sink = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(sink, STDERR)
+    fill_new_memory(M_PERTURB, ALMOST_ZERO)
     try:
         return bool(gmsh.model.list())
     except Exception:  # the only class Gmsh raises
         return False
     finally:
-        perturb(M_PERTURB, 0)
-        os.dup2(kept, 2)
-        os.close(kept)
+        fill_new_memory(M_PERTURB, 0)
+        os.dup2(stderr, STDERR)
+        os.close(stderr)
         os.close(sink)

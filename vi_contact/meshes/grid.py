@@ -19,10 +19,7 @@ _BOX_TYPE = (15, 1, 3, 5)  # point, line, quadrangle, hexahedron
 
 
 def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
-    """Return the nodes of an evenly divided box with one corner at the origin.
-
-    They are (n_1+1, ..., n_d+1, d) [m].
-    """
+    """Return the nodes (n_1+1, ..., n_d+1, d) [m] of an evenly divided box at the origin."""
     axes = [length * np.arange(n + 1) / n for length, n in zip(lengths, divisions, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
@@ -31,9 +28,11 @@ def lattice(lengths: Sequence[float], divisions: Sequence[int]) -> Array:
 class Grid:
     """Describe a structured mesh of one body.
 
-    `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the
-    two sides on which lattice index a is lowest and highest; `body` names all cells. `simplices`
-    splits boxes along a diagonal (Kuhn).
+    Attributes:
+        nodes: (n_1+1, ..., n_d+1, d) points of the deformed lattice [m].
+        simplices: whether boxes are split along a diagonal (Kuhn).
+        body: name of all cells.
+        sides: names of the two sides on which each lattice index is lowest and highest.
     """
 
     nodes: Array
@@ -44,30 +43,30 @@ class Grid:
     @property
     def kinds(self) -> tuple[int, ...]:
         """Return Gmsh's numbers of the shapes of 0, 1, ... d dimensions."""
-        return (_SIMPLEX_TYPE if self.simplices else _BOX_TYPE)[: self.nodes.shape[-1] + 1]
+        kinds = _SIMPLEX_TYPE if self.simplices else _BOX_TYPE
+        dimension = self.nodes.shape[-1]
+        return kinds[: dimension + 1]
 
-    def numbered(self) -> tuple[Array, npt.NDArray[np.int_], dict[str, npt.NDArray[np.int_]]]:
+    def number_nodes(self) -> tuple[Array, npt.NDArray[np.int_], dict[str, npt.NDArray[np.int_]]]:
         """Return points (n, d), cells and the facets of every side as rows of points."""
         *shape, d = self.nodes.shape
         number = np.arange(np.prod(shape)).reshape(shape, order="F")
         points = np.empty((number.size, d))
         points[number.reshape(-1)] = self.nodes.reshape(-1, d)
-        faces = {
-            name: _cells(np.asarray(np.take(number, end, axis=axis)), self.simplices)
-            for axis, pair in enumerate(self.sides)
-            for name, end in zip(pair, (0, -1), strict=True)
-        }
+        faces = {}
+        for axis, (low, high) in enumerate(self.sides):
+            for name, end in ((low, 0), (high, -1)):
+                on_side = np.asarray(np.take(number, end, axis=axis))
+                faces[name] = _cells(on_side, self.simplices)
         return points, _cells(number, self.simplices), faces
 
 
 def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
-    """Add structured meshes to the current model as discrete entities.
-
-    They get named physical groups.
-    """
-    model, first = gmsh.model, 1  # tag of the first node
+    """Add structured meshes to the current model, as discrete entities with named groups."""
+    model = gmsh.model
+    first = 1  # tag of the first node of a grid
     for grid in grids:
-        points, cells, faces = grid.numbered()
+        points, cells, faces = grid.number_nodes()
         n, d = points.shape
         boundary = [_add_entity(model, d - 1, name) for name in faces]
         volume = _add_entity(model, d, grid.body, boundary)
@@ -90,74 +89,79 @@ def add_outline(
 ) -> int:
     """Add a surface within an outline, to be meshed irregularly.
 
-    Its curves are in the groups ``names``; its tag is returned.
+    Args:
+        model: Gmsh's current model.
+        name: of the group of the surface.
+        outline: corners (x, y) [m]; a curve leads from each to the next one.
+        names: of the groups of the curves.
+        sizes: of the cells at the corners [m].
+        cells: exact numbers of cells on the first curves.
 
-    ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first
-    curves.
+    Returns:
+        The tag of the surface.
     """
-    points = [
-        model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)
-    ]
-    curves = [
-        model.geo.addLine(one, two)
-        for one, two in zip(points, [*points[1:], points[0]], strict=True)
-    ]
+    points = []
+    for place, size in zip(outline, sizes, strict=True):
+        points.append(model.geo.addPoint(*place, 0.0, size))
+    ends = [*points[1:], points[0]]
+    curves = [model.geo.addLine(start, end) for start, end in zip(points, ends, strict=True)]
     for curve, count in zip(curves, cells, strict=False):
         model.geo.mesh.setTransfiniteCurve(curve, count + 1)
     surface: int = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
     model.geo.synchronize()
     for group in dict.fromkeys(names):
-        held = [curve for curve, one in zip(curves, names, strict=True) if one == group]
-        model.setPhysicalName(1, model.addPhysicalGroup(1, held), group)
+        members = [curve for curve, own in zip(curves, names, strict=True) if own == group]
+        model.setPhysicalName(1, model.addPhysicalGroup(1, members), group)
     model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
     return surface
 
 
 def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -> int:
+    """Add a discrete entity in a group of its own, and return its tag."""
     entity: int = model.addDiscreteEntity(dim, -1, list(boundary))
     model.setPhysicalName(dim, model.addPhysicalGroup(dim, [entity]), name)
     return entity
 
 
 def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
-    """Return the vertices of every cell of a lattice of node tags.
+    """Return the vertices (n_cells, n_vertices) of every cell of a lattice of node tags.
 
-    They are in Gmsh's order, (n_cells, n_vertices).
+    They are in Gmsh's order. A box of the lattice is one cell, or d! simplices.
     """
     d = tags.ndim
     shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
-    count = [n - 1 for n in tags.shape]
-    corner = {
-        o: tags[tuple(slice(i, i + n) for i, n in zip(o, count, strict=True))]
-        for o in np.ndindex(*(2,) * d)
-    }
-    cells = np.stack([corner[o].reshape(-1) for shape in shapes for o in shape], axis=-1)
-    return cells.reshape(-1, len(shapes[0]))
+
+    # The node at one corner of all boxes: the lattice without its first or last layer.
+    at_corner = {}
+    for corner in np.ndindex(*(2,) * d):
+        layers = [slice(i, i + n - 1) for i, n in zip(corner, tags.shape, strict=True)]
+        at_corner[corner] = tags[tuple(layers)].reshape(-1)
+    vertices = [at_corner[corner] for shape in shapes for corner in shape]
+    return np.stack(vertices, axis=-1).reshape(-1, len(shapes[0]))
 
 
 def _box_corners(d: int) -> list[tuple[int, ...]]:
-    loop = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    corners: list[list[tuple[int, ...]]] = [
-        [()],
-        [(0,), (1,)],
-        [*loop],
-        [(x, y, z) for z in (0, 1) for x, y in loop],
-    ]
-    return corners[d]
+    """Return the corners of a box of d dimensions in Gmsh's order."""
+    if d == 0:
+        return [()]
+    if d == 1:
+        return [(0,), (1,)]
+    loop: list[tuple[int, ...]] = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    if d == 2:
+        return loop
+    return [(*corner, z) for z in (0, 1) for corner in loop]
 
 
 def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
-    """Return the d! simplices of a cell, positively oriented.
+    """Return the d! simplices of a box, positively oriented (Kuhn).
 
-    They are walked from corner (0,...,0) to (1,...,1) along the axes.
+    Each is a walk from corner (0, ..., 0) to (1, ..., 1) along the axes, in one of their orders.
     """
     simplices = []
     for order in permutations(range(d)):
         steps = np.eye(d, dtype=int)[list(order)]
-        walk = [
-            tuple(int(c) for c in corner)
-            for corner in np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])
-        ]
+        corners = np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])
+        walk = [tuple(corner) for corner in corners.tolist()]
         if d and np.linalg.det(steps) < 0.0:
             walk[-1], walk[-2] = walk[-2], walk[-1]
         simplices.append(walk)

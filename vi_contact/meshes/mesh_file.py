@@ -25,21 +25,22 @@ SHORT = 80  # bytes in which what comes first is found
 def safe_copy(file: Path, folder: Path) -> Path:
     """Copy a mesh file into this folder, safe for Gmsh to read.
 
-    InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces
-    more than it holds.
+    Raises:
+        InputError: a file that is missing or empty, that is no MSH file (a script, for example),
+            that is cut short, or that announces more than it holds.
     """
     copy = folder / "mesh.msh"
     try:
-        there = file.is_file()
-        if there:
+        exists = file.is_file()
+        if exists:
             shutil.copyfile(file, copy)
     except OSError as error:  # a name that is too long, what may not be looked into
         why = f"{error.strerror}): check the path and its permissions"
         raise InputError(f"mesh file {shown(str(file))} cannot be read ({why}") from None
-    if not there:
-        what = str(file) if "\0" not in str(file) else shown(str(file))
+    if not exists:
+        name = str(file) if "\0" not in str(file) else shown(str(file))
         raise InputError(
-            f"mesh file {what} does not exist: check the path, or write one (python3 meshes --help)"
+            f"mesh file {name} does not exist: check the path, or write one (python3 meshes --help)"
         )
     if copy.stat().st_size == 0:
         raise InputError(f"mesh file {file} is empty: write it again")
@@ -50,6 +51,7 @@ def safe_copy(file: Path, folder: Path) -> Path:
 
 
 def _check_magic(data: mmap.mmap, file: Path) -> None:
+    """Raise InputError unless the file begins as Gmsh's own format does."""
     if data[: len(MAGIC)] != MAGIC:
         raise InputError(
             f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format "
@@ -59,49 +61,64 @@ def _check_magic(data: mmap.mmap, file: Path) -> None:
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:
-    """Refuse sections not closed, or that announce more than the file holds.
+    """Refuse sections that are not closed, or that announce more than the file holds.
 
-    Gmsh makes room before it reads.
+    Gmsh makes room before it reads, so that a wrong number would take all memory.
     """
-    version, binary = (data[:SHORT].split() + [b"", b""])[1:3]
-    opened, name = b"", b""
+    _, version, binary, *_ = [*data[:SHORT].split(), b"", b"", b""]
+    is_open = b""  # name of the section that is open
+    name = b""
     for section in _SECTION.finditer(data):
-        closes, name = section[1] is not None, section[2]
-        if closes != (opened != b"") or (closes and name != opened):
-            break
-        if not closes:
-            ahead = data[section.end() : section.end() + SHORT]
-            counts = (
-                _packed(ahead) if binary == b"1" and name != b"PhysicalNames" else _written(ahead)
+        closes = section[1] is not None
+        name = section[2]
+        if closes:
+            if name != is_open:
+                raise _damaged(file, name)
+            is_open = b""
+            continue
+        if is_open:
+            raise _damaged(file, name)
+        is_open = name
+        ahead = data[section.end() : section.end() + SHORT]
+        packed = binary == b"1" and name != b"PhysicalNames"
+        counts = _packed_counts(ahead) if packed else _written_counts(ahead)
+        if version.startswith(b"2"):
+            counts = counts[:1]
+        if max(counts) > len(data):
+            what = name.decode().lower()
+            raise InputError(
+                f"mesh file {file} announces more {what} than it can hold: write it again from Gmsh"
             )
-            if max(counts[:1] if version.startswith(b"2") else counts) > len(data):
-                what = name.decode().lower()
-                raise InputError(
-                    f"mesh file {file} announces more {what} than it can hold: write it again from "
-                    "Gmsh"
-                )
-        opened = b"" if closes else name
-    else:
-        if not opened:
-            return
-    raise InputError(
+    if is_open:
+        raise _damaged(file, name)
+
+
+def _damaged(file: Path, name: bytes) -> InputError:
+    """Return the error of a file whose sections do not follow one another."""
+    return InputError(
         f"mesh file {file} is cut short or damaged near {name.decode()}: write it again from Gmsh"
     )
 
 
-def _written(ahead: bytes) -> tuple[int, ...]:
-    """Return the first two numbers after a section's name.
+def _written_counts(ahead: bytes) -> tuple[int, ...]:
+    """Return the first two numbers after a section's name, 0 for what is none.
 
-    They are blocks and items in format 4, items and more in 2.
+    They are blocks and items in format 4, items and more in format 2.
     """
-    return tuple(int(word) if word.isdigit() else 0 for word in ahead.split()[:2]) or (0,)
+    words = ahead.split()[:2]
+    return tuple(int(word) if word.isdigit() else 0 for word in words) or (0,)
 
 
-def _packed(ahead: bytes) -> tuple[int, ...]:
+def _packed_counts(ahead: bytes) -> tuple[int, ...]:
     """Return these numbers of a binary file.
 
-    They have 8 bytes each, in the order of bytes that makes them smaller.
+    They have 8 bytes each. Of both orders of bytes, and of written numbers where there is a digit,
+    the answer is the one that makes the larger number least.
     """
+    readings: list[tuple[int, ...]] = []
     head = ahead[1:17]
-    both = [struct.unpack(order, head) for order in ("<2Q", ">2Q")] if len(head) == 16 else []
-    return min([*both, _written(ahead)] if ahead[1:2].isdigit() else both, key=max, default=(0,))
+    if len(head) == 16:
+        readings = [struct.unpack("<2Q", head), struct.unpack(">2Q", head)]
+    if ahead[1:2].isdigit():
+        readings.append(_written_counts(ahead))
+    return min(readings, key=max, default=(0,))

@@ -14,13 +14,14 @@ Ranks = npt.NDArray[np.int32]
 
 
 def halve(centres: Array, n: int) -> Ranks:
-    """Return the owner of each of the points (n_points, d).
+    """Return the owner, 0 to n - 1, of each of the points (n_points, d).
 
-    It is 0 to n - 1; shares are equal but for one point.
+    Shares are equal but for one point.
     """
     owner = np.zeros(len(centres), dtype=np.int32)
 
     def split(rows: npt.NDArray[np.intp], first: int, count: int) -> None:
+        """Give these points to as many owners, from the first one on."""
         owner[rows] = first
         if count == 1 or not len(rows):
             return
@@ -36,23 +37,37 @@ def halve(centres: Array, n: int) -> Ranks:
 
 
 def destinations(points: Array, cells: Rows, cell: str, n: int) -> tuple[Ranks, Ranks]:
-    """Return the ranks each cell goes to.
+    """Return the ranks that each cell goes to.
 
-    They are one list and the n_cells + 1 offsets of the cells in it.
+    The first is its owner. The others have it as a ghost: they own its neighbours across a facet.
 
-    First its owner, then, as a ghost, the owners of its neighbours across a facet.
+    Args:
+        points: (n_points, d) [m].
+        cells: (n_cells, n_vertices), rows of points.
+        cell: name of the kind of cells.
+        n: number of ranks.
+
+    Returns:
+        The ranks of all cells in one list, and the offsets (n_cells + 1,) of the cells in it.
     """
     owner = halve(points[cells].mean(axis=1), n)
-    sides, at = cell_sides(cells, cell)
+
+    # Pairs of cells with a common side.
+    sides, cell_of_side = cell_sides(cells, cell)
     (number,) = number_alike(sides)
     order = np.argsort(number, kind="stable")
-    shared = np.diff(number[order]) == 0
-    one, other = at[order[:-1][shared]], at[order[1:][shared]]
-    apart = owner[one] != owner[other]
-    pairs = np.stack([np.append(one, other), np.append(owner[other], owner[one])], axis=1)[
-        np.append(apart, apart)
-    ]
-    ghosts = np.unique(pairs, axis=0)
-    where = np.append(np.arange(len(cells)), ghosts[:, 0])
-    ranks = np.append(owner, ghosts[:, 1])[np.argsort(where, kind="stable")]
-    return ranks.astype(np.int32), np.append(0, np.bincount(where).cumsum()).astype(np.int32)
+    shared = np.flatnonzero(np.diff(number[order]) == 0)
+    first = cell_of_side[order[shared]]
+    second = cell_of_side[order[shared + 1]]
+
+    # Where their owners differ, each is a ghost of the other's owner.
+    apart = owner[first] != owner[second]
+    cell_of_ghost = np.append(first[apart], second[apart])
+    rank_of_ghost = np.append(owner[second[apart]], owner[first[apart]])
+    ghosts = np.unique(np.stack([cell_of_ghost, rank_of_ghost], axis=1), axis=0)
+
+    # One list, cell after cell, the owner in front.
+    place = np.append(np.arange(len(cells)), ghosts[:, 0])
+    ranks = np.append(owner, ghosts[:, 1])[np.argsort(place, kind="stable")]
+    offsets = np.append(0, np.bincount(place).cumsum())
+    return ranks.astype(np.int32), offsets.astype(np.int32)

@@ -1,7 +1,4 @@
-"""Handle rows of vertices.
-
-These are the sides of cells, which rows have the same members, and what hangs together.
-"""
+"""Handle rows of vertices: the sides of cells, rows with the same members, what hangs together."""
 
 import numpy as np
 import numpy.typing as npt
@@ -68,7 +65,7 @@ def vertex_count(cell: str) -> int:
 def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
     """Return all sides (n_cells * n_sides, n_side_vertices), and the cell of each.
 
-    Their vertices are ascending.
+    The vertices of a side are ascending.
     """
     sides = np.array(SIDES[cell])
     rows = np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
@@ -78,18 +75,21 @@ def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
 def number_alike(*tables: Rows) -> list[Rows]:
     """Give numbers to the rows of tables of one width.
 
-    Rows with equal members, in any order, have equal numbers.
-
-    Members are at least -1. Much faster than np.unique(axis=0).
+    Rows with equal members, in any order, have equal numbers. Members are at least -1. This is much
+    faster than np.unique(axis=0).
     """
     rows = np.sort(np.concatenate(tables), axis=1) + 1
     if not len(rows):
         return [np.zeros(0, dtype=np.int64) for _ in tables]
+
+    # Column by column: the number so far and the next member make one integer, then are numbered
+    # anew so that it stays small.
     base = int(rows.max()) + 1
     numbers = rows[:, 0]
     for column in rows.T[1:]:
-        numbers = np.unique(numbers * base + column, return_inverse=True)[1]
-    return np.split(numbers.astype(np.int64), np.cumsum([len(table) for table in tables])[:-1])
+        _, numbers = np.unique(numbers * base + column, return_inverse=True)
+    ends = np.cumsum([len(table) for table in tables])
+    return np.split(numbers.astype(np.int64), ends[:-1])
 
 
 def found_in(numbers: Rows, among: Rows) -> Mask:
@@ -100,11 +100,15 @@ def found_in(numbers: Rows, among: Rows) -> Mask:
 
 
 def connected(count: int, one: Rows, other: Rows) -> Rows:
-    """Return the number of the part (count,) of each thing.
+    """Return the number of the connected part of each of so many things.
 
-    There are so many things, of which pairs one-other are linked.
+    Args:
+        count: number of things.
+        one: things that are linked with those of ``other``.
+        other: the same number of things.
     """
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
     from scipy.sparse.csgraph import connected_components  # late: it takes a while
 
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
+    _, part = connected_components(graph, directed=False)
+    return np.asarray(part, dtype=np.int64)

@@ -1,6 +1,4 @@
-"""Mesh bars, rectangles or boxes that touch without sharing a node.
-
-They are bodies of their own, meshed each for itself.
+"""Mesh bars, rectangles or boxes, each a body of its own, that touch without sharing a node.
 
 Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x
 lowest, highest), "lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z).
@@ -21,7 +19,7 @@ from vi_contact.meshes.grid import Grid, add_grids
 class Blocks:
     """Hold blocks by name, each a body of its own.
 
-    InputError for blocks of different dimension or cells.
+    Raises InputError for blocks of different dimensions or kinds of cells.
     """
 
     blocks: Mapping[str, BlockMesh]
@@ -40,26 +38,27 @@ class Blocks:
 
     def grids(self) -> list[Grid]:
         """Return the grids of all bodies."""
-        return [
-            Grid(
-                one.points(),
-                one.simplices,
-                name,
-                [(f"{name}_{low}", f"{name}_{high}") for low, high in sides],
-            )
-            for name, one in self.blocks.items()
-            for sides in [SIDES[: len(one.lengths)]]
-        ]
+        grids = []
+        for name, block in self.blocks.items():
+            sides = SIDES[: len(block.lengths)]
+            own_sides = [(f"{name}_{low}", f"{name}_{high}") for low, high in sides]
+            grids.append(Grid(block.points(), block.simplices, name, own_sides))
+        return grids
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwoBlocks:
     """Describe a block "upper" on top of a block "lower", in one dimension to the right of it.
 
-    The lower one has a corner at the origin; the upper one begins at `offset` [m] along the
-    interface (x, and z of a box), `gap` [m] above it. Interface "lower_top" and "upper_bottom", of
-    bars "lower_right" and "upper_left": nodes at the same places when lengths and divisions match,
-    never the same nodes. `angle` [rad] turns both about the origin.
+    The interface is "lower_top" and "upper_bottom", of bars "lower_right" and "upper_left". It has
+    nodes at the same places when lengths and divisions match, never the same nodes.
+
+    Attributes:
+        lower: the lower block, with a corner at the origin.
+        upper: the upper block.
+        offset: where the upper block begins along the interface: x, and z of a box [m].
+        gap: between both [m].
+        angle: that turns both about the origin [rad].
     """
 
     lower: BlockMesh = field(default_factory=BlockMesh)
@@ -71,19 +70,19 @@ class TwoBlocks:
     @property
     def interface(self) -> tuple[str, str]:
         """Return the names of the side of the upper block and of that of the lower one."""
-        return (
-            ("upper_left", "lower_right")
-            if len(self.lower.lengths) == 1
-            else ("upper_bottom", "lower_top")
-        )
+        if len(self.lower.lengths) == 1:
+            return "upper_left", "lower_right"
+        return "upper_bottom", "lower_top"
 
     def blocks(self) -> Blocks:
         """Return both blocks where they are."""
-        height = self.lower.lengths[:2][-1] + self.gap
+        dimension = len(self.lower.lengths)
+        height = self.lower.lengths[min(dimension, 2) - 1] + self.gap  # of bars: along x
         x, z = (*self.offset, 0.0, 0.0)[:2]
-        corner = {1: (height,), 2: (x, height), 3: (x, height, z)}[len(self.lower.lengths)]
-        upper = replace(self.upper, corner=corner, angle=self.angle)
-        return Blocks({"lower": replace(self.lower, angle=self.angle), "upper": upper})
+        corners = {1: (height,), 2: (x, height), 3: (x, height, z)}
+        lower = replace(self.lower, angle=self.angle)
+        upper = replace(self.upper, corner=corners[dimension], angle=self.angle)
+        return Blocks({"lower": lower, "upper": upper})
 
     def build(self, gmsh: Any) -> None:
         """Add both to Gmsh's current model."""

@@ -1,6 +1,6 @@
-"""Mesh the wall of Fig. 2 of the boundary method.
+"""Mesh the wall of Fig. 2 of the boundary method, a rectangle on its base.
 
-It is a rectangle on its base, with one-sided supports along its right side.
+One-sided supports stand along its right side.
 
 Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the contact side), "top",
 "back" (x = 0). The defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes
@@ -22,12 +22,18 @@ _PUBLISHED = (8, 12)
 
 @dataclass(frozen=True, kw_only=True)
 class WallMesh:
-    """Describe a mesh of a wall, height x width [m].
+    """Describe a mesh of a wall.
 
-    `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an
-    irregular mesh of about that cell size instead. If neither is given, the mesh has 8 x 12 cells.
-    `triangles` asks for triangles instead of quadrilaterals. Raises InputError for sizes that make
-    no wall.
+    Attributes:
+        height: of the wall [m].
+        width: of the wall [m].
+        divisions: exact numbers of cells along width and height. None for 8 x 12, or for an
+            irregular mesh.
+        size: of the cells of an irregular mesh [m]; None for an even one.
+        triangles: whether the cells are triangles instead of quadrilaterals.
+
+    Raises:
+        InputError: sizes that make no wall.
     """
 
     height: Annotated[float, Unit("m")] = 9.0
@@ -55,15 +61,15 @@ class WallMesh:
             add_grids(gmsh, self.grids())
             return
         corners = ((0.0, 0.0), (self.width, 0.0), (self.width, self.height), (0.0, self.height))
-        surface = add_outline(
-            gmsh.model, "wall", corners, ("base", "face", "top", "back"), [self.size] * 4
-        )
+        sides = ("base", "face", "top", "back")
+        surface = add_outline(gmsh.model, "wall", corners, sides, [self.size] * 4)
         if not self.triangles:
             gmsh.model.mesh.setRecombine(2, surface)
         gmsh.model.mesh.generate(2)
 
     def grids(self) -> list[Grid]:
-        """Return the grid it is, none of an irregular mesh."""
+        """Return the one grid that the mesh is, or none where it is irregular."""
+        if self.size is not None:
+            return []
         nodes = lattice((self.width, self.height), self.divisions or _PUBLISHED)
-        grid = Grid(nodes, self.triangles, "wall", (("back", "face"), ("base", "top")))
-        return [grid] if self.size is None else []
+        return [Grid(nodes, self.triangles, "wall", (("back", "face"), ("base", "top")))]

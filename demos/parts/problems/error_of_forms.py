@@ -34,7 +34,7 @@ from demos.parts.problems.boundary_elements import BOTTOM, TOP, pressed
 from vi_contact.bem.boundary_mesh import polygon
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact
-from vi_contact.bem.energetic import EnergeticBlocks, energetic_blocks, marched
+from vi_contact.bem.energetic import EnergeticBlocks, energetic_blocks, march_blocks
 from vi_contact.bem.poincare_steklov import BoundaryProblem, CondensedCompliance, PoincareSteklov
 from vi_contact.core.algebra import Array
 from vi_contact.core.protocols import FrictionLaw, Frictionless
@@ -181,7 +181,7 @@ class EnergyNorm:
         u = np.stack([motion.reshape(len(motion), -1) for motion in motions], axis=2)
         fixed = np.ones(u.shape[1], bool)
         assert isinstance(operator.blocks, EnergeticBlocks)  # one march for all motions
-        forces = operator.rho * marched(operator.blocks, fixed, np.zeros_like(u), u)[2]
+        forces = operator.rho * march_blocks(operator.blocks, fixed, np.zeros_like(u), u)[2]
         work = np.matmul(forces.swapaxes(1, 2), np.diff(u, axis=0, prepend=0.0))
         self._products = np.cumsum(work, axis=0).sum(axis=0)
 

@@ -14,14 +14,14 @@ from vi_contact.bem.boundary_operators import (
     N_SINGLE,
     double_local,
     integrands,
-    joined_at_nodes,
+    join_at_nodes,
     tensor,
 )
 from vi_contact.bem.fundamental_solution import TimeKernels
 from vi_contact.bem.loops import distances
 from vi_contact.bem.poincare_steklov import BoundaryMotion, PoincareSteklov
-from vi_contact.bem.quadrature import at_points
-from vi_contact.bem.rules import pieces, placed, roots, smoothed
+from vi_contact.bem.quadrature import integration_matrix
+from vi_contact.bem.rules import pieces, place_rule, roots, smoothed_rule
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, instance, integers, shape_of
 from vi_contact.core.errors import InputError
@@ -88,7 +88,7 @@ def _matrices(
     values = double_local(mesh, c_s**2, moments[N_SINGLE:, :, None, :], element)[..., 0, :]
     single[:, point, :, element] = tensor(moments[:N_SINGLE]).transpose(2, 0, 1, 3)
     double[:, point, :, element] = values.transpose(2, 0, 1, 3)
-    return single.reshape(2 * m, 4 * n), joined_at_nodes(mesh, double, 3).reshape(2 * m, 2 * n)
+    return single.reshape(2 * m, 4 * n), join_at_nodes(mesh, double, 3).reshape(2 * m, 2 * n)
 
 
 def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> Iterator[Array]:
@@ -113,7 +113,9 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         row, low, length = pieces(np.concatenate([*fronts, foot[:, None]], axis=1))
         eta, weight = (
             part.ravel()
-            for part in placed(low, length, smoothed(ORDER), about=(foot[row], height[row]))
+            for part in place_rule(
+                low, length, smoothed_rule(ORDER), about=(foot[row], height[row])
+            )
         )
         owner = np.repeat(row, ORDER)
         weight = weight * np.sqrt(b2)[owner]
@@ -126,7 +128,9 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         owner = owner[heard]
         weight = weight[heard]
         values = integrands(kernels(r), d, r)[: N_SINGLE + N_DOUBLE]
-        matrix = at_points(np.stack([1.0 - eta, eta], axis=1) * weight[:, None], owner, count * n)
+        matrix = integration_matrix(
+            np.stack([1.0 - eta, eta], axis=1) * weight[:, None], owner, count * n
+        )
         yield np.asarray(matrix @ values.T).T.reshape(len(values), count * n, 2)
 
 
