@@ -123,5 +123,5 @@ def test_wrong_data_are_refused():
         contact_radius(5.0, -4.0)
     with pytest.raises(InputError, match="HertzLine: force is 0"):
         HertzLine(0, 1.0, 1.0)
-    with pytest.raises(InputError, match="the approach is -1"):
+    with pytest.raises(InputError, match="approach is -1"):
         HertzPoint.from_approach(-1, modulus=1.0, radius=1.0)

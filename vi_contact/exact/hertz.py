@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
-from ..core.arguments import check_fields
+from ..core.arguments import check_fields, checked
 from ..core.errors import InputError
 from ..core.quantities import Positive, Unit
 
@@ -74,10 +74,27 @@ class HertzPoint:
         check_fields(self)
 
     @classmethod
-    def from_approach(cls, approach: float, *, modulus: float, radius: float) -> "HertzPoint":
-        """Return the contact of spheres whose distant points have come nearer by `approach` [m]."""
-        if not approach > 0.0:
-            raise InputError(f"HertzPoint: the approach is {approach!r}; give a number above zero")
+    @checked
+    def from_approach(
+        cls,
+        approach: Annotated[float, Positive, Unit("m")],
+        *,
+        modulus: Annotated[float, Positive, Unit("Pa")],
+        radius: Annotated[float, Positive, Unit("m")],
+    ) -> "HertzPoint":
+        """Return the contact of spheres whose distant points have come nearer by an approach.
+
+        Args:
+            approach: of distant points [m].
+            modulus: E* [Pa].
+            radius: R [m].
+
+        Returns:
+            The contact, with the force that the approach needs.
+
+        Raises:
+            InputError: a number is not positive.
+        """
         return cls(4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5, modulus, radius)
 
     @property

@@ -185,6 +185,7 @@ class RigidBody:
 
 def rotation(p: Array) -> Array:
     """Return R (3, 3) of the quaternion p (4,), which need not have length one."""
+    p = array("rotation", "p", p, (4,))
     w, x, y, z = p / np.linalg.norm(p)
     return np.array(
         [
