@@ -171,7 +171,6 @@ ROOMS = [
     "bem",
     "beam",
     "layer",
-    "exact",
     "studies",
     "plots",
 ]

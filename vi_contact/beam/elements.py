@@ -26,7 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array
-from ..core.arguments import check_fields
+from ..core.arguments import check_fields, checked
 from ..core.checks import counted, number
 from ..core.errors import InputError
 from ..core.quantities import Between
@@ -79,6 +79,7 @@ class Elements:
         )[1:]
 
 
+@checked
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the beam: ½ wᵀMw and ½ yᵀSy are its energies [J], and C = a2 S.
 
@@ -87,6 +88,9 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     Returns:
         M and S, sparse (2 m, 2 m), of y = (theta_1 … theta_m [-], u_1 … u_m [m]), and the forces
         (2 m,) of a uniform load of 1 N/m.
+
+    Raises:
+        InputError: an argument is of another type.
     """
     m = elements.count
     h = beam.length / elements.count
@@ -124,12 +128,16 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     return M, stiffness, load
 
 
-def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
+@checked
+def rod_matrices(rod: Rod, count: Annotated[int, Between(2, math.inf)]) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the rod: ½ wᵀMw and ½ vᵀKv are its energies [J], and C = a1 K.
 
     Returns:
         M and K, sparse (n, n), of v_1 … v_n [m] with n = ``count``, and the forces (n,) of a
         uniform load of 1 N/m.
+
+    Raises:
+        InputError: the rod is none, or there are fewer than two elements.
     """
     h = rod.length / count
     lines = _lines(S)

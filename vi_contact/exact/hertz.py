@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields
+from ..core.checks import number
 from ..core.errors import InputError
 from ..core.quantities import Positive, Unit
 
@@ -75,9 +76,16 @@ class HertzPoint:
 
     @classmethod
     def from_approach(cls, approach: float, *, modulus: float, radius: float) -> "HertzPoint":
-        """Return the contact of spheres whose distant points have come nearer by `approach` [m]."""
-        if not approach > 0.0:
-            raise InputError(f"HertzPoint: the approach is {approach!r}; give a number above zero")
+        """Return the contact of spheres whose distant points have come nearer by `approach` [m].
+
+        Its E* is the modulus [Pa], its R the radius [m].
+
+        Raises:
+            InputError: one of the three is not positive.
+        """
+        given = (("approach", approach, "m"), ("modulus", modulus, "Pa"), ("radius", radius, "m"))
+        for name, value, unit in given:
+            number("HertzPoint", f"the {name}", value, positive=True, unit=unit)
         return cls(4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5, modulus, radius)
 
     @property
