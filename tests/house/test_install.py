@@ -70,7 +70,7 @@ def test_the_cases_that_ship_are_installed() -> None:
     files = sorted(
         path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file()
     )
-    assert len(files) == 2 and all(any(fnmatch(file, one) for one in patterns) for file in files)
+    assert len(files) == 4 and all(any(fnmatch(file, one) for one in patterns) for file in files)
     others = {
         path
         for path in (ROOT / "vi_contact").rglob("*")

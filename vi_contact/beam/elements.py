@@ -29,7 +29,7 @@ from ..core.algebra import Array
 from ..core.arguments import check_fields, checked
 from ..core.checks import counted, number
 from ..core.errors import InputError
-from ..core.quantities import Between, Positive
+from ..core.quantities import Between
 from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements
@@ -88,6 +88,9 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     Returns:
         M and S, sparse (2 m, 2 m), of y = (theta_1 … theta_m [-], u_1 … u_m [m]), and the forces
         (2 m,) of a uniform load of 1 N/m.
+
+    Raises:
+        InputError: an argument is of another type.
     """
     m = elements.count
     h = beam.length / elements.count
@@ -126,12 +129,15 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
 
 
 @checked
-def rod_matrices(rod: Rod, count: Annotated[int, Positive]) -> tuple[Any, Any, Array]:
+def rod_matrices(rod: Rod, count: Annotated[int, Between(2, math.inf)]) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the rod: ½ wᵀMw and ½ vᵀKv are its energies [J], and C = a1 K.
 
     Returns:
         M and K, sparse (n, n), of v_1 … v_n [m] with n = ``count``, and the forces (n,) of a
         uniform load of 1 N/m.
+
+    Raises:
+        InputError: the rod is none, or there are fewer than two elements.
     """
     h = rod.length / count
     lines = _lines(S)

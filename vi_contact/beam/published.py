@@ -31,8 +31,11 @@ def published_mu(t: float, rate: float) -> float:
     """Return the coefficient mu = |slip rate|/100 [-] of Ahn (2012), section 8.
 
     t [s] is not used, the rate is in m/s.
+
+    Raises:
+        InputError: the rate is no finite number.
     """
-    return abs(rate) / 100.0
+    return abs(number("published_mu", "the slip rate", rate, unit="m/s")) / 100.0
 
 
 def published_start() -> Start:

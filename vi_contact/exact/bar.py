@@ -43,6 +43,9 @@ class UprightBar:
     rho: Annotated[float, Positive, Unit("kg/m³")] = 1.0
     height: Annotated[float, NotNegative, Unit("m")] = 5.0
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     @property
     def wave_speed(self) -> float:
         """Return c = sqrt(E/rho) [m/s]."""

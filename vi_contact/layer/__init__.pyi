@@ -12,7 +12,6 @@ from .particle import restitution as restitution
 from .particle_problem import particle_problem as particle_problem
 from .rigid_body import Ellipsoid as Ellipsoid
 from .rigid_body import RigidBody as RigidBody
-from .rigid_body import rotation as rotation
 from .scheme import BoundaryLayer as BoundaryLayer
 from .trajectory import LayerContact as LayerContact
 from .trajectory import Trajectory as Trajectory

@@ -204,7 +204,7 @@ def contact_layer(
             f"contact_layer: the restitution coefficient e is {e}; give a number from "
             f"{LEAST_RESTITUTION:g} to 1"
         )
-    if not isinstance(metric, Metric) or metric not in (Metric.BLENDED, Metric.FLAT):
+    if not (metric is Metric.BLENDED or metric is Metric.FLAT):
         raise InputError(
             f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT"
         )
