@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array, Matrix, total
 from ..core.problem import ContactProblem
-from ..laws.free_motions import bodies_in, free_motions
+from ..laws.free_motions import count_bodies, free_motions
 
 WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs
 
@@ -70,7 +70,7 @@ def body_springs(problem: ContactProblem) -> Matrix:
     """
     system, surface = problem.turned, problem.surface
     algebra, numbers = system.algebra, np.asarray(system.space.bodies)
-    count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]
+    count, d = count_bodies(algebra.comm, numbers), system.influence.shape[1]
     row_sums = np.sum(
         system.influence * np.column_stack([system.M @ r for r in system.influence.T]), axis=1
     )
