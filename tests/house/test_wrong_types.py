@@ -51,7 +51,6 @@ EXEMPT = {  # name -> why
     "kkt_residual": "called in every step with what scheme and solver have made",
     "Metric": "an enumeration, whose members are written by their names",
     "Check": "an abstract class, which Python refuses to make",
-    "Metric": "an enumeration, whose members are named and never made",
 }
 
 

@@ -24,7 +24,15 @@ Acceleration = Annotated[float, Finite, Unit("m/s²")]
 
 @dataclass(frozen=True)
 class Harmonic:
-    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times."""
+    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
+
+    Attributes:
+        amplitude: the largest acceleration [m/s²].
+        frequency: of the sine [Hz].
+        phase: of the sine at t = 0 [rad].
+        direction: (d,) along which the ground moves.
+        duration: infinite.
+    """
 
     amplitude: Acceleration
     frequency: Annotated[float, Positive, Unit("Hz")]
@@ -46,11 +54,15 @@ class Harmonic:
 class Ricker:
     """Shake with a Ricker wavelet (Ricker, Geophysics 18, 1953).
 
-    a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))².
+    a(t) = amplitude (1 - 2 x) exp(-x), x = (pi frequency (t - peak_time))². Velocity and
+    displacement both return to zero.
 
-    amplitude: the peak; frequency: where the spectrum peaks; delay: the time of the peak, by
-    default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a
-    jump. Velocity and displacement both return to zero.
+    Attributes:
+        amplitude: the peak [m/s²].
+        frequency: where the spectrum peaks [Hz].
+        delay: time of the peak [s]. None: 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a
+            smaller one starts with a jump.
+        direction: (d,) along which the ground moves.
     """
 
     amplitude: Acceleration
@@ -81,7 +93,13 @@ class Ricker:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Hold what one-sided and two-sided pulses share."""
+    """Hold what one-sided and two-sided pulses share.
+
+    Attributes:
+        amplitude: the largest acceleration [m/s²].
+        duration: of the pulse [s], which begins at t = 0.
+        direction: (d,) along which the ground moves.
+    """
 
     amplitude: Acceleration
     duration: Annotated[float, Positive, Unit("s")]
@@ -98,6 +116,7 @@ class Pulse:
         return self.amplitude * self._shape(t) if 0.0 <= t < self.duration else 0.0
 
     def _shape(self, t: float) -> float:
+        """Return the acceleration at a time [s] inside the pulse, over the amplitude."""
         return 1.0
 
     __call__ = vector
@@ -132,12 +151,12 @@ class Rectangular(Pulse):
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Shake with accelerations at given times.
+    """Shake with accelerations at given times, straight lines between them, and zero elsewhere.
 
-    There are straight lines between them, and zero before and after them.
-
-    times: strictly increasing, at least two; values: as many, kept as tuples. InputError for
-    others.
+    Attributes:
+        times: at least two times [s], strictly increasing; kept as a tuple.
+        values: as many accelerations [m/s²]; kept as a tuple.
+        direction: (d,) along which the ground moves.
     """
 
     times: Annotated[Sequence[float], Finite, Unit("s")]
@@ -167,10 +186,11 @@ class Tabulated:
 
     def acceleration(self, t: float) -> float:
         """Return the linear interpolation [m/s²]; the values at both end times are included."""
-        times, values = self.times, self.values
+        times = self.times
+        values = self.values
         if not times[0] <= t <= times[-1]:
             return 0.0
-        k = min(bisect_right(times, t), len(times) - 1)
+        k = min(bisect_right(times, t), len(times) - 1)  # t is in the interval before times[k]
         w = (t - times[k - 1]) / (times[k] - times[k - 1])
         return (1.0 - w) * values[k - 1] + w * values[k]
 

@@ -10,16 +10,22 @@ from ..core.system import SemiDiscreteSystem
 from .mass_transfer import rigid_motions
 
 # wᵀKw over Σ K_ii w_i² that is round-off: 1.1 eps at most on meshes
-ROUNDED = 16.0 * float(np.finfo(float).eps)
+NO_STIFFNESS = 16.0 * float(np.finfo(float).eps)
 NOWHERE = 1e300  # [m], where bodies are that are held everywhere
+NO_LENGTH = 1e-300  # in place of the size of a body of one point
 SOFT = 1e-12  # of a diagonal entry: lets unknowns be solved for that nothing holds
+DEPENDENT = 1e-10  # relative, squared; motions that others leave nothing of
 
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """Hold a body's owned unknowns and its free motions w (rows, k).
+    """Hold the k free motions w of a body.
 
-    The motions are of size one, and also held orthonormal in m = diag M; m w is held too.
+    Attributes:
+        rows: (r,) the unknowns of the body that this rank owns.
+        unit: (r, k) the motions, of which the largest entry on all ranks is one.
+        motions: (r, k) the same, orthonormal in m = diag M.
+        momenta: (r, k) m times these.
     """
 
     rows: Indices
@@ -30,7 +36,7 @@ class FreeMotions:
 
 @dataclass(frozen=True, eq=False)
 class Unheld:
-    """Hold what says which bodies nothing holds: their matrices, and where their unknowns are.
+    """Hold what tells which bodies nothing holds: their matrices, and where their unknowns are.
 
     Attributes:
         algebra: that of the matrices.
@@ -54,10 +60,10 @@ def floats(equations: Unheld) -> bool:
 
 
 def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
-    """Yield every body: its rigid motions w with K w = 0, those of a mass without a stiffness too.
+    """Yield the free motions of every body: its rigid motions w with K w = 0. Collective.
 
-    Unknowns that are no displacements, such as rotations, which no ``influence`` moves, take the
-    values that cost the least energy. Collective.
+    Those of a mass without a stiffness are among them. Unknowns that are no displacements, such as
+    rotations, which no ``influence`` moves, take the values that cost the least energy.
     """
     space = system.space
     bodies = np.asarray(space.bodies)
@@ -70,20 +76,20 @@ def _motions_of(system: Unheld) -> Iterator[FreeMotions]:
     """Yield the free motions of every body, from its matrices. Collective."""
     comm = system.algebra.comm
     bodies = _rows_by_body(comm, system.bodies)
-    motions = _rigid(system, bodies)
+    motions = _rigid_motions_of_bodies(system, bodies)
     stiffness = np.abs(system.K.diagonal())[:, None]
     mass = system.M.diagonal()[:, None]
-    pulls = np.column_stack([system.K @ w for w in motions.T])
-    # of each body: wᵀKw says which motions are free, wᵀMw makes them orthonormal
+    forces = np.column_stack([system.K @ w for w in motions.T])
     for rows in bodies:
+        # wᵀKw says which motions are free, wᵀmw makes them orthonormal.
         w = motions[rows]
-        form, size, inertia = comm.sum(
-            np.stack([w.T @ x for x in (pulls[rows], stiffness[rows] * w, mass[rows] * w)])
-        )
-        kernel = _kernel(0.5 * (form + form.T), size.diagonal())
-        basis = kernel @ _orthonormal(kernel.T @ inertia @ kernel)
-        most = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
-        yield FreeMotions(rows, w @ basis / most, w @ basis, mass[rows] * (w @ basis))
+        local = [w.T @ forces[rows], w.T @ (stiffness[rows] * w), w.T @ (mass[rows] * w)]
+        form, size, inertia = comm.sum(np.stack(local))
+        kernel = _find_kernel(0.5 * (form + form.T), size.diagonal())
+        basis = kernel @ _orthonormalise(kernel.T @ inertia @ kernel)
+        free = w @ basis
+        most = comm.max(np.max(np.abs(free), axis=0, initial=0.0))
+        yield FreeMotions(rows, unit=free / most, motions=free, momenta=mass[rows] * free)
 
 
 def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
@@ -93,57 +99,72 @@ def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
 
 def _rows_by_body(comm: Comm, numbers: Indices) -> list[Indices]:
     """Return the owned unknowns of every body, given the body of each. Collective."""
-    counts = np.bincount(numbers, minlength=bodies_in(comm, numbers))
+    counts = np.bincount(numbers, minlength=count_bodies(comm, numbers))
     return np.split(np.argsort(numbers, kind="stable"), np.cumsum(counts)[:-1])
 
 
-def _rigid(system: Unheld, bodies: list[Indices]) -> Array:
-    """Rigid motions of all bodies about their middles, in one vector each: bodies share no unknown.
+def _rigid_motions_of_bodies(system: Unheld, bodies: list[Indices]) -> Array:
+    """Return rigid motions (n, modes) of all bodies at once, each about its middle. Collective.
 
-    Each moves by another amount, so that what K ties to another body does not go with it.
+    Bodies share no unknown, so that one vector holds a motion of all of them. Each body moves by
+    another amount, so that what K ties to another body does not go with it.
     """
     comm = system.algebra.comm
     points = system.points
     place = np.zeros_like(points)
     amount = np.zeros((len(points), 1))
-    for rows, factor in zip(
-        bodies, np.random.default_rng(0).uniform(1.0, 2.0, len(bodies)), strict=True
-    ):
+    factors = np.random.default_rng(0).uniform(1.0, 2.0, len(bodies))
+    for rows, factor in zip(bodies, factors, strict=True):
         high = comm.max(np.max(points[rows], axis=0, initial=-NOWHERE))
         low = -comm.max(np.max(-points[rows], axis=0, initial=-NOWHERE))
-        place[rows] = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
+        length = max(float(np.max(high - low)), NO_LENGTH)
+        place[rows] = (points[rows] - 0.5 * (low + high)) / length
         amount[rows] = factor
-    motions, other = amount * rigid_motions(system.influence, place), ~system.influence.any(axis=1)
+    motions = amount * rigid_motions(system.influence, place)
+
+    # Rotations and other unknowns that no translation moves follow without force.
+    other = ~system.influence.any(axis=1)
     if largest(comm, other.any()):
-        solver = _factor(system, np.abs(system.K.diagonal()), other)
+        factor_of_others = _factorise_others(system, other)
         for w in motions.T:
-            w[other] = -solver.solve((system.K @ w)[other])
+            w[other] = -factor_of_others.solve((system.K @ w)[other])
     return motions
 
 
-def _factor(system: Unheld, stiffness: Array, other: Mask) -> Factor:
-    """Solve for unknowns that are no displacements, also where nothing resists them."""
-    algebra, soft, every = system.algebra, stiffness[other], np.arange(np.count_nonzero(other))
-    shift = algebra.local(every, every, np.where(soft > 0.0, SOFT * soft, 1.0), len(every))
+def _factorise_others(system: Unheld, other: Mask) -> Factor:
+    """Return a factor of K for unknowns that are no displacements, also where nothing holds them.
+
+    What holds them is made a little stiffer; what nothing holds gets a stiffness of one.
+    """
+    algebra = system.algebra
+    stiffness = np.abs(system.K.diagonal())[other]
+    places = np.arange(len(stiffness))
+    soft = np.where(stiffness > 0.0, SOFT * stiffness, 1.0)
+    shift = algebra.local(places, places, soft, len(places))
     return algebra.factor(algebra.combine([(1.0, algebra.block(system.K, other)), (1.0, shift)]))
 
 
-def _kernel(form: Array, size: Array) -> Array:
-    """Return the columns whose form is round-off.
+def _find_kernel(form: Array, size: Array) -> Array:
+    """Return the combinations of motions (modes, k) whose stiffness is round-off.
 
-    They are axes of that kind, so that sums of forces stay apart, and others between the rest.
-    ``size`` is the sum of each axis without its signs.
+    Motions of that kind are columns by themselves, so that sums of forces stay apart; others are
+    combined of the rest.
+
+    Args:
+        form: (modes, modes) wᵀKw.
+        size: (modes,) Σ K_ii w_i² of each motion, which round-off is measured by.
     """
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))
     form = form / np.outer(scale, scale)
-    free = np.abs(form.diagonal()) <= ROUNDED
+    free = np.abs(form.diagonal()) <= NO_STIFFNESS
     values, vectors = np.linalg.eigh(form[np.ix_(~free, ~free)])
-    others = np.zeros((len(form), len(values)))
-    others[~free] = vectors / scale[~free, None]
-    return np.column_stack([np.eye(len(form))[:, free], others[:, np.abs(values) <= ROUNDED]])
+    combined = np.zeros((len(form), len(values)))
+    combined[~free] = vectors / scale[~free, None]
+    is_free = np.abs(values) <= NO_STIFFNESS
+    return np.column_stack([np.eye(len(form))[:, free], combined[:, is_free]])
 
 
-def _orthonormal(form: Array) -> Array:
+def _orthonormalise(form: Array) -> Array:
     """Return columns c with cᵀ form c = 1, by Gram and Schmidt.
 
     There are none of motions along a component that is held everywhere.
@@ -153,11 +174,11 @@ def _orthonormal(form: Array) -> Array:
         for c in columns:
             column = column - c * (c @ form @ column)
         size = float(column @ form @ column)
-        if size > 1e-10 * np.max(form):
+        if size > DEPENDENT * np.max(form):
             columns.append(column / np.sqrt(size))
     return np.column_stack(columns) if columns else np.zeros((len(form), 0))
 
 
-def bodies_in(comm: Comm, numbers: Indices) -> int:
-    """Return how many bodies are numbered on all ranks. Collective."""
+def count_bodies(comm: Comm, numbers: Indices) -> int:
+    """Return how many bodies there are on all ranks, given the body of each unknown. Collective."""
     return 1 + int(largest(comm, np.max(numbers, initial=0)))

@@ -8,7 +8,8 @@ components), every law says
 and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0).
 Reactions are forces [N] for displacement schemes and impulses [N s] for velocity schemes; `scale`
 (1 or the time step [s]) is the factor between the two, so that a stress times a nodal weight
-becomes either. The slope may depend on the slip rate: `at`.
+becomes either. The slope may depend on the slip rate: `at`. The arguments of the methods of a law
+are those of ``core.protocols.FrictionLaw``, which explains them.
 """
 
 import math
@@ -32,10 +33,11 @@ PerPoint = Annotated[float | Array | tuple[float, ...], Between(0.0, math.inf, r
 class Tresca:
     """Bound friction by a threshold, whether or not the node touches.
 
-    limit = threshold · weight · scale.
+    limit = threshold · weight · scale. A wrong count of values raises InputError when the law is
+    used.
 
-    ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError for
-    a wrong count, when used.
+    Attributes:
+        threshold: a number [Pa], or one per contact point (then kept as a tuple).
     """
 
     never_negative: ClassVar[bool] = True  # it has checked its values
@@ -43,18 +45,15 @@ class Tresca:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        object.__setattr__(self, "threshold", _frozen("Tresca", self.threshold))
+        object.__setattr__(self, "threshold", _as_tuple("Tresca", self.threshold))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return threshold · weights · scale, shape (n,)."""
-        return (
-            _nodal("Tresca", "threshold", self.threshold, len(weights))
-            * np.asarray(weights, dtype=float)
-            * scale
-        )
+        """Return threshold · weights · scale, shape (m,)."""
+        threshold = _spread("Tresca", "threshold", self.threshold, len(weights))
+        return threshold * np.asarray(weights, dtype=float) * scale
 
     def slope(self, weights: Array) -> Array:
-        """Return zeros, shape (n,)."""
+        """Return zeros, shape (m,)."""
         return np.zeros(len(weights))
 
     def at(self, speed: Array) -> "Tresca":
@@ -66,8 +65,10 @@ class Tresca:
 class Coulomb:
     """Bound dry friction by a coefficient mu: limit = mu · r_n, zero for an open node.
 
-    ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised,
-    when the law is used, if their count is wrong.
+    A wrong count of values raises InputError when the law is used.
+
+    Attributes:
+        mu: a number, or one per contact point (then kept as a tuple).
     """
 
     never_negative: ClassVar[bool] = True  # it has checked its values
@@ -75,18 +76,18 @@ class Coulomb:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        object.__setattr__(self, "mu", _frozen("Coulomb", self.mu))
+        object.__setattr__(self, "mu", _as_tuple("Coulomb", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu · max(r_n, 0), shape (n,).
+        """Return mu · max(r_n, 0), shape (m,).
 
         Tension, of a held point or on the way to an answer, rubs on nothing.
         """
-        return _nodal("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
+        return _spread("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
     def slope(self, weights: Array) -> Array:
-        """Return mu, shape (n,)."""
-        return _nodal("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
+        """Return mu, shape (m,)."""
+        return _spread("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
 
     def at(self, speed: Array) -> "Coulomb":
         """Return itself: the law does not know the slip rate."""
@@ -97,12 +98,13 @@ class Coulomb:
 class SlipRateCoulomb:
     """Bound dry friction by a coefficient that depends on the slip rate: limit = mu(|v|) · r_n.
 
-    ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape
-    (n,), and returns as many coefficients, or one. InputError for no function and, when used, a
-    negative or infinite coefficient.
+    The law is implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0)
+    is the static coefficient. What is no function raises InputError, and so does, when the law is
+    used, a negative or infinite coefficient.
 
-    Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the
-    static coefficient.
+    Attributes:
+        mu: ExponentialDecay, StaticKinetic, or any function that takes speeds (m,) [m/s] >= 0, and
+            returns as many coefficients, or one.
     """
 
     mu: Annotated["ExponentialDecay | StaticKinetic | Callable[[Array], Any]", RATIO]
@@ -116,34 +118,35 @@ class SlipRateCoulomb:
         """Return Coulomb's law with the coefficients of these speeds."""
         if not len(speed):  # users' functions need not cope with none
             return Coulomb(speed)
-        values = self.mu(speed)
-        found = np.asarray(values)
-        if found.dtype.kind not in "iuf" or found.shape not in ((), speed.shape):
+        answer = self.mu(speed)
+        values = np.asarray(answer)
+        if values.dtype.kind not in "iuf" or values.shape not in ((), speed.shape):
             raise InputError(
-                f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for "
+                f"SlipRateCoulomb: mu returns {shown(answer)}, of shape {values.shape} for "
                 f"{len(speed)} slip rates; return one real coefficient per rate"
             )
-        found = np.broadcast_to(found.astype(float), speed.shape)
-        wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
+        mu = np.broadcast_to(values.astype(float), speed.shape)
+        wrong = np.flatnonzero(~(np.isfinite(mu) & (mu >= 0.0)))
         if len(wrong):
+            first = wrong[0]
             raise InputError(
-                f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it "
+                f"SlipRateCoulomb: mu({speed[first]:.6g} m/s) is {mu[first]:.6g}; let it "
                 "return zero or a positive finite number for every slip rate from 0 on"
             )
-        return Coulomb(found)
+        return Coulomb(mu)
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu(0) · max(r_n, 0), shape (n,): at rest."""
+        """Return mu(0) · max(r_n, 0), shape (m,): at rest."""
         return self.at(np.zeros(len(r_n))).limit(r_n, weights, scale)
 
     def slope(self, weights: Array) -> Array:
-        """Return mu(0), shape (n,): at rest."""
+        """Return mu(0), shape (m,): at rest."""
         return self.at(np.zeros(len(weights))).slope(weights)
 
 
 @dataclass(frozen=True)
 class TwoCoefficients:
-    """Hold static and kinetic coefficients, or one of both per contact point."""
+    """Hold a static and a kinetic coefficient, each a number or one per contact point."""
 
     mu_s: Annotated[PerPoint, RATIO, "the static coefficient mu_s"]
     mu_k: Annotated[PerPoint, RATIO, "the kinetic coefficient mu_k"]
@@ -151,22 +154,22 @@ class TwoCoefficients:
     def __post_init__(self) -> None:
         check_fields(self)
         for name in ("mu_s", "mu_k"):
-            object.__setattr__(self, name, _frozen(type(self).__name__, getattr(self, name)))
-        if (
-            isinstance(self.mu_s, tuple)
-            and isinstance(self.mu_k, tuple)
-            and len(self.mu_s) != len(self.mu_k)
-        ):
+            object.__setattr__(self, name, _as_tuple(type(self).__name__, getattr(self, name)))
+        static = self.mu_s
+        kinetic = self.mu_k
+        if not isinstance(static, tuple) or not isinstance(kinetic, tuple):
+            return
+        if len(static) != len(kinetic):
             raise InputError(
-                f"{self}: there are {len(self.mu_s)} mu_s and {len(self.mu_k)} mu_k; give as many"
+                f"{self}: there are {len(static)} mu_s and {len(kinetic)} mu_k; give as many"
             )
 
-    def _nodal(self, count: int) -> list[Array]:
-        """mu_s and mu_k as arrays that broadcast over the nodes."""
-        return [
-            _nodal(type(self).__name__, name, getattr(self, name), count)
-            for name in ("mu_s", "mu_k")
-        ]
+    def _coefficients(self, count: int) -> tuple[Array, Array]:
+        """Return mu_s and mu_k as arrays that broadcast over ``count`` nodes."""
+        owner = type(self).__name__
+        static = _spread(owner, "mu_s", self.mu_s, count)
+        kinetic = _spread(owner, "mu_k", self.mu_k, count)
+        return static, kinetic
 
 
 @dataclass(frozen=True)
@@ -175,7 +178,10 @@ class ExponentialDecay(TwoCoefficients):
 
     mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c.
 
-    mu_s, mu_k: numbers, or one per contact point.
+    Attributes:
+        mu_s: the static coefficient, a number or one per contact point.
+        mu_k: the kinetic coefficient, a number or one per contact point.
+        v_c: the speed [m/s].
     """
 
     v_c: Annotated[
@@ -186,8 +192,8 @@ class ExponentialDecay(TwoCoefficients):
     ]
 
     def __call__(self, speed: Array) -> Array:
-        """Return mu of each speed."""
-        static, kinetic = self._nodal(len(speed))
+        """Return mu (m,) of each speed (m,) [m/s]."""
+        static, kinetic = self._coefficients(len(speed))
         return np.asarray(kinetic + (static - kinetic) * np.exp(-speed / self.v_c))
 
 
@@ -195,9 +201,11 @@ class ExponentialDecay(TwoCoefficients):
 class StaticKinetic(TwoCoefficients):
     """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0.
 
-    Where both hold, rest is chosen.
+    Where a step can be solved both at rest and in motion, rest is chosen.
 
-    mu_s >= mu_k: numbers, or one per contact point.
+    Attributes:
+        mu_s: the static coefficient, a number or one per contact point; at least mu_k.
+        mu_k: the kinetic coefficient, a number or one per contact point.
     """
 
     def __post_init__(self) -> None:
@@ -208,19 +216,22 @@ class StaticKinetic(TwoCoefficients):
             )
 
     def __call__(self, speed: Array) -> Array:
-        """Return mu of each speed."""
-        static, kinetic = self._nodal(len(speed))
+        """Return mu (m,) of each speed (m,) [m/s]."""
+        static, kinetic = self._coefficients(len(speed))
         return np.where(speed == 0.0, static, kinetic)
 
 
 def project(r_t: Array, limit: Array) -> Array:
-    """Return the nearest point of the friction disks |r_t| <= limit, node by node.
+    """Return the nearest points of the friction disks |r_t| <= limit, node by node.
 
-    It is r_t · min(1, limit / |r_t|).
+    They are r_t · min(1, limit / |r_t|), in a new array.
 
-    r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node
-    that cannot slip. Returns a new array of the shape of r_t. Raises InputError when the shapes do
-    not match.
+    Args:
+        r_t: tangential reactions (m, d - 1).
+        limit: radii (m,) >= 0, infinite for a node that cannot slip.
+
+    Raises:
+        InputError: the shapes do not match.
     """
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
         raise InputError(
@@ -232,16 +243,23 @@ def project(r_t: Array, limit: Array) -> Array:
     return r_t * factor[:, np.newaxis]
 
 
-def _frozen(law: str, value: Any) -> Any:
-    """Return the value, or those of a field as a tuple (frozen, comparable)."""
+def _as_tuple(law: str, value: Any) -> Any:
+    """Return one value as it is, and values per point as a tuple, which laws can be compared by."""
     if np.ndim(value) > 1:
         raise InputError(f"{law}: the values have shape {np.shape(value)}; {ONE_EACH}")
-    field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
-    return tuple(float(one) for one in value) if field else value
+    per_point = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
+    return tuple(map(float, value)) if per_point else value
 
 
-def _nodal(law: str, name: str, value: Any, count: int) -> Array:
-    """Return the value as an array that broadcasts over the nodes."""
+def _spread(law: str, name: str, value: Any, count: int) -> Array:
+    """Return the value as an array that broadcasts over ``count`` nodes.
+
+    Args:
+        law: class of the law, for the sentence.
+        name: the coefficient.
+        value: a number, or a tuple of one per node.
+        count: number of nodes.
+    """
     if isinstance(value, tuple) and len(value) != count:
         raise InputError(
             f"{law}: {name} has {len(value)} values but there are {count} contact points: give one "

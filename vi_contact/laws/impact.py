@@ -36,23 +36,27 @@ from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..kernels.condensation import condense
 
-BELOW = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
+NEGLIGIBLE = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
 STORED = 20  # entries a row of M⁻¹Bᵀ: half a substitution reads more in two dimensions
-# times as many unknowns as beside the steps: factors are sparse there, and impacts come in every
-# step
+# Problems in the plane are small up to so many times the unknowns of ``core.sizes``: their factors
+# are sparse, and impacts come in every step.
 IN_PLANE = 6
-UPDATE = "give ComponentReset() or ImpulseUpdate()"
+UPDATE_REMEDY = "give ComponentReset() or ImpulseUpdate()"
 
 
 class VelocityUpdate(Protocol):
-    """Give a velocity vector prescribed normal velocities: how, is the update's own."""
+    """Give a velocity vector prescribed normal velocities; how it does so is the update's own."""
 
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,).
+        """Return the velocity (n,) [m/s] with the wanted normal velocities.
 
-        They stay where ``target`` is NaN.
+        Args:
+            system: the equations that are marched.
+            surface: the contact conditions.
+            v: velocity (n,) [m/s] that the step left.
+            target: wanted normal velocities (m,) [m/s], NaN where they stay as they are.
         """
 
 
@@ -70,92 +74,120 @@ class ComponentReset:
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v with the normal velocities ``target`` set, where they are not NaN."""
-        target, after = with_open_faces(surface, v, target), v.copy()
-        after.T[surface.owned] = np.where(np.isnan(target), surface.normal_values(v), target).T
+        """Return the velocity with its normal components set; arguments of ``VelocityUpdate``."""
+        target = with_open_faces(surface, v, target)
+        v_n = np.where(np.isnan(target), surface.normal_values(v), target)
+        after = v.copy()
+        after.T[surface.owned] = v_n.T
         return after
 
 
 @dataclass(frozen=True)
 class ImpulseUpdate:
-    """Apply an impulse on the chosen contact unknowns.
+    """Apply the impulse on the chosen contact unknowns that gives the wanted velocities.
 
-    It is the M-orthogonal projection onto the wanted velocities.
-
-    The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it
-    decays to round-off within thirty elements; else an impact costs half a substitution
-    (``kernels.condensation``). Large systems, from 50 000 unknowns in space and 300 000 in the
-    plane, are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by conjugate gradients to
-    round-off at every impact.
+    It is the M-orthogonal projection onto these. The system remembers M condensed onto the contact
+    unknowns, and M⁻¹Bᵀ where it is sparse, as it decays to round-off within thirty elements; else
+    an impact costs half a substitution (``kernels.condensation``). Large systems, from 50 000
+    unknowns in space and 300 000 in the plane, are not factorised: M (v⁺ - v⁻) = 0 off the chosen
+    unknowns, by conjugate gradients to round-off at every impact.
     """
 
     def __call__(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v after the impulse that gives it the normal velocities ``target``."""
+        """Return the velocity after the impulse; the arguments are those of ``VelocityUpdate``."""
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
         is_small = system.cached(
             "small impacts",
             lambda: small(surface.comm, system.rows, surface.count, worth=worth),
             surface,
         )
-        return (self._condensed if is_small else self._iterative)(system, surface, v, target)
-
-    def _iterative(
-        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
-    ) -> Array:
-        chosen = ~np.isnan(target)
-        held, jump = np.zeros(len(v), dtype=bool), np.zeros(len(v))
-        held[surface.owned[chosen]] = True
-        jump[surface.owned[chosen]] = (target - surface.normal_values(v))[chosen]
-        return v + solve_free(system.algebra, system.M, np.zeros(len(v)), held, jump)
-
-    def _condensed(
-        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
-    ) -> Array:
-        jump = surface.everywhere(target - surface.normal_values(v))
-        chosen: Indices = np.flatnonzero(~np.isnan(jump))
-        if len(chosen) == 0:
-            return v
-        flexibility, response = system.cached(
-            "impulse update", lambda: _prepared(system, surface), surface
-        )
-        impulse = np.zeros(surface.total)
-        impulse[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], jump[chosen])
-        return np.asarray(v + response(impulse))
+        update = _update_condensed if is_small else _update_by_iterations
+        return update(system, surface, v, target)
 
 
-def _prepared(
+def _update_by_iterations(
+    system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+) -> Array:
+    """Return v after the impulse: M (v⁺ - v⁻) = 0 off the chosen unknowns. Collective."""
+    chosen = ~np.isnan(target)
+    unknowns = surface.owned[chosen]
+    held = np.zeros(len(v), dtype=bool)
+    held[unknowns] = True
+    jump = np.zeros(len(v))
+    jump[unknowns] = (target - surface.normal_values(v))[chosen]
+    return v + solve_free(system.algebra, system.M, np.zeros(len(v)), held, jump)
+
+
+def _update_condensed(
+    system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+) -> Array:
+    """Return v after the impulse, which is solved for on every rank. Collective."""
+    jump = surface.everywhere(target - surface.normal_values(v))
+    chosen: Indices = np.flatnonzero(~np.isnan(jump))
+    if len(chosen) == 0:
+        return v
+    flexibility, respond = system.cached(
+        "impulse update", lambda: _condense_mass(system, surface), surface
+    )
+    impulse = np.zeros(surface.total)
+    impulse[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], jump[chosen])
+    return np.asarray(v + respond(impulse))
+
+
+def _condense_mass(
     system: SemiDiscreteSystem, surface: ContactSurface
 ) -> tuple[Array, Callable[[Array], Array]]:
-    """B M⁻¹Bᵀ, and what gives the owned rows of M⁻¹Bᵀ times impulses. Collective."""
+    """Return the mass condensed onto the contact unknowns. Collective.
+
+    Returns:
+        B M⁻¹Bᵀ (total, total), and a function of impulses (total,) that gives the owned rows of
+        M⁻¹Bᵀ times them.
+    """
+    comm = surface.comm
     condensed = condense(EffectiveMatrix(system.M, system.algebra), surface)
-    comm, columns, left = surface.comm, [], STORED * total(surface.comm, system.rows)
+
+    # Store the columns of M⁻¹Bᵀ without what is round-off, as long as they take less memory than a
+    # substitution reads; otherwise every impact makes a substitution.
+    columns = []
+    room = STORED * total(comm, system.rows)
     for impulse in np.eye(surface.total):
         column = condensed.response(impulse)
-        column[np.abs(column) < BELOW * largest(comm, max_abs(column))] = 0.0
+        column[np.abs(column) < NEGLIGIBLE * largest(comm, max_abs(column))] = 0.0
         columns.append(sp.csr_matrix(column))
-        left -= total(comm, columns[-1].nnz)
-        if left < 0:
+        room -= total(comm, columns[-1].nnz)
+        if room < 0:
             return condensed.flexibility, condensed.response
     stored = sp.csr_matrix(sp.vstack(columns).T) if columns else sp.csr_matrix((system.rows, 0))
     return condensed.flexibility, lambda impulse: np.asarray(stored @ impulse)
 
 
 class ByUpdate:
-    """Share what laws have in common that leave it to an update to change velocities."""
+    """Share what laws have in common that leave it to an update to change velocities.
+
+    Attributes:
+        update: how velocities are changed.
+    """
 
     update: VelocityUpdate
 
     @property
     def by_rows(self) -> bool:
-        """Say whether velocities and impacts may be rows, those of several runs."""
+        """Say whether velocities and impacts may be rows, one for each of several runs."""
         return getattr(self.update, "by_rows", False)
 
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return v changed by ``update``."""
+        """Return the velocity (n,) [m/s] changed by ``update``.
+
+        Args:
+            system: the equations that are marched.
+            surface: the contact conditions.
+            v: velocity (n,) [m/s] that the step left.
+            target: normal velocities (m,) [m/s], NaN where they stay as they are.
+        """
         return self.update(system, surface, v, target)
 
 
@@ -166,7 +198,7 @@ class Inelastic(ByUpdate):
     update: VelocityUpdate = field(default_factory=ComponentReset)
 
     def __post_init__(self) -> None:
-        function("Inelastic", "update", self.update, UPDATE)
+        function("Inelastic", "update", self.update, UPDATE_REMEDY)
 
     def target(self, impact: Impact) -> Array:
         """Return zero at active conditions, NaN elsewhere."""
@@ -177,10 +209,12 @@ class Inelastic(ByUpdate):
 class Newton(ByUpdate):
     """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed.
 
-    Points that stay closed are left to the step.
+    Points that stay closed are left to the step. v_n⁻ is the velocity of approach before the step:
+    a single mass rebounds with e times its speed at every dt.
 
-    v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed
-    at every dt.
+    Attributes:
+        e: restitution coefficient, from 0 (inelastic) to 1 (elastic).
+        update: how velocities are changed.
     """
 
     e: Annotated[
@@ -192,7 +226,7 @@ class Newton(ByUpdate):
     update: VelocityUpdate = field(default_factory=ComponentReset)
 
     def __post_init__(self) -> None:
-        function("Newton", "update", self.update, UPDATE)
+        function("Newton", "update", self.update, UPDATE_REMEDY)
         check_fields(self)
 
     def target(self, impact: Impact) -> Array:

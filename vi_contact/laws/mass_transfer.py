@@ -1,6 +1,4 @@
-"""Give contact nodes the velocity of the nodes behind them.
-
-This is how redistributed mass leaves the contact surface.
+"""Give contact nodes the velocity of the nodes behind them, which then carry their mass.
 
 A massless unknown i at node c, with direction q_i, gets the velocity of the rigid motion a that
 fits its neighbours J best, weighted with their entries w_J of the mass matrix:
@@ -22,35 +20,49 @@ from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 
 BATCH = 4096  # rows that are fitted at a time: bounds the memory
-KEPT = 1e-10  # of a rigid motion, in the units of the neighbourhood
+EXACT = 1e-10  # error of a rigid motion, in units of the neighbourhood, that is round-off
 NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
+DEPENDENT = 1e-8  # relative; singular values of motions that the neighbours cannot tell
 
 
-def from_neighbours(
+def transfer_to_neighbours(
     system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array
 ) -> list[Matrix]:
-    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns.
-
-    ``contact``: all unknowns of contact nodes.
+    """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns. Collective.
 
     Contact nodes with neighbours behind the surface come last in the product; those in corners,
-    with contact nodes around, follow them, and tied ones, which are in two places. InputError for
-    contact nodes without material behind.
+    with contact nodes around, follow them, and tied ones, which are in two places.
+
+    Args:
+        system: the equations.
+        massless: (n,) the unknowns that lose their mass.
+        contact: (n,) all unknowns of contact nodes.
+        nodal: (n,) the nodal masses.
+
+    Raises:
+        InputError: contact nodes without material behind.
     """
-    algebra, comm = system.algebra, system.algebra.comm
+    algebra = system.algebra
     node = np.asarray(system.space.ids) // system.influence.shape[1]
-    levels: list[Matrix] = []
     tied = np.zeros_like(contact) if system.tied is None else system.tied
-    left, donors, exact = massless.copy(), ~contact & ~tied & system.influence.any(axis=1), True
-    while largest(comm, left.any()):
-        ready, entries = _rows(system, left & ~tied if exact else left, donors, nodal, exact=exact)
-        if largest(comm, len(ready)):
+
+    # Level by level: unknowns with enough neighbours among the donors are replaced, and become
+    # donors for the next ones.
+    levels: list[Matrix] = []
+    left = massless.copy()
+    donors = ~contact & ~tied & system.influence.any(axis=1)
+    exact = True
+    while largest(algebra.comm, left.any()):
+        tried = left & ~tied if exact else left
+        ready, entries = _fit_rows(system, tried, donors, nodal, exact=exact)
+        if largest(algebra.comm, len(ready)):
             levels.append(algebra.replaced_rows(system.rows, ready, entries))
             left[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
-            # too few to tell a rotation: translations will do
-            exact, donors = (False, donors | (tied & ~contact))
+            # The neighbours that are left are too few to tell a rotation: translations will do.
+            exact = False
+            donors = donors | (tied & ~contact)
         else:
             raise InputError(
                 "the mass of some contact nodes cannot be moved, as no node behind them has mass: "
@@ -59,44 +71,56 @@ def from_neighbours(
     return levels[::-1]
 
 
-def _rows(
+def _fit_rows(
     system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
 ) -> tuple[Indices, sp.csr_matrix]:
-    """Return (numbers, rows of P) of unknowns ``left`` that have neighbours among the donors.
+    """Return the rows of P of those unknowns that donors can replace. Collective.
 
-    ``exact``: there are enough of them to keep every rigid motion. Collective.
+    Args:
+        system: the equations.
+        left: (n,) the unknowns to replace.
+        donors: (n,) the unknowns that may replace them.
+        nodal: (n,) the nodal masses.
+        exact: whether the donors must be enough to keep every rigid motion.
+
+    Returns:
+        The numbers (k,) of the unknowns, and their rows (k, unknowns of all ranks).
     """
-    asked = np.flatnonzero(left)
-    entries = system.algebra.entries(system.M, asked)
-    neighbours = _neighbours(system, donors, entries.indices)
+    unknowns = np.flatnonzero(left)
+    entries = system.algebra.entries(system.M, unknowns)
+    neighbours = _find_neighbours(system, donors, entries.indices)
     weights = neighbours.weights(entries)
-    enough = np.asarray(weights.sum(axis=1)).ravel() > NOTHING * nodal[asked]
-    fitted, fits = neighbours.of_unknowns(weights), np.zeros(len(asked), dtype=bool)
-    directions, points = system.influence[asked], system.space.coordinates[asked]
-    for rows in _alike(np.diff(fitted.indptr), enough):
-        places = fitted.indptr[rows][:, None] + np.arange(
-            fitted.indptr[rows[0] + 1] - fitted.indptr[rows[0]]
-        )
-        row, error = neighbours.fit(
+    enough = np.asarray(weights.sum(axis=1)).ravel() > NOTHING * nodal[unknowns]
+
+    # The weights of each row are replaced by what the fit makes of them, many rows of one length
+    # at a time.
+    fitted = neighbours.spread_to_unknowns(weights)
+    fits = np.zeros(len(unknowns), dtype=bool)
+    directions = system.influence[unknowns]
+    points = system.space.coordinates[unknowns]
+    lengths = np.diff(fitted.indptr)
+    for rows in _batches(lengths, enough):
+        places = fitted.indptr[rows][:, None] + np.arange(lengths[rows[0]])
+        fit, error = neighbours.fit(
             fitted.indices[places],
             fitted.data[places],
             directions[rows],
             points[rows],
             turning=exact,
         )
-        fitted.data[places] = row
-        fits[rows] = True if not exact else error <= KEPT
-    node = np.asarray(system.space.ids)[asked] // system.influence.shape[1]
+        fitted.data[places] = fit
+        fits[rows] = error <= EXACT if exact else True
+    node = np.asarray(system.space.ids)[unknowns] // system.influence.shape[1]
     fits &= ~np.isin(node, node[~fits])  # a node goes as a whole
-    columns = (
-        neighbours.columns[fitted.indices] if len(fitted.indices) else np.zeros(0, dtype=np.int64)
-    )
-    rows_of_p = sp.csr_matrix((fitted.data, columns, fitted.indptr), shape=entries.shape)
-    return asked[fits], rows_of_p[fits]
+    columns = np.zeros(0, dtype=np.int64)
+    if len(fitted.indices):
+        columns = neighbours.columns[fitted.indices]
+    P = sp.csr_matrix((fitted.data, columns, fitted.indptr), shape=entries.shape)
+    return unknowns[fits], P[fits]
 
 
-def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
-    """Return the chosen rows, in batches of those with the same count."""
+def _batches(counts: Indices, chosen: Mask) -> Iterator[Indices]:
+    """Yield the chosen rows, in batches of those with the same count."""
     for count in np.unique(counts[chosen]):
         rows = np.flatnonzero(chosen & (counts == count))
         yield from np.split(rows, range(BATCH, len(rows), BATCH))
@@ -104,11 +128,13 @@ def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
 
 @dataclass(frozen=True)
 class _Neighbours:
-    """Hold the unknowns of all donor nodes next to the contact nodes of this rank.
+    """Hold the k unknowns of all donor nodes next to the contact nodes of this rank, and others.
 
-    There are some others too; all are sorted by column.
-
-    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d).
+    Attributes:
+        columns: (k,) their numbers over all ranks, ascending.
+        node: (k,) the node of each, numbered from 0 on.
+        directions: (k, d) in which they point.
+        points: (k, d) where they are [m].
     """
 
     columns: Indices
@@ -117,97 +143,136 @@ class _Neighbours:
     points: Array
 
     def weights(self, entries: sp.csr_matrix) -> sp.csr_matrix:
-        """Weight of every donor node in rows of M: the size of its entries there."""
-        rows, count = (
-            np.repeat(np.arange(entries.shape[0]), np.diff(entries.indptr)),
-            len(self.columns),
-        )
+        """Return the weights of donor nodes (rows, nodes) in rows of M: the sizes of its entries.
+
+        The size is the root of the sum of squares over the unknowns of the node.
+        """
+        # Find the column of every entry among those of the donors.
+        rows = np.repeat(np.arange(entries.shape[0]), np.diff(entries.indptr))
+        count = len(self.columns)
         place = np.minimum(np.searchsorted(self.columns, entries.indices), max(count - 1, 0))
-        found = self.columns[place] == entries.indices if count else np.zeros(len(rows), dtype=bool)
+        of_donor = np.zeros(len(rows), dtype=bool)
+        if count:
+            of_donor = self.columns[place] == entries.indices
+
+        # Sum over the entries of each pair of a row and a node.
         nodes = int(self.node.max(initial=-1)) + 1
-        pairs, which = np.unique(rows[found] * nodes + self.node[place[found]], return_inverse=True)
-        sizes = np.sqrt(
-            np.bincount(which.ravel(), weights=entries.data[found] ** 2, minlength=len(pairs))
-        )
+        keys = rows[of_donor] * nodes + self.node[place[of_donor]]
+        pairs, pair = np.unique(keys, return_inverse=True)
+        squares = entries.data[of_donor] ** 2
+        sizes = np.sqrt(np.bincount(pair.ravel(), weights=squares, minlength=len(pairs)))
         used = sizes > 0.0
         row, node = np.divmod(pairs[used], max(nodes, 1))
         return sp.csr_matrix((sizes[used], (row, node)), shape=(entries.shape[0], nodes))
 
-    def of_unknowns(self, weights: sp.csr_matrix) -> sp.csr_matrix:
-        """Weights of nodes, told to every unknown of theirs, columns ascending."""
+    def spread_to_unknowns(self, weights: sp.csr_matrix) -> sp.csr_matrix:
+        """Return weights (rows, k) of unknowns, each that of its node, columns ascending."""
         count = len(self.columns)
         spread = sp.csr_matrix(
             (np.ones(count), (self.node, np.arange(count))), shape=(weights.shape[1], count)
         )
-        found = sp.csr_matrix(weights @ spread)
-        found.sort_indices()
-        return found
+        of_unknowns = sp.csr_matrix(weights @ spread)
+        of_unknowns.sort_indices()
+        return of_unknowns
 
     def fit(
         self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
     ) -> tuple[Array, Array]:
-        """Return (rows R_i G⁻¹ w_J R_Jᵀ (n, k), how much of a rigid motion each loses).
+        """Fit rigid motions to neighbours, for n unknowns at a time.
 
-        The rows are on the ``used`` neighbours (n, k). With ``turning`` False they are of
-        translations only, which a single neighbour can tell.
+        Args:
+            used: (n, j) which of these neighbours each unknown has.
+            weights: (n, j) w_J of each.
+            directions: (n, d) in which the unknowns point.
+            points: (n, d) where they are [m].
+            turning: whether rotations are fitted, and not translations alone, which a single
+                neighbour can tell.
+
+        Returns:
+            The rows R_i G⁻¹ w_J R_Jᵀ (n, j), and how much of a rigid motion each loses (n,).
         """
+        # Rigid motions about each unknown, in units of its neighbourhood.
         offset = self.points[used] - points[:, None, :]
         size = np.max(np.abs(offset), axis=(1, 2))[:, None, None]
         R = rigid_motions(self.directions[used], offset / size)
         target = rigid_motions(directions, np.zeros_like(points))
         if not turning:
             d = points.shape[1]
-            R, target = R[:, :, :d], target[:, :d]
+            R = R[:, :, :d]
+            target = target[:, :d]
+
+        # Least squares by the singular values of sqrt(w) R, without motions that the neighbours
+        # cannot tell.
         root = np.sqrt(weights)
         U, values, V = np.linalg.svd(root[:, :, None] * R, full_matrices=False)
-        kept = values > 1e-8 * values[:, :1]
-        share = np.where(kept, (V @ target[:, :, None])[:, :, 0] / np.where(kept, values, 1.0), 0.0)
-        # one order of sums, whatever the batch
+        independent = values > DEPENDENT * values[:, :1]
+        inverse = np.where(independent, values, 1.0)
+        share = np.where(independent, (V @ target[:, :, None])[:, :, 0] / inverse, 0.0)
+
+        # Stored by columns, the product has one order of sums, whatever the size of the batch.
         by_columns = np.ascontiguousarray(U.swapaxes(1, 2)).swapaxes(1, 2)
         row = root * (by_columns @ share[:, :, None])[:, :, 0]
-        return row, np.max(np.abs((row[:, None, :] @ R)[:, 0] - target), axis=1)
+        error = np.max(np.abs((row[:, None, :] @ R)[:, 0] - target), axis=1)
+        return row, error
 
 
-def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
-    """Return what this rank needs of the donor nodes in these columns.
+def _find_neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _Neighbours:
+    """Return what this rank needs of the donor nodes in these columns. Collective.
 
-    What other ranks own is told to all. Collective.
+    Every rank sends to all others what these name of its unknowns.
+
+    Args:
+        system: the equations.
+        donors: (n,) the unknowns of this rank that may replace others.
+        columns: (k,) the columns that this rank needs, numbered over all ranks.
     """
-    d, first = system.influence.shape[1], system.algebra.first(system.rows)
-    node, every = np.asarray(system.space.ids) // d, system.space.coordinates
+    algebra = system.algebra
+    first = algebra.first(system.rows)
+    node = np.asarray(system.space.ids) // system.influence.shape[1]
+    coordinates = system.space.coordinates
 
-    def told(asked: Indices) -> tuple[Indices, Indices, Array, Array]:
-        own = np.flatnonzero(np.isin(node, node[asked[donors[asked]]]))
-        return first + own, node[own], system.influence[own], every[own]
+    def describe(rows: Indices) -> tuple[Indices, Indices, Array, Array]:
+        """Return all unknowns of the donor nodes in these rows, as ``_Neighbours`` holds them."""
+        own = np.flatnonzero(np.isin(node, node[rows[donors[rows]]]))
+        return first + own, node[own], system.influence[own], coordinates[own]
 
-    mine, foreign = _owned(system, columns)
-    others = from_each(system.algebra.comm, told(foreign))
-    others[system.algebra.comm.rank] = told(mine)
-    numbers, nodes, directions, points = (
-        np.concatenate([part[i] for part in others]) for i in range(4)
-    )
+    mine, foreign = _owned_of_named(system, columns)
+    parts = from_each(algebra.comm, describe(foreign))
+    parts[algebra.comm.rank] = describe(mine)
+    numbers, nodes, directions, points = map(np.concatenate, zip(*parts, strict=True))
     order = np.argsort(numbers)
     _, place = np.unique(nodes[order], return_inverse=True)
     return _Neighbours(numbers[order], place.ravel(), directions[order], points[order])
 
 
-def _owned(system: SemiDiscreteSystem, columns: Indices) -> tuple[Indices, Indices]:
-    """Owned unknowns whose columns this rank names, and those that others name. Collective."""
-    first, named = system.algebra.first(system.rows), np.unique(columns)
-    mine = (named >= first) & (named < first + system.rows)
-    away = np.unique(np.concatenate(from_each(system.algebra.comm, named[~mine])))
-    return named[mine] - first, away[(away >= first) & (away < first + system.rows)] - first
+def _owned_of_named(system: SemiDiscreteSystem, columns: Indices) -> tuple[Indices, Indices]:
+    """Return owned unknowns whose columns this rank names, and those that others name. Collective.
+
+    The columns (k,) are numbered over all ranks.
+    """
+    first = system.algebra.first(system.rows)
+    end = first + system.rows
+    named = np.unique(columns)
+    is_mine = (named >= first) & (named < end)
+    foreign = np.unique(np.concatenate(from_each(system.algebra.comm, named[~is_mine])))
+    is_asked = (foreign >= first) & (foreign < end)
+    return named[is_mine] - first, foreign[is_asked] - first
 
 
-def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
-    """Return those owned unknowns whose columns any rank names. Collective."""
-    return np.union1d(*_owned(system, columns))
+def select_named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
+    """Return those owned unknowns whose columns, numbered over all ranks, any rank names.
+
+    Collective.
+    """
+    return np.union1d(*_owned_of_named(system, columns))
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:
-    """Return rows R of rigid motions (…, modes) of directions (…, d) at offsets.
+    """Return what rigid motions (…, modes) move in given directions: d translations, rotations.
 
-    The modes are d translations and the rotations.
+    Args:
+        directions: (…, d) in which the motion is measured.
+        offset: (…, d) places from the centre of the rotations, in any unit.
     """
     d = directions.shape[-1]
     turns = [
@@ -215,6 +280,6 @@ def rigid_motions(directions: Array, offset: Array) -> Array:
         for i in range(d)
         for j in range(i + 1, d)
     ]
-    return np.concatenate(
-        [directions, np.stack(turns, axis=-1)] if turns else [directions], axis=-1
-    )
+    if not turns:
+        return directions.copy()
+    return np.concatenate([directions, np.stack(turns, axis=-1)], axis=-1)

@@ -1,8 +1,6 @@
-"""Describe what a body is made of.
+"""Describe what a body is made of: isotropic elasticity, its section, and its damping.
 
-It is isotropic elasticity, the section it is cut to, and the damping of its motion.
-
-Everything here is a frozen value checked when it is built; SI units throughout; no finite element
+Everything here is a frozen value that is checked when it is built, in SI units. No finite element
 is needed.
 """
 
@@ -15,6 +13,7 @@ from ..core.errors import InputError
 from ..core.quantities import RATIO, Between, NotNegative, Positive, Unit
 
 EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any more
+ROUND_OFF = 1e-12  # relative; coefficients of damping that are zero, but for it
 BELOW_ONE = Between(0.0, 1.0, "[)", "give ratios from 0 to less than 1, not per cent")
 DampedBy = Annotated[float, BELOW_ONE, RATIO, "the damping ratio xi"]
 Density = Annotated[float, Positive, Unit("kg/m³"), "the mass density rho"]
@@ -25,7 +24,11 @@ Thickness = Annotated[float, Positive, Unit("m"), "the thickness"]
 class LinearElastic:
     """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
-    xi is that at the frequency of ``DampingRatio``, the one law that reads it.
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio.
+        rho: mass density [kg/m³].
+        xi: damping ratio at the frequency of ``DampingRatio``, the one law that reads it.
     """
 
     E: Annotated[float, Positive, Unit("Pa"), "Young's modulus E"]
@@ -45,10 +48,8 @@ class LinearElastic:
     xi: DampedBy = 0.0
 
     def __post_init__(self) -> None:
-        if any(
-            callable(one) or hasattr(one, "ufl_shape")
-            for one in (self.E, self.nu, self.rho, self.xi)
-        ):
+        values = (self.E, self.nu, self.rho, self.xi)
+        if any(callable(value) or hasattr(value, "ufl_shape") for value in values):
             raise InputError(
                 "LinearElastic: E, nu, rho and xi are numbers; give fem.Heterogeneous(E, nu, rho, "
                 "xi) where they change from place to place"
@@ -69,12 +70,19 @@ class LinearElastic:
         rho: Annotated[float, Positive, Unit("kg/m³"), "rho"],
         xi: DampedBy = 0.0,
     ) -> "LinearElastic":
-        """Return the material whose pressure and shear waves travel at c_p and c_s.
-
-        Its damping ratio is xi.
+        """Return the material whose pressure and shear waves travel at given speeds.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 +
-        nu). Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
+        nu).
+
+        Args:
+            c_p: speed of pressure waves [m/s].
+            c_s: speed of shear waves [m/s].
+            rho: mass density [kg/m³].
+            xi: damping ratio, as in the class.
+
+        Raises:
+            InputError: unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
         """
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
             raise InputError(
@@ -93,15 +101,15 @@ class LinearElastic:
     def shear_modulus(self) -> float:
         """Return the second Lamé constant E / (2 (1 + nu)) [Pa].
 
-        It is never called mu here: mu is friction.
+        It is not called mu here, for mu is friction.
         """
         return self.E / (2.0 * (1.0 + self.nu))
 
     @property
     def c_p(self) -> float:
-        """Return the pressure wave speed [m/s], which is also that in plane strain.
+        """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s].
 
-        It is sqrt((lame_lambda + 2 shear_modulus) / rho).
+        It is also that in plane strain.
         """
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
@@ -113,9 +121,13 @@ class LinearElastic:
 
 @dataclass(frozen=True)
 class ElasticValues:
-    """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points.
+    """Hold elastic constants at points, which sections and damping take as they take a material.
 
-    Each is (k,) or one for all; sections and damping take them alike.
+    Attributes:
+        E: Young's moduli (k,) [Pa], or one for all points.
+        nu: Poisson's ratios (k,), or one.
+        rho: mass densities (k,) [kg/m³], or one.
+        xi: damping ratios (k,), or one.
     """
 
     E: Any
@@ -127,20 +139,14 @@ class ElasticValues:
 
 
 class Section(Protocol):
-    """Say how the body is cut out of space.
-
-    Integrals over the mesh are multiplied by `thickness` [m] (solids: 1).
-    """
+    """Say how the body is cut out of space."""
 
     @property
     def thickness(self) -> float:
-        """Return the thickness [m] that integrals over the mesh are multiplied by."""
+        """Return the thickness [m] that integrals over the mesh are multiplied by, 1 of solids."""
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (lambda_eff, shear_modulus) [Pa] of the stress in the plane.
-
-        It is sigma = lambda_eff tr(eps) I + 2 shear_modulus eps.
-        """
+        """Return (lambda_eff, shear_modulus) [Pa] of sigma = lambda_eff tr(eps) I + 2 shear eps."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +154,9 @@ class PlaneStress:
     """Cut a panel of this thickness, free of stress across it.
 
     lambda_eff = 2 lambda mu / (lambda + 2 mu).
+
+    Attributes:
+        thickness: of the panel [m].
     """
 
     thickness: Thickness = 1.0
@@ -156,19 +165,18 @@ class PlaneStress:
         check_fields(self)
 
     def elastic_constants(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (lambda_eff, shear_modulus) [Pa].
-
-        They equal (E nu / (1 - nu²), E / (2 (1 + nu))).
-        """
-        lame, shear = material.lame_lambda, material.shear_modulus
+        """Return (lambda_eff, shear_modulus) [Pa], (E nu / (1 - nu²), E / (2 (1 + nu)))."""
+        lame = material.lame_lambda
+        shear = material.shear_modulus
         return 2.0 * lame * shear / (lame + 2.0 * shear), shear
 
 
 @dataclass(frozen=True)
 class PlaneStrain:
-    """Cut a slice of the given thickness of a long body that cannot strain along its axis.
+    """Cut a slice out of a long body that cannot strain along its axis: lambda_eff = lambda.
 
-    lambda_eff = lambda.
+    Attributes:
+        thickness: of the slice [m].
     """
 
     thickness: Thickness = 1.0
@@ -196,10 +204,7 @@ class Damping(Protocol):
     """Build viscous damping from the mass and stiffness of one material: C = alpha M + beta K."""
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (alpha [1/s], beta [s]) of C = alpha M + beta K.
-
-        They are those on the part of the body made of `material`.
-        """
+        """Return (alpha [1/s], beta [s]) on the part of the body that is made of a material."""
 
 
 @dataclass(frozen=True)
@@ -213,9 +218,10 @@ class NoDamping:
 
 @dataclass(frozen=True)
 class MassProportional:
-    """Damp by a force c u' per unit volume.
+    """Damp by a force c u' per unit volume: rho u'' + c u' = div sigma + f.
 
-    rho u'' + c u' = div sigma + f.
+    Attributes:
+        c: damping coefficient [kg/m³/s].
     """
 
     c: Annotated[float, NotNegative, Unit("kg/m³/s"), "the damping coefficient c"]
@@ -224,21 +230,20 @@ class MassProportional:
         check_fields(self)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (c / rho, 0).
-
-        Integrating c against the shape functions is c / rho times the consistent mass.
-        """
+        """Return (c / rho, 0), for the integral of c is c / rho times the consistent mass."""
         return self.c / material.rho, 0.0
 
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """Damp by C = alpha M + beta K.
-
-    K is the stiffness without any contact term.
+    """Damp by C = alpha M + beta K, with the stiffness K of the body, without contact.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with
     uplift prefer alpha = 0.
+
+    Attributes:
+        alpha: factor of the mass [1/s].
+        beta: factor of the stiffness [s].
     """
 
     alpha: Annotated[float, NotNegative, Unit("1/s"), "the mass coefficient alpha"]
@@ -257,23 +262,35 @@ class Rayleigh:
         xi1: Annotated[float, NotNegative, RATIO, "the damping ratio xi1"],
         xi2: Annotated[float, NotNegative, RATIO, "the damping ratio xi2"],
     ) -> "Rayleigh":
-        """Make the damping of ratio xi1 at f1, xi2 at f2.
+        """Return the damping that has given ratios at two frequencies.
 
-        alpha / (2 w_i) + beta w_i / 2 = xi_i, w_i = 2 pi f_i.
+        alpha / (2 w_i) + beta w_i / 2 = xi_i, w_i = 2 pi f_i, so that
 
-        alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²);
-        for equal ratios xi alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and
-        10 Hz: 0.5712 1/s and 1.4469e-3 s. Raises InputError when f1 = f2 or when the solution needs
-        a negative coefficient.
+            alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²)
+            beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²)
+
+        For equal ratios xi they are 2 xi w1 w2 / (w1 + w2) and 2 xi / (w1 + w2). 5 % at 1 and 10 Hz
+        gives 0.5712 1/s and 1.4469e-3 s.
+
+        Args:
+            f1: one frequency [Hz].
+            f2: the other [Hz].
+            xi1: damping ratio at f1.
+            xi2: damping ratio at f2.
+
+        Raises:
+            InputError: f1 = f2, or ratios that need a negative coefficient.
         """
         if f1 == f2:
             raise InputError(
                 f"Rayleigh.from_frequencies: f1 and f2 are both {f1!r} Hz; give two frequencies"
             )
-        w1, w2 = 2.0 * math.pi * min(f1, f2), 2.0 * math.pi * max(f1, f2)
-        low, high = (xi1, xi2) if f1 < f2 else (xi2, xi1)
-        mass, stiffness = w2 * low - w1 * high, w2 * high - w1 * low
-        round_off = 1e-12 * (w1 + w2) * (low + high)
+        (f_low, xi_low), (f_high, xi_high) = sorted([(f1, xi1), (f2, xi2)])
+        w1 = 2.0 * math.pi * f_low
+        w2 = 2.0 * math.pi * f_high
+        mass = w2 * xi_low - w1 * xi_high
+        stiffness = w2 * xi_high - w1 * xi_low
+        round_off = ROUND_OFF * (w1 + w2) * (xi_low + xi_high)
         if min(mass, stiffness) < -round_off:
             raise InputError(
                 f"Rayleigh.from_frequencies: ratios {xi1!r} at {f1!r} Hz and {xi2!r} at {f2!r} Hz "
@@ -288,11 +305,9 @@ class Rayleigh:
 
     @checked
     def ratio(self, f: Annotated[float, Positive, Unit("Hz"), "the frequency f"]) -> float:
-        """Return the damping ratio of a mode of frequency f = w / 2 pi.
+        """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi.
 
-        It is alpha / (2 w) + beta w / 2.
-
-        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
+        It is smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
         """
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)
@@ -309,9 +324,12 @@ class DampingRatio:
         C = alpha M + beta K,    w = 2 pi f
         alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2)
 
-    ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies
-    the ratio is less than xi between them and more outside, and alpha M also resists rigid rocking
-    (see ``Rayleigh``).
+    With two frequencies the ratio is less than xi between them and more outside, and alpha M also
+    resists rigid rocking (see ``Rayleigh``).
+
+    Attributes:
+        frequency: f1 [Hz].
+        second: f2 [Hz], or zero for damping of the stiffness alone, xi f/f1 at f.
     """
 
     frequency: Annotated[float, Positive, Unit("Hz"), "frequency"]
@@ -321,17 +339,16 @@ class DampingRatio:
         check_fields(self)
 
     def coefficients(self, material: LinearElastic) -> tuple[Any, Any]:
-        """Return (alpha [1/s], beta [s]), of values at points where xi is."""
-        w1, w2 = 2.0 * math.pi * self.frequency, 2.0 * math.pi * self.second
+        """Return (alpha [1/s], beta [s]); values at points where xi has such."""
+        w1 = 2.0 * math.pi * self.frequency
+        w2 = 2.0 * math.pi * self.second
         beta = 2.0 / (w1 + w2) * material.xi
         return w1 * w2 * beta, beta
 
 
 @dataclass(frozen=True)
 class KelvinVoigt:
-    """Damp by sigma_v = bulk tr(eps') I + 2 shear dev(eps').
-
-    The viscosities are shear and bulk.
+    """Damp by the viscous stress sigma_v = bulk tr(eps') I + 2 shear dev(eps').
 
         C = ∫ sigma_v(v):eps(w) = ∫ (bulk - 2/3 shear) tr(eps(v)) tr(eps(w)) + 2 shear eps(v):eps(w)
 
@@ -341,6 +358,10 @@ class KelvinVoigt:
     strain across the panel would have a motion of its own (``assemble`` refuses it). With
     viscosities beta times the shear and bulk moduli, mu and lambda + 2/3 mu, it is Rayleigh(0,
     beta), the solid of one retardation time, which goes with PlaneStress too.
+
+    Attributes:
+        shear: shear viscosity [Pa s].
+        bulk: bulk viscosity [Pa s].
     """
 
     shear: Annotated[float, NotNegative, Unit("Pa·s")]

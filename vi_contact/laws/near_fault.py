@@ -25,9 +25,14 @@ class NearFaultPulse:
     begins and ends, the bell and its slope are zero. The velocity returns to zero; the displacement
     does so where cos(phase) sin(pi cycles) is zero.
 
-    velocity: the height of the bell, which the peak comes close to; frequency: that of the cosine;
-    cycles: how many of its periods the pulse lasts, the gamma of the source, where it lies between
-    1 and 3 for most records; phase: 0 is a pulse that is even in time, pi/2 an odd one.
+    Attributes:
+        velocity: the height of the bell [m/s], which the peak comes close to.
+        frequency: of the cosine [Hz].
+        cycles: how many of its periods the pulse lasts, the gamma of the source, where it lies
+            between 1 and 3 for most records.
+        phase: of the cosine [rad]; 0 is a pulse that is even in time, pi/2 an odd one.
+        start: when the pulse begins [s].
+        direction: (d,) along which the ground moves.
     """
 
     velocity: Annotated[float, Finite, Unit("m/s")]

@@ -1,7 +1,4 @@
-"""Describe orthotropic elasticity along three material axes at right angles.
-
-It has nine engineering constants.
-"""
+"""Describe orthotropic elasticity along three material axes by nine engineering constants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,9 +14,9 @@ from ..core.errors import InputError
 from ..core.quantities import RATIO, Finite, Positive, Unit
 from .materials import DampedBy, PlaneStress, Section
 
-NORMAL, SHEAR = ("1", "2", "3"), ("12", "13", "23")
 DEFINITE = 1e-12  # the least eigenvalue of the scaled compliance, whose diagonal is one
-ROUND_OFF = 1e-12
+ORTHOGONAL = 1e-9  # entries of QᵀQ - 1 of a rotation Q
+OUT_OF_PLANE = 1e-12  # of the largest stiffness: shear across the plane that is round-off
 VOIGT = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
 """Components of a symmetric tensor as a vector, by dimension; of strains 2 eps_ij where i != j."""
 
@@ -65,8 +62,11 @@ class Orthotropic:
     xi: DampedBy = 0.0
 
     def __post_init__(self) -> None:
-        _ = self._rotation
+        _ = self._rotation  # checks the axes
         check_fields(self)
+
+        # Every strain has positive energy when the compliance, scaled to a diagonal of one, has
+        # positive eigenvalues.
         root = np.sqrt([self.E1, self.E2, self.E3])
         if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
             raise InputError(
@@ -75,7 +75,7 @@ class Orthotropic:
                 "nu_ij well below sqrt(E_i / E_j)"
             )
         Q = self._rotation
-        if not np.allclose(Q.T @ Q, np.eye(3), atol=1e-9) or np.linalg.det(Q) < 0.0:
+        if not np.allclose(Q.T @ Q, np.eye(3), atol=ORTHOGONAL) or np.linalg.det(Q) < 0.0:
             raise InputError(
                 "Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose "
                 "columns are right-handed unit vectors at right angles"
@@ -84,39 +84,51 @@ class Orthotropic:
     @property
     def _compliance(self) -> Array:
         """Return (3, 3) strains along the axes under unit stresses along them [1/Pa]."""
-        a, b, c = -self.nu12 / self.E1, -self.nu13 / self.E1, -self.nu23 / self.E2
-        return np.array([[1.0 / self.E1, a, b], [a, 1.0 / self.E2, c], [b, c, 1.0 / self.E3]])
+        s12 = -self.nu12 / self.E1
+        s13 = -self.nu13 / self.E1
+        s23 = -self.nu23 / self.E2
+        return np.array(
+            [[1.0 / self.E1, s12, s13], [s12, 1.0 / self.E2, s23], [s13, s23, 1.0 / self.E3]]
+        )
 
     @property
     def _rotation(self) -> Array:
         """Return Q (3, 3), whose columns are the material axes."""
         if np.ndim(self.axes):
             return array("Orthotropic", "axes", self.axes, (3, 3))
-        c, s = (
-            f(number("Orthotropic", "the angle [rad] of the axes", self.axes))
-            for f in (np.cos, np.sin)
-        )
+        angle = number("Orthotropic", "the angle [rad] of the axes", self.axes)
+        c = np.cos(angle)
+        s = np.sin(angle)
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
     @property
     def stiffness(self) -> Array:
         """Return C (3, 3, 3, 3) [Pa] of sigma_ij = C_ijkl eps_kl along x, y, z."""
+        # Along the material axes: C_iijj from the moduli and ratios, C_ijij = G_ij.
         C = np.zeros((3, 3, 3, 3))
         for (i, j), value in np.ndenumerate(np.linalg.inv(self._compliance)):
             C[i, i, j, j] = value
-        for (i, j), G in zip(((0, 1), (0, 2), (1, 2)), (self.G12, self.G13, self.G23), strict=True):
-            for p, q in product(((i, j), (j, i)), repeat=2):
-                C[p + q] = G
+        shear_moduli = {(0, 1): self.G12, (0, 2): self.G13, (1, 2): self.G23}
+        for (i, j), G in shear_moduli.items():
+            for first, second in product(((i, j), (j, i)), repeat=2):
+                C[first + second] = G
+
+        # Turned to x, y, z.
         Q = self._rotation
         return np.einsum("ip,jq,kr,ls,pqrs->ijkl", Q, Q, Q, Q, C, optimize=True)
 
     def matrix(self, section: Section, dimension: int) -> Array:
-        """Return the stresses of unit strains [Pa].
+        """Return the stresses of unit strains [Pa], in the order of ``VOIGT``.
 
-        The rows are in the order of ``VOIGT``, in the plane then sigma_zz.
+        Args:
+            section: how the body is cut out of space.
+            dimension: 2 or 3.
 
-        (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and
-        on a line.
+        Returns:
+            (4, 3) in the plane, where the last row is sigma_zz, (6, 6) in space.
+
+        Raises:
+            InputError: material axes that leave the plane, and a body on a line.
         """
         if dimension not in VOIGT:
             raise InputError(
@@ -124,14 +136,15 @@ class Orthotropic:
             )
         C = self.stiffness
         if dimension == 2:
-            # shear across the plane by strains in it
-            out = np.abs(C[:, :, :2, 2])[[0, 1, 0, 2], [0, 1, 1, 2]]
-            if out.max() > ROUND_OFF * C.max():
+            # Stresses in the plane and sigma_zz, under shear strains across the plane.
+            across = np.abs(C[:, :, :2, 2])[[0, 1, 0, 2], [0, 1, 1, 2]]
+            if across.max() > OUT_OF_PLANE * C.max():
                 raise InputError(
                     "Orthotropic: z is not one of the material axes, so the body would leave its "
                     "plane; give the angle of axis 1 in the plane"
                 )
             if isinstance(section, PlaneStress):
+                # Strain across the plane is eliminated, where the stress is zero.
                 C = C - np.einsum("ij,kl->ijkl", C[:, :, 2, 2], C[2, 2]) / C[2, 2, 2, 2]
         rows = VOIGT[dimension] if dimension == 3 else (*VOIGT[2], (2, 2))
         return np.array([[C[row + column] for column in VOIGT[dimension]] for row in rows])

@@ -13,7 +13,7 @@ from ..core.errors import InputError
 from ..core.quantities import RATIO, Finite, Remedy, Unit
 from ..core.system import SemiDiscreteSystem
 from ..core.units import STANDARD_GRAVITY
-from .free_motions import bodies_in
+from .free_motions import count_bodies
 
 NOTHING = 1e-9  # of the largest weight of an unknown
 ALIKE = 0.05  # of a weight: what 9.81 for 9.80665, or a rounded unit weight, is off
@@ -32,29 +32,37 @@ def with_weight(
 ) -> SemiDiscreteSystem:
     """Return the same system under its own weight, f + M r g: whatever its materials and densities.
 
-    acceleration: g; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by
-    default, in one dimension (-1,). bodies: the numbers of those that have weight
-    (``fem.bodies_of``), all by default. It is the load of ``BodyForce`` with the density of every
-    material. InputError for a direction of another length, and a system without ``base_inertia``:
-    it lost the mass at held nodes; for weight that no unknown feels; and for weight that the system
-    has already, as a constant load of nearly its size: of ``BodyForce``, or of this function.
-    Collective.
+    It is the load of ``BodyForce`` with the density of every material. Collective.
+
+    Args:
+        system: the system.
+        acceleration: g [m/s²].
+        direction: (d,) where it acts, of length one; None for (0, -1) or (0, 0, -1), in one
+            dimension (-1,).
+        bodies: the numbers of those that have weight (``fem.bodies_of``); None for all.
+
+    Raises:
+        InputError: a direction of another length; a system without ``base_inertia``, which lost the
+            mass at held nodes; weight that no unknown feels; weight that the system has already, as
+            a constant load of nearly its size: of ``BodyForce``, or of this function.
     """
+    owner = "with_weight"
     d = system.influence.shape[1]
-    down = (*(0.0,) * (d - 1), -1.0)
-    way = array("with_weight", "direction", down if direction is None else direction, (None,))
-    if way.shape != (d,) or not np.isclose(np.linalg.norm(way), 1.0):
+    if direction is None:
+        direction = (*[0.0] * (d - 1), -1.0)
+    down = array(owner, "direction", direction, (None,))
+    if down.shape != (d,) or not np.isclose(np.linalg.norm(down), 1.0):
         raise InputError(
-            f"the direction of gravity is {tuple(way)}: give {d} components of a vector of length "
+            f"the direction of gravity is {tuple(down)}: give {d} components of a vector of length "
             "one"
         )
     if system.base_mass is None:
         raise InputError("the weight needs the mass at held nodes: assemble with base_inertia=True")
-    weight = system.inertia(acceleration * way)
+    weight = system.inertia(acceleration * down)
     if bodies is not None:
         numbers = np.asarray(system.space.bodies)
-        last = bodies_in(system.algebra.comm, numbers) - 1
-        heavy = [whole("with_weight", "the number of a body", one, most=last) for one in bodies]
+        last = count_bodies(system.algebra.comm, numbers) - 1
+        heavy = [whole(owner, "the number of a body", number, most=last) for number in bodies]
         weight = np.where(np.isin(numbers, heavy), weight, 0.0)
     if bodies is None or len(bodies):
         _refuse_vain(system, weight)
@@ -62,9 +70,9 @@ def with_weight(
 
 
 def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
-    """Raise InputError, on all ranks, for weight that is given in vain.
+    """Raise InputError, on all ranks, for weight (n,) [N] that is given in vain.
 
-    Nothing feels it, or the constant loads hold it already.
+    Nothing feels it, or it is among the constant loads already.
     """
     comm = system.algebra.comm
     size = largest(comm, max_abs(weight))
@@ -78,11 +86,13 @@ def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
     numbers = np.asarray(system.space.bodies)
     heavy = np.abs(weight) > NOTHING * size
     alike = heavy & (np.abs(system.load.constant - weight) <= ALIKE * np.abs(weight))
-    count = bodies_in(comm, numbers)
-    having, doubled = comm.sum(
-        np.array([np.bincount(numbers[one], minlength=count) for one in (heavy, alike)], float)
-    )
-    if np.any((doubled > 0.0) & (doubled >= SHARE * having)):
+    count = count_bodies(comm, numbers)
+    counts = [
+        np.bincount(numbers[heavy], minlength=count),
+        np.bincount(numbers[alike], minlength=count),
+    ]
+    with_weight_here, with_it_already = comm.sum(np.array(counts, float))
+    if np.any((with_it_already > 0.0) & (with_it_already >= SHARE * with_weight_here)):
         raise InputError(
             "with_weight: the system has this weight already among its constant loads, as a "
             "BodyForce or from an earlier with_weight, and would weigh twice as much; leave one of "

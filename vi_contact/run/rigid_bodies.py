@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array, Matrix, total
 from ..core.problem import ContactProblem
-from ..laws.free_motions import bodies_in, free_motions
+from ..laws.free_motions import count_bodies, free_motions
 
 WEAK = 4e-6  # of a stiffness: see body_springs
 STRONG = 1e-4  # the same
@@ -78,7 +78,7 @@ def body_springs(problem: ContactProblem) -> Matrix:
     surface = problem.surface
     algebra = system.algebra
     numbers = np.asarray(system.space.bodies)
-    count = bodies_in(algebra.comm, numbers)
+    count = count_bodies(algebra.comm, numbers)
 
     # The mass of every body, rᵀMr along each axis, and its largest K_ii.
     d = system.influence.shape[1]
