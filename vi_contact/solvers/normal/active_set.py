@@ -1,6 +1,4 @@
-"""Solve dense contact problems by the primal-dual active-set method.
-
-It has a finite fallback, and is the default.
+"""Solve dense contact problems by the primal-dual active-set method: the default.
 
 Guess which rows are active, solve  G_aa r_a = -q_a  with r = 0 elsewhere, move every row with the
 wrong sign (r < 0 in the set, w < 0 out of it) to the other side, repeat until no sign is wrong:
@@ -33,18 +31,21 @@ from ...kernels.exchanges import Exchanges
 from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
-KEPT = 2**22  # numbers in the factors of sets, of 16 sets at most
+KEPT = 2**22  # numbers in the factors of sets that are remembered
+MOST_KEPT = 16  # sets
 PATIENCE = 10  # Júdice and Pires, Comput. Oper. Res. 21, 1994
 
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Hold the settings.
+    """Hold the settings of the active-set method.
 
-    ``max_iterations``: set changes allowed; ``tolerance``: residual above which it refuses.
+    In the result ``iterations`` counts changes of the set (0: the guess was right), and ``history``
+    the rows moved in each.
 
-    In the result ``iterations`` counts changes of the set (0: the guess was right), ``history`` the
-    rows moved in each.
+    Attributes:
+        tolerance: the residual above which it refuses.
+        max_iterations: number of changes of the set, at most.
     """
 
     tolerance: Annotated[float, Positive] = 1e-9
@@ -54,10 +55,17 @@ class ActiveSet:
         check_fields(self)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
-        """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.
+        """Check and factor G once for many right-hand sides.
 
         The factors of the last sets are remembered: a step on the same set costs triangular solves
         only.
+
+        Args:
+            G: the Delassus operator (m, m).
+            bilateral: (m,) which rows are bilateral.
+
+        Raises:
+            InputError: G is not symmetric and positive definite.
         """
         scaled = scaled_dense(G, bilateral)
         cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
@@ -65,15 +73,13 @@ class ActiveSet:
 
 
 class PreparedSets(PreparedLCP):
-    """Solve problem (1) of one G, or several at once.
-
-    Compiled exchanges come first where rows are few.
-    """
+    """Solve problem (1) of one G, or several at once, by compiled exchanges where rows are few."""
 
     @cached_property
     def _exchanges(self) -> Exchanges | None:
         """Return the compiled exchanges; None where rows are many, or there is no compiler."""
-        scaled, method = self.scaled, cast(ActiveSet, self.method)
+        scaled = self.scaled
+        method = cast(ActiveSet, self.method)
         loops = load_loops(SerialComm()) if scaled.bilateral.size <= FEW else None
         if loops is None:
             return None
@@ -87,29 +93,41 @@ class PreparedSets(PreparedLCP):
             most=min(PATIENCE, method.max_iterations),
         )
 
-    def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
+    def _solve(self, q: Array, guess: Array | Mask | None) -> LCPResult:
+        """Solve by compiled exchanges, and where these end without an answer by the search."""
         fits = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
         if fits and self._exchanges is not None:
             closed = q < 0.0 if guess is None else guess > 0
             answer = self._exchanges.solve(q, closed)
-            count = int(answer.changes[0])
-            if count >= 0:
-                history = tuple(answer.moved[0, :count].tolist())
-                residual = float(answer.residual[0])
+            changes = int(answer.changes[0])
+            if changes >= 0:
                 return LCPResult(
-                    answer.r[0], answer.active[0], count, residual, self.method, history
+                    r=answer.r[0],
+                    active=answer.active[0],
+                    iterations=changes,
+                    residual=float(answer.residual[0]),
+                    method=self.method,
+                    history=tuple(answer.moved[0, :changes].tolist()),
                 )
-        return super()._solved(q, guess)
+        return super()._solve(q, guess)
 
     def solve_many(
         self, q: Array, guess: Mask
     ) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
-        """Return r and active of several q, all (k, m), the iterations, and the errors.
+        """Solve several problems.
 
-        The errors are what those raise that have no answer.
+        Args:
+            q: (k, m) gaps without reactions.
+            guess: (k, m) sets to start from.
+
+        Returns:
+            r and active, both (k, m), the iterations of each row, and the errors of rows that have
+            no answer, by their numbers.
         """
         if self._exchanges is None:
-            r, active, changes = np.zeros(q.shape), np.zeros(q.shape, bool), np.full(len(q), -1)
+            r = np.zeros(q.shape)
+            active = np.zeros(q.shape, dtype=bool)
+            changes = np.full(len(q), -1)
         else:
             r, active, _, changes, _ = self._exchanges.solve(q, guess)
 
@@ -118,7 +136,7 @@ class PreparedSets(PreparedLCP):
         failed: dict[int, ViContactError] = {}
         for row in np.flatnonzero(changes < 0).tolist():
             try:
-                result = super()._solved(q[row], guess[row])
+                result = super()._solve(q[row], guess[row])
             except ViContactError as error:
                 failed[row] = error
             else:
@@ -129,14 +147,25 @@ class PreparedSets(PreparedLCP):
 
 
 class _Sets:
-    """The sets of one G, with the factors of the last ones."""
+    """Search the sets of one G, with the factors of the last ones."""
 
     def __init__(self, method: ActiveSet, scaled: ScaledLCP) -> None:
-        self.method, self._scaled, self._bilateral = method, scaled, scaled.bilateral
-        self._kept: dict[bytes, _Factor] = {}
+        self.method = method
+        self._scaled = scaled
+        self._bilateral = scaled.bilateral
+        self._factors: dict[bytes, _Factor] = {}
 
     def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
-        """Start from the guess, or the signs of guessed reactions; without one, from gap < 0."""
+        """Search the set without wrong signs.
+
+        Args:
+            gap: (m,) scaled gaps without reactions.
+            guess: (m,) the set to start from, or reactions whose signs give it; None for gap < 0.
+            unit: of the residual.
+
+        Raises:
+            StepFailure: there were too many changes, or the residual is above the tolerance.
+        """
         active = gap < 0.0 if guess is None else (guess > 0) & (gap < np.inf)
         history: list[float] = []
         r, w = self._exchange(active | self._bilateral, gap, history)
@@ -147,25 +176,38 @@ class _Sets:
         elif residual > self.method.tolerance:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
         else:
-            return r, residual, len(history), history
+            return Found(r, residual, len(history), history)
         raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
-        """Return the r and w of the first set without wrong signs.
+        """Exchange all rows with wrong signs, until there are none.
 
-        How many rows each change moved is added to ``history``.
+        Args:
+            active: (m,) the set to start from.
+            gap: (m,) scaled gaps without reactions.
+            history: gets the number of rows that each change moved.
+
+        Returns:
+            r and w of the set, or of the last one, where changes were too many.
         """
         seen: set[bytes] = set()
-        fewest, patience = gap.size + 1, PATIENCE
+        fewest = gap.size + 1
+        patience = PATIENCE
         while True:
             r, w = self._on_set(active, gap)
             wrong = self._wrong(active, r, w)
             count = np.count_nonzero(wrong)
             if count == 0:
                 return self._cut(r, w, gap)
-            fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
+
+            # A set that returns, or wrong signs that grow no fewer, say that it may never end.
+            if count < fewest:
+                fewest = count
+                patience = PATIENCE
+            else:
+                patience -= 1
             if patience == 0 or active.tobytes() in seen:
-                return self._descend(self._positive(r), gap, history)
+                return self._descend(self._project(r), gap, history)
             seen.add(active.tobytes())
             history.append(float(count))
             if len(history) > self.method.max_iterations:
@@ -173,17 +215,28 @@ class _Sets:
             active = active ^ wrong
 
     def _descend(self, r: Array, gap: Array, history: list[float]) -> tuple[Array, Array]:
-        """Lawson–Hanson from an admissible r; adds to ``history``."""
+        """Go down from an admissible r by the method of Lawson and Hanson.
+
+        Args:
+            r: (m,) r >= 0 in unilateral rows.
+            gap: (m,) scaled gaps without reactions.
+            history: gets the number of rows that each change moved.
+
+        Returns:
+            r and w of the set, or of the last one, where changes were too many.
+        """
         active = (r > 0.0) | self._bilateral
         while True:
             target, w = self._on_set(active, gap)
             leaving = active & ~self._bilateral & (target < 0.0)
-            if leaving.any():  # go only as far as the first reaction that vanishes
+            if leaving.any():
+                # On the way to the minimum on the set reactions vanish: go as far as the first.
                 share = np.full(r.size, np.inf)
                 share[leaving] = r[leaving] / (r[leaving] - target[leaving])
                 change: Mask = share == share.min()
-                r = self._positive(np.where(change, 0.0, r + share.min() * (target - r)))
+                r = self._project(np.where(change, 0.0, r + share.min() * (target - r)))
             else:
+                # The minimum on the set is reached: admit the row with the worst gap.
                 r = target
                 if not self._wrong(active, r, w).any():
                     return r, w
@@ -194,37 +247,46 @@ class _Sets:
             active = active ^ change
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
+        """Return r and w with w = 0 on the set and r = 0 off it."""
         key = active.tobytes()
-        factor = self._kept.pop(key) if key in self._kept else _Factor(active, self._scaled.matrix)
-        self._kept[key] = factor  # now the last
-        if len(self._kept) > min(max(KEPT // (1 + active.size**2), 1), 16):
-            del self._kept[next(iter(self._kept))]
+        factor = self._factors.pop(key, None)
+        if factor is None:
+            factor = _Factor(active, self._scaled.matrix)
+        self._factors[key] = factor  # now the last
+        most = min(max(KEPT // (1 + active.size**2), 1), MOST_KEPT)
+        if len(self._factors) > most:
+            del self._factors[next(iter(self._factors))]
         return factor.solve(gap)
 
     def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
-        """Return the rows whose sign is wrong by more than rounding.
+        """Return the rows (m,) whose sign is wrong by more than rounding.
 
-        Grazing rows (r = w = 0) fit either side.
+        Grazing rows (r = w = 0) are right on either side.
+
+        Args:
+            active: (m,) the set.
+            r: (m,) reactions on the set.
+            w: (m,) gaps off it.
         """
         wrong = np.where(active, r, w) < -self._scaled.rounding(r)
         return wrong if self._scaled.unilateral else wrong & ~self._bilateral
 
-    def _positive(self, r: Array) -> Array:
+    def _project(self, r: Array) -> Array:
+        """Return r with zero for what is negative in unilateral rows."""
         return np.where(self._bilateral, r, np.maximum(r, 0.0))
 
     def _cut(self, r: Array, w: Array, gap: Array) -> tuple[Array, Array]:
         """Cut reactions that are negative by rounding, so that r >= 0 holds exactly."""
         if lowest(r) <= 0.0:
             return r, w
-        cut = self._positive(r)
-        return (cut, gap + self._scaled.matrix @ cut) if (cut != r).any() else (r, w)
+        cut = self._project(r)
+        if not (cut != r).any():
+            return r, w
+        return cut, gap + self._scaled.matrix @ cut
 
 
 class _Factor:
-    """Hold the Cholesky factor of G_aa of one set.
-
-    The rows of G that carry its reactions to all gaps are held too.
-    """
+    """Hold the Cholesky factor of G_aa of one set, and the rows of G that carry r to all gaps."""
 
     def __init__(self, active: Mask, matrix: Array) -> None:
         self._index = active.nonzero()[0]

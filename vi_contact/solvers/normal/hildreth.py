@@ -1,6 +1,4 @@
-"""Solve the quadratic program of eq.
-
-49 of the boundary method row after row, to convergence: Hildreth and d'Esopo.
+"""Solve the quadratic program of the boundary method row after row: Hildreth and d'Esopo.
 
 Primal (eqs. 46, 49 there; D = G⁻¹):   v_i <- min(bound_i, v_i + (z - D v)_i / D_ii)
 Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
@@ -25,12 +23,17 @@ from .lcp import EPS, Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_d
 
 @dataclass(frozen=True)
 class Hildreth:
-    """Hold the settings. ``primal``: sweep over displacements (eq. 49) or over reactions (eq. 42).
+    """Hold the settings of the sweeps.
 
-    Ends when the largest change of a sweep, relative to the largest unknown, and the residual are
-    below ``tolerance`` (or at rounding level). In the result ``iterations`` counts sweeps; with
-    ``record``, ``history`` holds the objective [J] after each: ½ sᵀD s or ½ rᵀG r + qᵀr, whose
-    minima differ in sign only.
+    In the result ``iterations`` counts sweeps.
+
+    Attributes:
+        primal: True to sweep over displacements (eq. 49), False over reactions (eq. 42).
+        tolerance: it ends when the largest change of a sweep, relative to the largest unknown, and
+            the residual are below this, or at rounding level.
+        max_sweeps: number of sweeps, at most.
+        record: whether ``history`` of the result holds the objective [J] after each sweep: ½ sᵀD s
+            or ½ rᵀG r + qᵀr, whose minima differ in sign only.
     """
 
     primal: bool = True
@@ -42,29 +45,54 @@ class Hildreth:
         check_fields(self)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
-        """Check G (m, m), and invert it for the primal form. InputError when it is not SPD."""
+        """Check G, and invert it for the primal form.
+
+        Args:
+            G: the Delassus operator (m, m).
+            bilateral: (m,) which rows are bilateral.
+
+        Raises:
+            InputError: G is not symmetric and positive definite.
+        """
         scaled = scaled_dense(G, bilateral)
         return PreparedLCP(self, scaled, _Sweeps(self, scaled).search)
 
 
 class _Sweeps:
-    """Hold the sweeps for one G.
+    """Sweep for one G.
 
-    They solve min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or x = r.
+    The sweeps solve min ½ xᵀHx + cᵀx over x >= lower, with H scaled to unit diagonal, for x = s or
+    x = r.
     """
 
     def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
-        self.method, self._scaled, bilateral = method, scaled, scaled.bilateral
+        """Form H: the scaled G, or in the primal form its inverse, scaled once more."""
+        self.method = method
+        self._scaled = scaled
         factor = cholesky(scaled.matrix)
-        self._H, self._unit = (
-            _inverse(factor) if method.primal else (scaled.matrix, np.ones(bilateral.size))
-        )
-        fixed = bilateral & method.primal  # s = -q there; in the dual form r is free there
-        self._rows = [(i, self._H[i]) for i in np.flatnonzero(~fixed).tolist()]
+        bilateral = scaled.bilateral
+        if method.primal:
+            self._H, self._unit = _inverse(factor)
+            swept = np.flatnonzero(~bilateral)  # in bilateral rows s = -q
+        else:
+            self._H = scaled.matrix
+            self._unit = np.ones(bilateral.size)
+            swept = np.arange(bilateral.size)
+        self._rows = [(i, self._H[i]) for i in swept.tolist()]
 
     def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
-        """Sweep from the guess; without one, from zero."""
-        scaled, method = self._scaled, self.method
+        """Sweep until the answer is found.
+
+        Args:
+            gap: (m,) scaled gaps without reactions.
+            guess: (m,) reactions or set to start from; None for zero.
+            unit: of the residual.
+
+        Raises:
+            StepFailure: sweeps were too many.
+        """
+        scaled = self._scaled
+        method = self.method
         lower = self._lower(gap)
         x = self._start(gap, lower, guess)
         gradient = self._gradient(x, gap)
@@ -73,29 +101,36 @@ class _Sweeps:
             change = sweep(self._rows, x, lower, gradient)
             if method.record:
                 history.append(self._objective(x, gap))
-            if (
-                change > method.tolerance * max(abs(value) for value in x)
-                and sweeps < method.max_sweeps
-            ):
+            x_max = max(abs(value) for value in x)
+            if change > method.tolerance * x_max and sweeps < method.max_sweeps:
                 continue
-            # afresh: the updates of a sweep accumulate rounding errors
+
+            # x has settled: judge it by its residual. The gradient is formed afresh, as the updates
+            # of a sweep accumulate rounding errors.
             gradient = self._gradient(x, gap)
             r = self._reaction(np.array(x), np.array(lower), gradient)
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
-                return r, error / unit, sweeps, history
+                return Found(r, error / unit, sweeps, history)
         advice = "the contacts are strongly coupled: use ActiveSet, or the other form of Hildreth"
         raise failure(method, iterations=method.max_sweeps, residual=error / unit, advice=advice)
 
     def _lower(self, gap: Array) -> list[float]:
-        lower = (
-            -gap / self._unit
-            if self.method.primal
-            else np.where(self._scaled.bilateral, -np.inf, 0.0)
-        )
+        """Return the lower bounds of x: -q of s, or 0 of r, in unilateral rows."""
+        if self.method.primal:
+            lower = -gap / self._unit
+        else:
+            lower = np.where(self._scaled.bilateral, -np.inf, 0.0)
         return list(lower.tolist())
 
     def _start(self, gap: Array, lower: list[float], guess: Array | Mask | None) -> list[float]:
+        """Return x to start from.
+
+        Args:
+            gap: (m,) scaled gaps without reactions.
+            lower: (m,) bounds of x.
+            guess: (m,) reactions or set; None for zero.
+        """
         r = self._scaled.reaction(guess, gap)
         if not self.method.primal:
             return list(r.tolist())
@@ -103,13 +138,19 @@ class _Sweeps:
         return list(np.where(self._scaled.bilateral, lower, s).tolist())
 
     def _gradient(self, x: list[float], gap: Array) -> Array:
+        """Return H x + c (m,)."""
         image: Array = self._H @ np.array(x)
         return image if self.method.primal else gap + image
 
     def _reaction(self, x: Array, lower: Array, gradient: Array) -> Array:
-        """Return the scaled r.
+        """Return the scaled r (m,).
 
         It is x itself, or r = D s where s is at its bound (elsewhere r = 0 by complementarity).
+
+        Args:
+            x: (m,).
+            lower: (m,) its bounds.
+            gradient: (m,) at x.
         """
         if not self.method.primal:
             return x
@@ -117,15 +158,18 @@ class _Sweeps:
         return np.where(self._scaled.bilateral, r, np.where(x == lower, np.maximum(r, 0.0), 0.0))
 
     def _objective(self, x: list[float], gap: Array) -> float:
-        at = np.array(x)
-        # q = inf where r = 0
-        linear = 0.0 if self.method.primal else float(at[at != 0.0] @ gap[at != 0.0])
-        return 0.5 * float(at @ (self._H @ at)) + linear
+        """Return ½ xᵀHx + cᵀx."""
+        values = np.array(x)
+        quadratic = 0.5 * float(values @ (self._H @ values))
+        if self.method.primal:
+            return quadratic
+        carried = values != 0.0  # elsewhere q may be infinite
+        return quadratic + float(values[carried] @ gap[carried])
 
     def _rounding(self, x: list[float], r: Array) -> float:
-        """Return the gaps that the form in use cannot tell from zero.
+        """Return the gap that the form in use cannot tell from zero.
 
-        w = q + G D s has passed through both G and D.
+        In the primal form w = q + G D s has passed through both G and D.
         """
         if not self.method.primal:
             return self._scaled.rounding(r)
@@ -136,11 +180,18 @@ class _Sweeps:
 def sweep(
     rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array
 ) -> float:
-    """Sweep once over ``rows`` (index, row of H with unit diagonal), in place.
+    """Sweep once, in place.
 
-    Returned is the largest |change|.
+    The gradient is kept up to date by columns, so that rows at rest cost a comparison.
 
-    Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison.
+    Args:
+        rows: index and row of H, whose diagonal is one.
+        x: the unknowns.
+        lower: their bounds.
+        gradient: H x + c.
+
+    Returns:
+        The largest |change| of an unknown.
     """
     largest_change = 0.0
     for i, row in rows:
@@ -154,8 +205,8 @@ def sweep(
 
 
 def _inverse(factor: Array) -> tuple[Array, Array]:
-    """D = G⁻¹ scaled to unit diagonal, e D e, and e = D_ii^(-1/2)."""
-    inverse = lapack.dpotri(factor, lower=1)[0] if factor.size else factor
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    """Return D = G⁻¹ scaled to unit diagonal, e D e, and e = D_ii^(-1/2)."""
+    triangle = lapack.dpotri(factor, lower=1)[0] if factor.size else factor
+    inverse = np.tril(triangle) + np.tril(triangle, -1).T
     e = np.diagonal(inverse) ** -0.5
     return np.ascontiguousarray(e[:, None] * inverse * e), e

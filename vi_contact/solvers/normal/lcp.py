@@ -1,6 +1,4 @@
-"""Pose the linear complementarity problem of one contact step.
-
-Its residual, and the scaling all its methods share, are here.
+"""Pose the linear complementarity problem of one contact step, with the scaling of all methods.
 
     w = q + G r
     unilateral rows: 0 <= r  perpendicular to  w >= 0;    bilateral rows: w = 0, r free         (1)
@@ -22,6 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,21 +30,30 @@ from ...core.algebra import Array, Mask, lowest, max_abs
 from ...core.errors import InputError, StepFailure
 
 EPS = float(np.finfo(float).eps)
-# scaled r, residual over the unit, iterations, history
-Found = tuple[Array, float, int, Sequence[float]]
+SYMMETRIC = 1e-8  # entries of the scaled G that differ by less are equal
+
+
+class Found(NamedTuple):
+    """Hold the answer of a method, in scaled numbers."""
+
+    r: Array  # (m,)
+    residual: float  # over the unit
+    iterations: int
+    history: Sequence[float]
 
 
 @dataclass(frozen=True)
 class LCPResult:
-    """Answer problem (1), within the tolerance of the method.
+    """Answer problem (1), within the tolerance of the method or the limit that rounding sets.
 
-    The limit that rounding sets serves too; else there is a StepFailure.
-
-    ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral,
-    where a grazing row (r = w = 0 but for rounding) may be either; ``residual``: max |min(r_i/d_i,
-    w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows, over the unit: 1 is what r = 0
-    scores, 0 is exact, in all units of G and q; ``method`` the settings that made it. Each method
-    tells what ``iterations`` and ``history`` count.
+    Attributes:
+        r: (m,) with r >= 0 exactly in unilateral rows.
+        active: (m,) r > 0, or bilateral; a grazing row (r = w = 0 but for rounding) may be either.
+        iterations: each method tells what it counts.
+        residual: max |min(r_i/d_i, w_i d_i)| over unilateral and max |w_i d_i| over bilateral rows,
+            over the unit: 1 is what r = 0 scores, 0 is exact, in all units of G and q.
+        method: the settings that made it.
+        history: each method tells what it holds.
     """
 
     r: Array
@@ -61,32 +69,41 @@ class ScaledLCP:
     """Hold d G d with its scale d: what the methods work on.
 
     Everything here is in sqrt(J) or dimensionless.
+
+    Attributes:
+        scale: (m,) d.
+        matrix: (m, m) d G d.
+        norm: of the matrix: bounds the growth of rounding errors.
+        bilateral: (m,) which rows are.
     """
 
     scale: Array
     matrix: Array
-    norm: float  # of the matrix: bounds the growth of rounding errors
+    norm: float
     bilateral: Mask
 
     def reaction(self, guess: Array | Mask | None, q: Array) -> Array:
-        """Return a start for iterative methods.
+        """Return a start (m,) for iterative methods, scaled.
 
-        It is the guess itself, one Jacobi step on a guessed set, or zero.
+        Args:
+            guess: (m,) reactions [N]; or the contact set, on which one step of Jacobi's method is
+                made; None for zero.
+            q: (m,) scaled gaps without reactions.
+
+        Raises:
+            InputError: guessed reactions are not finite.
         """
         if guess is None:
             return np.zeros(q.size)
-        start = (
-            np.where(guess, np.where(np.isfinite(q), -q, 0.0), 0.0)
-            if guess.dtype == bool
-            else guess / self.scale
-        )
+        in_reach = np.isfinite(q)
+        is_set = guess.dtype == bool
+        start = np.where(guess & in_reach, -q, 0.0) if is_set else guess / self.scale
         if not np.isfinite(start).all():
             raise InputError(
                 "the guessed reactions contain NaN or infinity: give finite numbers or None"
             )
-        return np.where(
-            self.bilateral, start, np.where(np.isfinite(q), np.maximum(start, 0.0), 0.0)
-        )
+        one_sided = np.where(in_reach, np.maximum(start, 0.0), 0.0)
+        return np.where(self.bilateral, start, one_sided)
 
     def rounding(self, r: Array) -> float:
         """Return the gap below which there are rounding errors of q + G r only."""
@@ -102,16 +119,21 @@ class ScaledLCP:
         return lowest(gap) if self.unilateral else self.complementarity(np.zeros(gap.size), gap)
 
     def complementarity(self, r: Array, w: Array) -> float:
-        """Return max |min(r, w)| over unilateral rows, max |w| over bilateral ones."""
-        least = np.minimum(r, w)
-        return max_abs(least if self.unilateral else np.where(self.bilateral, w, least))
+        """Return max |min(r, w)| over unilateral rows, or |w| of bilateral ones if that is more."""
+        wrong = np.minimum(r, w)
+        if not self.unilateral:
+            wrong = np.where(self.bilateral, w, wrong)
+        return max_abs(wrong)
 
 
 @dataclass(frozen=True)
 class PreparedLCP:
     """Solve problem (1) for one G and many q.
 
-    ``search``: (scaled gap, guess, unit of the residual) -> Found.
+    Attributes:
+        method: the settings.
+        scaled: G.
+        search: (scaled gap, guess, unit of the residual) -> the answer.
     """
 
     method: object
@@ -119,16 +141,21 @@ class PreparedLCP:
     search: Callable[[Array, Array | Mask | None, float], Found]
 
     def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
-        """Solve the problem of q (m,) [m].
+        """Solve the problem of q.
 
-        ``guess``: reactions of a similar problem, or their active set.
+        Args:
+            q: (m,) gaps without reactions [m].
+            guess: (m,) reactions of a similar problem [N], or their active set.
 
-        Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf,
-        or +inf in a bilateral row, and for a guess that has not one entry a row.
+        Raises:
+            StepFailure: the method does not reach its tolerance.
+            InputError: q is NaN, -inf, or +inf in a bilateral row, or the guess has not one entry a
+                row.
         """
-        return self._solved(np.asarray(q, float), guess if guess is None else np.asarray(guess))
+        return self._solve(np.asarray(q, float), guess if guess is None else np.asarray(guess))
 
-    def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
+    def _solve(self, q: Array, guess: Array | Mask | None) -> LCPResult:
+        """Check, scale, search, and return what was found in newtons."""
         scaled = self.scaled
         check_gap(q, scaled.bilateral)
         if guess is not None and guess.shape != q.shape:
@@ -137,21 +164,29 @@ class PreparedLCP:
             )
         gap = q * scaled.scale
         unit = scaled.violation(gap)
-        r, residual, iterations, history = (
-            self.search(gap, guess, unit) if unit else (np.zeros(q.size), 0.0, 0, ())
-        )
-        active = (r > 0.0) | scaled.bilateral
+        nothing = Found(np.zeros(q.size), 0.0, 0, ())
+        answer = self.search(gap, guess, unit) if unit else nothing
         return LCPResult(
-            r * scaled.scale, active, iterations, residual, self.method, tuple(history)
+            r=answer.r * scaled.scale,
+            active=(answer.r > 0.0) | scaled.bilateral,
+            iterations=answer.iterations,
+            residual=answer.residual,
+            method=self.method,
+            history=tuple(answer.history),
         )
 
 
 def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
     """Check and scale a dense G.
 
+    Args:
+        G: the Delassus operator (m, m) [m/N].
+        bilateral: (m,) which rows are bilateral.
+        unsymmetric: whether G need not be symmetric, and its diagonal not positive.
+
     Raises:
-        InputError: G is not finite or, unless ``unsymmetric`` allows it, not symmetric (to 1e-8) of
-            positive diagonal.
+        InputError: G is not finite or, unless it need not be, not symmetric (to 1e-8) of positive
+            diagonal.
     """
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
@@ -163,11 +198,16 @@ def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> Sca
 def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
     """Return d G d, exactly symmetric where it is so to 1e-8, and its norm.
 
+    Args:
+        G: (m, m).
+        d: (m,).
+        unsymmetric: whether G need not be symmetric.
+
     Raises:
         InputError: G should be symmetric and is not.
     """
     matrix = np.ascontiguousarray(d[:, None] * G * d)
-    if max_abs(matrix - matrix.T) <= 1e-8:
+    if max_abs(matrix - matrix.T) <= SYMMETRIC:
         matrix = 0.5 * (matrix + matrix.T)
     elif not unsymmetric:
         raise InputError(
@@ -180,7 +220,12 @@ def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arr
 def energy_scale(G: Array, *, signed: bool = False) -> Array:
     """Return d = |G_ii|^(-1/2) (m,).
 
-    InputError where G_ii is not positive, unless it may be: 0 is then as good as the largest entry.
+    Args:
+        G: (m, m).
+        signed: whether G_ii may be zero or negative; for 0 the largest entry is taken.
+
+    Raises:
+        InputError: G is not finite, or G_ii not positive and not signed.
     """
     if not np.isfinite(G).all():
         raise InputError(
@@ -202,7 +247,7 @@ def cholesky(G: Array) -> Array:
     """Return the lower Cholesky factor (LAPACK dpotrf).
 
     Raises:
-        InputError: G is not positive definite; it tells the row.
+        InputError: G is not positive definite; the error tells the row.
     """
     if not G.size:  # LAPACK takes no empty matrix
         return G
@@ -240,7 +285,14 @@ def check_gap(q: Array, bilateral: Mask) -> None:
 
 
 def failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
-    """Return the error of a method that did not reach its tolerance."""
+    """Return the error of a method that did not reach its tolerance.
+
+    Args:
+        method: its settings.
+        iterations: so far.
+        residual: over the unit.
+        advice: what helps.
+    """
     return StepFailure(
         f"{method} stopped after {iterations} iterations with residual {residual:.1e}: {advice}"
     )

@@ -30,17 +30,20 @@ from .lcp import EPS, Found, PreparedLCP, ScaledLCP, failure, scaled_dense
 
 TINY = 1e-11  # of the largest entry of a column: no pivot
 TIED = 1e-13  # ratios that rounding alone may tell apart
+SINGULAR = 0.1 / EPS  # condition number of bilateral rows that depend on each other
 
 
 @dataclass(frozen=True)
 class Lemke:
-    """Hold the settings.
+    """Hold the settings of the pivoting.
 
-    ``tolerance``: residual above which it refuses; ``max_iterations``: pivots allowed.
-
-    In the result ``iterations`` counts pivots (0: the guessed set was right), ``history`` is z
+    In the result ``iterations`` counts pivots (0: the guessed set was right), and ``history`` is z
     after each, over the violation of r = 0. Where (1) has several solutions the guess may choose
     among them.
+
+    Attributes:
+        tolerance: the residual above which it refuses.
+        max_iterations: number of pivots, at most.
     """
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
@@ -51,24 +54,29 @@ class Lemke:
         check_fields(self)
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
-        """Check any square G (m, m) and eliminate its bilateral rows.
+        """Check any square G and eliminate its bilateral rows.
 
-        InputError when those depend on each other.
+        Args:
+            G: the Delassus operator (m, m).
+            bilateral: (m,) which rows are bilateral.
+
+        Raises:
+            InputError: the bilateral rows depend on each other.
         """
         scaled = scaled_dense(G, bilateral, unsymmetric=True)
         return PreparedLCP(self, scaled, _Pivots(self, scaled).search)
 
 
 class _Pivots:
-    """Hold the pivots of one G.
-
-    These are its unilateral rows with bilateral ones eliminated, and what carries the q of those.
-    """
+    """Pivot in one G, whose bilateral rows are eliminated."""
 
     def __init__(self, method: Lemke, scaled: ScaledLCP) -> None:
-        self.method, self._scaled = method, scaled
-        G, b = scaled.matrix, scaled.bilateral
-        if b.any() and np.linalg.cond(G[np.ix_(b, b)]) > 0.1 / EPS:
+        """Eliminate the bilateral rows b: G - G_:b G_bb⁻¹ G_b:."""
+        self.method = method
+        self._scaled = scaled
+        G = scaled.matrix
+        b = scaled.bilateral
+        if b.any() and np.linalg.cond(G[np.ix_(b, b)]) > SINGULAR:
             raise InputError(
                 "bilateral rows of the Delassus operator depend on each other: remove constraints "
                 "that act on the same motion twice"
@@ -77,25 +85,37 @@ class _Pivots:
         self._matrix = G - self._carry @ G[b]
 
     def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
-        """Try the guessed set, or that of guessed reactions; where it is wrong, pivot."""
+        """Try the guessed set, or that of guessed reactions; where it is wrong, pivot.
+
+        Args:
+            gap: (m,) scaled gaps without reactions.
+            guess: (m,) set or reactions; None for gap < 0.
+            unit: of the residual.
+
+        Raises:
+            StepFailure: there is no solution, pivots were too many, or the residual is above the
+                tolerance.
+        """
         history: list[float] = []
         r, residual = self._on_set(gap < 0.0 if guess is None else guess > 0, gap)
-        # huge r round to anything
+        # The rounding of a huge r would allow anything, so that the tolerance has to hold as well.
         if residual > min(self._scaled.rounding(r), self.method.tolerance * unit):
-            r, residual = self._on_set(self._closed(gap, unit, history), gap)
+            r, residual = self._on_set(self._pivot(gap, unit, history), gap)
         if not residual <= self.method.tolerance * unit:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
             raise failure(
                 self.method, iterations=len(history), residual=residual / unit, advice=advice
             )
-        return r, residual / unit, len(history), history
+        return Found(r, residual / unit, len(history), history)
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
         """Return r >= 0 with w = 0 on the set and bilateral rows, and its residual.
 
-        The residual is infinite where that has no one answer.
+        The residual is infinite where there is no such r, or more than one.
         """
-        G, bilateral, r = self._scaled.matrix, self._scaled.bilateral, np.zeros(gap.size)
+        G = self._scaled.matrix
+        bilateral = self._scaled.bilateral
+        r = np.zeros(gap.size)
         closed = np.flatnonzero((active & (gap < np.inf)) | bilateral)
         try:
             r[closed] = np.linalg.solve(G[np.ix_(closed, closed)], -gap[closed])
@@ -104,19 +124,34 @@ class _Pivots:
         r = np.where(bilateral, r, np.maximum(r, 0.0))
         return r, self._scaled.complementarity(r, gap + G @ r)
 
-    def _closed(self, gap: Array, unit: float, history: list[float]) -> Mask:
-        """Return the set of a solution, by pivots; add z after each to ``history``."""
-        bilateral, closed = self._scaled.bilateral, np.zeros(gap.size, dtype=bool)
+    def _pivot(self, gap: Array, unit: float, history: list[float]) -> Mask:
+        """Return the set (m,) of a solution, by pivots.
+
+        Args:
+            gap: (m,) scaled gaps without reactions.
+            unit: of the residual.
+            history: gets z after each pivot.
+        """
+        # The problem of unilateral rows in reach; q is of size one.
+        bilateral = self._scaled.bilateral
+        closed = np.zeros(gap.size, dtype=bool)
         rows = np.flatnonzero(~bilateral & (gap < np.inf))
-        m, q = len(rows), (gap[rows] - self._carry[rows] @ gap[bilateral]) / unit
+        m = len(rows)
+        q = (gap[rows] - self._carry[rows] @ gap[bilateral]) / unit
         if not (q < 0.0).any():
             return closed
-        basis, z = np.arange(m), 2 * m  # numbers of w, then of r, then of z
-        # covers q, and is parallel to none that a model would have
+
+        # Variables are numbered: w from 0, r from m, and z. The basis begins with all w; z enters
+        # in the row of the largest violation.
+        basis = np.arange(m)
+        z = 2 * m
+        # d covers q, and is parallel to none that a model would have.
         d = 1.5 + probe(np.arange(m), 0)
         tableau = np.column_stack([np.eye(m), -self._matrix[np.ix_(rows, rows)], -d, q])
-        row, entering, left = m - 1 - int(np.argmin((q / d)[::-1])), z, -1
-        while left != z:
+        row = m - 1 - int(np.argmin((q / d)[::-1]))
+        entering = z
+        leaving = -1
+        while leaving != z:
             if len(history) == self.method.max_iterations:
                 raise failure(
                     self.method,
@@ -124,35 +159,53 @@ class _Pivots:
                     residual=history[-1],
                     advice="raise max_iterations",
                 )
+            # Pivot: the column of what enters becomes a unit vector.
             tableau[row] /= tableau[row, entering]
             others = np.where(np.arange(m) == row, 0.0, tableau[:, entering])
             tableau -= np.outer(others, tableau[row])
-            left, basis[row] = int(basis[row]), entering
+            leaving = int(basis[row])
+            basis[row] = entering
             history.append(float(tableau[basis == z, -1].sum()))
-            entering = (left + m) % z
-            if left != z:
-                row = _leaving(tableau, basis, entering, len(history))
+
+            # The complement of what left enters next.
+            entering = (leaving + m) % z
+            if leaving != z:
+                row = _leaving_row(tableau, basis, entering, len(history))
         closed[rows[basis[basis >= m] - m]] = True
         return closed
 
 
-def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
+def _leaving_row(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
     """Return the row that is first at zero when a variable enters.
 
-    It is that of z, or of tied rows the lexicographic minimum.
+    Of several it is that of z, or the lexicographic minimum.
+
+    Args:
+        tableau: (m, 2 m + 2).
+        basis: (m,) number of the variable of each row.
+        entering: number of the variable that enters.
+        pivots: so far.
+
+    Raises:
+        StepFailure: no row comes to zero.
     """
-    m, column = len(tableau), tableau[:, entering]
+    m = len(tableau)
+    column = tableau[:, entering]
     rows = np.flatnonzero(column > TINY * max_abs(column))
     if not rows.size:
         raise StepFailure(
             f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is "
             "not copositive-plus; take a smaller time step, a finer mesh, or a symmetric G"
         )
+
+    # Compare by q first, and rows that tie by one column of the inverse of the basis after another.
     for place in (-1, *range(m)):
         ratio = tableau[rows, place] / column[rows]
-        rows = rows[ratio <= ratio.min() + TIED * max(1.0, abs(ratio.min()))]
-        if (basis[rows] == 2 * m).any():
-            return int(rows[basis[rows] == 2 * m][0])
+        least = ratio.min()
+        rows = rows[ratio <= least + TIED * max(1.0, abs(least))]
+        is_z = basis[rows] == 2 * m
+        if is_z.any():
+            return int(rows[is_z][0])
         if len(rows) == 1:
             break
     return int(rows[0])

@@ -20,9 +20,11 @@ NONE = "is no P-matrix, a principal minor is not positive: contact may have no s
 
 @dataclass(frozen=True)
 class PMatrix:
-    """Hold whether a matrix is a P-matrix, and the reason (``sentence``).
+    """Hold whether a matrix is a P-matrix.
 
-    ``holds`` is None where that is not known.
+    Attributes:
+        holds: whether it is; None where that is not known.
+        sentence: what is known, and why.
     """
 
     holds: bool | None
@@ -30,18 +32,24 @@ class PMatrix:
 
 
 def p_matrix(G: Array) -> PMatrix:
-    """Return whether G (m, m) is a P-matrix. InputError unless it is square and finite.
+    """Return whether G (m, m) is a P-matrix.
 
-    One with positive definite symmetric part is. Where that is not, up to 18 rows are tested by the
+    A matrix with positive definite symmetric part is one. Others of up to 18 rows are tested by the
     recursion of Tsatsomeros and Li (BIT 40, 2000): G is one if G_11 > 0, and G without row and
     column 1 and the Schur complement of G_11 are. Bounds of the rounding errors go along: a minor
     within them of zero decides nothing.
+
+    Raises:
+        InputError: G is not square or not finite.
     """
     G = array("p_matrix", "G", G, (None, None))
     check_operator(G, np.zeros(len(G), dtype=bool))
     if not (G.diagonal() > 0.0).all():
         return PMatrix(False, NONE)
-    matrix = energy_scale(G)[:, None] * G * energy_scale(G)
+
+    # The symmetric part, scaled to a diagonal of ones.
+    d = energy_scale(G)
+    matrix = d[:, None] * G * d
     norm = float(np.abs(matrix).sum(axis=1).max(initial=0.0))
     if np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min(initial=1.0) > len(G) * EPS * norm:
         return PMatrix(
@@ -53,18 +61,23 @@ def p_matrix(G: Array) -> PMatrix:
             f"may be a P-matrix or none: its symmetric part is not positive definite, and {len(G)} "
             "rows are too many for all minors",
         )
-    parts, errors, sure = matrix[None], 2.0 * EPS * np.abs(matrix)[None], True
-    while parts.shape[1]:
-        if (parts[:, 0, 0] < -errors[:, 0, 0]).any():
+
+    # All minors: every matrix leaves two smaller ones, itself without its first row and column, and
+    # its Schur complement. Their first entries are quotients of minors.
+    matrices = matrix[None]
+    errors = 2.0 * EPS * np.abs(matrix)[None]
+    is_sure = True
+    while matrices.shape[1]:
+        first = matrices[:, 0, 0]
+        error = errors[:, 0, 0]
+        if (first < -error).any():
             return PMatrix(False, NONE)
-        clear = parts[:, 0, 0] > errors[:, 0, 0]
-        sure = sure and bool(clear.all())
-        rest, doubt = _complements(parts[clear], errors[clear])
-        parts, errors = (
-            np.concatenate([parts[:, 1:, 1:], rest]),
-            np.concatenate([errors[:, 1:, 1:], doubt]),
-        )
-    if sure:
+        is_positive = first > error
+        is_sure = is_sure and bool(is_positive.all())
+        complements, doubts = _complements(matrices[is_positive], errors[is_positive])
+        matrices = np.concatenate([matrices[:, 1:, 1:], complements])
+        errors = np.concatenate([errors[:, 1:, 1:], doubts])
+    if is_sure:
         return PMatrix(
             True, "is a P-matrix, all its principal minors are positive: the solution is unique"
         )
@@ -72,13 +85,27 @@ def p_matrix(G: Array) -> PMatrix:
 
 
 @np.errstate(all="ignore")  # entries that overflow decide nothing
-def _complements(parts: Array, errors: Array) -> tuple[Array, Array]:
+def _complements(matrices: Array, errors: Array) -> tuple[Array, Array]:
     """Return the Schur complements of the first entries of many matrices.
 
-    What their entries may be wrong by is returned too.
+    Args:
+        matrices: (k, m, m).
+        errors: (k, m, m), what their entries may be wrong by.
+
+    Returns:
+        The complements (k, m - 1, m - 1), and what their entries may be wrong by.
     """
-    pivots, column, row = parts[:, :1, :1], parts[:, 1:, :1], parts[:, :1, 1:]
-    within, below, beside = errors[:, :1, :1], errors[:, 1:, :1], errors[:, :1, 1:]
-    taken, doubt = column * row / pivots, below * (np.abs(row) + beside) + np.abs(column) * beside
-    rest, doubt = parts[:, 1:, 1:] - taken, (doubt + np.abs(taken) * within) / (pivots - within)
-    return rest, errors[:, 1:, 1:] + doubt + 2.0 * EPS * (np.abs(taken) + np.abs(rest))
+    pivot = matrices[:, :1, :1]
+    column = matrices[:, 1:, :1]
+    row = matrices[:, :1, 1:]
+    product = column * row / pivot
+    complements = matrices[:, 1:, 1:] - product
+
+    # The error of column row, then of its quotient with a pivot that may be smaller, and rounding.
+    pivot_error = errors[:, :1, :1]
+    column_error = errors[:, 1:, :1]
+    row_error = errors[:, :1, 1:]
+    doubt = column_error * (np.abs(row) + row_error) + np.abs(column) * row_error
+    doubt = (doubt + np.abs(product) * pivot_error) / (pivot - pivot_error)
+    rounding = 2.0 * EPS * (np.abs(product) + np.abs(complements))
+    return complements, errors[:, 1:, 1:] + doubt + rounding

@@ -28,9 +28,10 @@ from ..petsc import PETSc
 class BoundedSystem:
     """Hold A, the contact surface and its springs as one system.
 
-    It has ``size`` unknowns here, ``bounded`` of them bounded.
-
     Attributes:
+        A, surface, scale: as they were given.
+        rows: unknowns of the body, on this rank.
+        size: unknowns with those of the springs.
         soft: (m,) True where the support is a spring.
         spring, feet: stiffness k of these springs, in the unit of A, and the positions in x of
             their body ends.
@@ -39,7 +40,16 @@ class BoundedSystem:
     """
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
-        self.A, self.surface, self.scale = A, surface, scale
+        """Find where the unknowns are.
+
+        Args:
+            A: the effective matrix.
+            surface: the contact surface.
+            scale: of reactions, over which compliances are divided.
+        """
+        self.A = A
+        self.surface = surface
+        self.scale = scale
         self.rows = A.matrix.rows
         self.symmetric = A.algebra.symmetric
         self.soft: Mask = surface.compliance > 0.0
@@ -74,16 +84,20 @@ class BoundedSystem:
         return np.concatenate([b, np.zeros(self.size - self.rows)])
 
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
-        """Return (lower, upper) of the owned unknowns.
+        """Return (lower, upper) of the owned unknowns, both (size,).
 
         An infinite bound leaves its point free, bilateral or not.
+
+        Raises:
+            InputError: on all ranks, where a bound is NaN.
         """
         if self.surface.some(np.isnan(step.bound)):
             raise InputError(
                 "the bound of the contact conditions contains NaN: check the gap and the time "
                 "scheme"
             )
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        lower = np.full(self.size, -np.inf)
+        upper = np.full(self.size, np.inf)
         if step.lower is not None:
             lower[self.bounded] = step.lower
         upper[self.bounded] = step.bound
@@ -99,9 +113,9 @@ class BoundedSystem:
         return z
 
     def reactions(self, f: Array) -> Array:
-        """Return (m,) r_n from the residual f = A z - b; on a spring k (x_n - w).
+        """Return r_n (m,) from the residual f = A z - b, where the bound is active.
 
-        Valid where the bound is active.
+        On a spring it is k (x_n - w).
         """
         return np.asarray(-f[self.bounded])
 
@@ -115,17 +129,21 @@ class BoundedSystem:
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assembled(self) -> Any:
-        """Return A with its springs as an AIJ matrix.
+        """Return A with its springs as an AIJ matrix. Collective.
 
-        It is the given one when that is a PETSc matrix without springs.
+        It is the given matrix when that is PETSc's and there are no springs.
         """
         mat = assembled(self.A)
         if not self.surface.some(self.soft):
             return mat
+
+        # Every rank's part of the columns grows by its springs; each spring adds k to its two ends
+        # and -k between them.
         indptr, columns, values = mat.getValuesCSR()
-        first, columns, total = renumbered(self.surface.comm, self.rows, self.size, columns)
+        first, columns, total = renumber(self.surface.comm, self.rows, self.size, columns)
         body = sp.csr_matrix((values, columns, indptr), shape=(self.rows, total)).tocoo()
-        feet, tips = self.feet, np.arange(self.rows, self.size)
+        feet = self.feet
+        tips = np.arange(self.rows, self.size)
         local = np.concatenate([body.row, feet, feet, tips, tips])
         remote = np.concatenate([body.col, first + feet, first + tips, first + feet, first + tips])
         k = self.spring
@@ -142,23 +160,32 @@ def assembled(A: EffectiveMatrix) -> Any:
 
 
 def aij(rows: sp.csr_matrix, comm: Any) -> Any:
-    """Return the square AIJ matrix with these rows of this rank, columns numbered over all ranks.
+    """Return the square AIJ matrix with these rows of this rank. Collective.
 
-    Collective.
+    Columns are numbered over all ranks.
     """
-    size, kind = (rows.shape[0], None), PETSc.IntType
+    kind = PETSc.IntType
+    size = (rows.shape[0], None)
     arrays = rows.indptr.astype(kind), rows.indices.astype(kind), rows.data
     return PETSc.Mat().createAIJ((size, size), csr=arrays, comm=comm)
 
 
-def renumbered(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
-    """Return this rank's first global number, global column numbers and total.
+def renumber(comm: Comm, old_size: int, new_size: int, columns: Any) -> tuple[int, Indices, int]:
+    """Give columns new numbers, as the part of every rank grows at its end. Collective.
 
-    Ranks' parts grow at their end.
+    Args:
+        comm: of the contact surface.
+        old_size: columns of this rank before.
+        new_size: columns of this rank from now on.
+        columns: (n,) global numbers before.
+
+    Returns:
+        This rank's first global number, the new global numbers (n,), and how many there are.
     """
     sizes = np.zeros((comm.size, 2))
     sizes[comm.rank] = old_size, new_size
     sizes = comm.sum(sizes)
-    old, new = (np.concatenate([[0], np.cumsum(column)]).astype(np.int64) for column in sizes.T)
+    old = np.concatenate([[0], np.cumsum(sizes[:, 0])]).astype(np.int64)
+    new = np.concatenate([[0], np.cumsum(sizes[:, 1])]).astype(np.int64)
     owner = np.searchsorted(old, columns, side="right") - 1
     return int(new[comm.rank]), columns + (new - old)[owner], int(new[-1])

@@ -1,6 +1,6 @@
 """Build the Jacobian of a step with friction.
 
-It is made of H = A x_ref/r_ref, B_t, and in 3D what lambda and gamma make of it.
+Its parts are H = A x_ref/r_ref, B_t, and in 3D the derivatives of the disks.
 """
 
 import weakref
@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices
 from ..petsc import PETSc
-from .bounded_system import aij, renumbered
+from .bounded_system import aij, renumber
 from .friction_system import FrictionSystem, ScaledFrictionStep
 
 Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
@@ -24,43 +24,52 @@ class FrictionJacobian:
     """
 
     def __init__(self, scaled: ScaledFrictionStep) -> None:
+        """Make the pattern of the matrix. Collective."""
         self._system: FrictionSystem = scaled.friction
         self._scaled = weakref.proxy(scaled)  # PETSc holds the matrix: see weakly()
         self._ratio = np.nan
         total, parts = self._entries()
-        rows, columns = (np.concatenate([part[i] for part in parts.values()]) for i in (0, 1))
-        places = sp.csr_matrix(
-            (np.arange(1.0, 1.0 + len(rows)), (rows, columns)), shape=(self._system.size, total)
-        )
+
+        # The entries of all parts, none of which is given twice, are sorted once by rows and
+        # columns: a matrix of their numbers tells the order.
+        rows = np.concatenate([rows for rows, _, _ in parts.values()])
+        columns = np.concatenate([columns for _, columns, _ in parts.values()])
+        numbers = np.arange(1.0, 1.0 + len(rows))
+        places = sp.csr_matrix((numbers, (rows, columns)), shape=(self._system.size, total))
         places.sort_indices()
-        # of the entries of all parts, none of which is given twice
         self._order = places.data.astype(np.int64) - 1
+
         self._values = {name: values for name, (_, _, values) in parts.items()}
-        self._A, self._inverse = parts["A"][2], 1.0 / self._system.stiffness[self._system.line]
+        self._A = parts["A"][2]
+        self._flexibility = 1.0 / self._system.stiffness[self._system.line]
         self.mat = aij(places, self._system.body.comm)
         self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
     def _entries(self) -> tuple[int, dict[str, Entries]]:
-        """Return how many columns there are on all ranks, and the parts of the matrix.
+        """Return how many columns there are on all ranks, and the parts of the matrix. Collective.
 
-        There are zeros for what changes.
+        What changes from step to step, or with y, is zero.
         """
         system = self._system
-        body, line, pairs = system.body, system.line, system.pairs
+        body = system.body
+        line = system.line
+        pairs = system.pairs
         indptr, columns, A = _rows_of(body)
-        first, columns, total = renumbered(system.surface.comm, body.size, system.size, columns)
-        lam, gamma = (
-            body.size + np.arange(len(system.tangent)),
-            system.first_gamma + np.arange(len(pairs)),
-        )
-        slices = [np.arange(*indptr[row : row + 2]) for row in system.tangent[line]]
+        first, columns, total = renumber(system.surface.comm, body.size, system.size, columns)
+        lam = body.size + np.arange(len(system.tangent))
+        gamma = system.first_gamma + np.arange(len(pairs))
+
+        # The rows F_lambda + E_t / c of points with one tangent: the rows of A of these tangents,
+        # over their diagonal entries.
+        slices = [np.arange(indptr[row], indptr[row + 1]) for row in system.tangent[line]]
         row, entry = _spread(lam[line], slices)
         column = columns[entry]
-        tangent, stiffness = (
-            _spread(system.tangent[line], slices)[0],
-            _spread(system.stiffness[line], slices)[0],
-        )
-        both, twice = body.size + pairs.T.ravel(), np.tile(gamma, 2)
+        tangent, _ = _spread(system.tangent[line], slices)
+        stiffness, _ = _spread(system.stiffness[line], slices)
+
+        # Rows of disks: first all first components, then all second ones.
+        both = body.size + pairs.T.ravel()
+        twice = np.tile(gamma, 2)
         moved = system.tangent[pairs.T.ravel()]
         none = np.zeros(len(both))
         return total, {
@@ -80,19 +89,21 @@ class FrictionJacobian:
         """Take the units of a step."""
         if ratio != self._ratio:
             self._ratio = ratio
-            self._values |= {"A": self._A * ratio, "line lambda": self._inverse / ratio}
+            self._values["A"] = self._A * ratio
+            self._values["line lambda"] = self._flexibility / ratio
             self._write()
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
         """Compute the derivatives at y; constant in 2D."""
         if self._system.any_disk:
-            self._turn(np.array(y.array_r))
+            self._update_disks(np.array(y.array_r))
             self._write()
 
-    def _turn(self, y: Array) -> None:
-        """Return the entries of disks."""
+    def _update_disks(self, y: Array) -> None:
+        """Compute the entries of disks at y."""
         pairs, still, gamma = self._scaled.disks(y)
-        c, over = self._scaled.disk_stiffness, self._scaled.disk_inverse
+        c = self._scaled.disk_stiffness
+        over = self._scaled.disk_inverse
         by_reaction = (c[:, None] * (still + gamma[:, None] * pairs) - 2.0 * pairs) * over[:, None]
         self._values |= {
             "disk lambda": np.tile(gamma, 2),
@@ -103,7 +114,9 @@ class FrictionJacobian:
         }
 
     def _write(self) -> None:
-        self.mat.setValuesCSR(*self._csr, np.concatenate(list(self._values.values()))[self._order])
+        """Write all entries into the matrix. Collective."""
+        values = np.concatenate(list(self._values.values()))
+        self.mat.setValuesCSR(*self._csr, values[self._order])
         self.mat.assemble()
 
     def destroy(self) -> None:
@@ -112,7 +125,7 @@ class FrictionJacobian:
 
 
 def _rows_of(body: Any) -> Any:
-    """CSR arrays of the owned rows of the body with its springs, in copies."""
+    """Return CSR arrays of the owned rows of the body with its springs, in copies."""
     assembled = body.assembled()
     arrays = [np.array(part) for part in assembled.getValuesCSR()]
     if assembled is not getattr(body.A.matrix, "mat", None):
@@ -121,8 +134,7 @@ def _rows_of(body: Any) -> Any:
 
 
 def _spread(values: Any, slices: list[Indices]) -> tuple[Any, Any]:
-    """values[i] for every entry of slices[i], and these entries."""
-    lengths = [len(part) for part in slices]
-    return np.repeat(values, lengths), np.concatenate(slices) if slices else np.zeros(
-        0, dtype=np.int64
-    )
+    """Return values[i] for every entry of slices[i], and these entries."""
+    lengths = [len(entries) for entries in slices]
+    all_entries = np.concatenate(slices) if slices else np.zeros(0, dtype=np.int64)
+    return np.repeat(values, lengths), all_entries

@@ -1,6 +1,4 @@
-"""Write a step as a mixed complementarity problem in simple bounds.
-
-Tresca's thresholds s are given.
+"""Write a step with given thresholds s of friction as a complementarity problem in simple bounds.
 
 The tangential reactions lambda = r_t are unknowns beside the z of ``bounded_system``. A point that
 has one free tangent (2D) carries
@@ -46,15 +44,20 @@ class FrictionSystem:
     First comes z of ``body``, then lambda of the free tangents, point by point, then gamma.
 
     Attributes:
-        point, tangent, stiffness: (L,) contact point, position in x and diagonal entry of A of each
-            lambda.
-        disk: (m,) True for points with two free tangents; ``any_disk``: whether some rank has one.
+        point, component: (L,) contact point and component of each lambda.
+        tangent, stiffness: (L,) its position in x, and the diagonal entry of A there.
+        disk: (m,) True for points with two free tangents.
+        any_disk: whether some rank has one.
         pairs: (D, 2) places of their lambdas.
         line: (L,) True for the other lambdas.
+        first_gamma: where gamma begins.
+        size: number of unknowns.
     """
 
     def __init__(self, body: BoundedSystem) -> None:
-        self.body, self.surface = body, body.surface
+        """Find where the unknowns are. Collective."""
+        self.body = body
+        self.surface = body.surface
         free = body.surface.tangents >= 0
         self.point, self.component = np.nonzero(free)
         self.tangent = body.surface.tangents[free]
@@ -67,8 +70,10 @@ class FrictionSystem:
         self.stiffness = body.A.matrix.diagonal()[self.tangent]
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:
-        """Return (z, lambda, gamma)."""
-        return y[: self.body.size], y[self.body.size : self.first_gamma], y[self.first_gamma :]
+        """Return the parts (z, lambda, gamma) of y."""
+        z = y[: self.body.size]
+        reaction = y[self.body.size : self.first_gamma]
+        return z, reaction, y[self.first_gamma :]
 
     def origin(self, step: StepProblem) -> Array:
         """Return (L,) x of the free tangents where the slip is zero."""
@@ -84,7 +89,13 @@ class FrictionSystem:
 
 @dataclass(frozen=True)
 class FrictionUnknowns:
-    """Hold the owned values of the unknowns: z, lambda (L,) [as r_t] and gamma (D,) of a rank."""
+    """Hold the owned values of the unknowns of a rank.
+
+    Attributes:
+        z: the unknowns of the body and its springs.
+        reaction: (L,) lambda [as r_t].
+        gamma: (D,) slip over r_t of points with disks.
+    """
 
     z: Array
     reaction: Array
@@ -95,19 +106,33 @@ class ScaledFrictionStep(ScaledStep):
     """Evaluate F(y), with bounds, for the step and limits set last.
 
     y = (z/x_ref, lambda/r_ref, gamma r_ref/x_ref).
+
+    Attributes:
+        friction: the numbers of the unknowns.
+        limit: (m,) thresholds over r_ref.
     """
 
     def __init__(self, friction: FrictionSystem, tolerance: float) -> None:
+        """Note the system; ``set_friction`` takes a step."""
         super().__init__(friction.body, tolerance)
         self.friction = friction
         self.limit = np.zeros(len(friction.disk))
 
     def set_friction(self, step: StepProblem, limit: Array, start: FrictionUnknowns) -> None:
-        """Take a step with thresholds (m,) [as r_t]."""
+        """Take a step with given thresholds. Collective.
+
+        Args:
+            step: the step.
+            limit: (m,) thresholds [as r_t].
+            start: where to begin.
+        """
         friction = self.friction
         self.set(step, start.z)
         self.limit = limit / self.r_ref
         self._origin = friction.origin(step) / self.x_ref
+
+        # lambda lies between -s and s at points with one tangent, and is free where there is a
+        # disk; gamma >= 0 there. Both are held at zero where s = 0.
         s = self.limit[friction.point]
         s = np.where(friction.line | (s == 0.0), s, np.inf)
         disks = self.disk_limits
@@ -130,12 +155,11 @@ class ScaledFrictionStep(ScaledStep):
     @property
     def disk_stiffness(self) -> Array:
         """Return (D,) scaled stiffness of the points with disks."""
-        return np.asarray(
-            self.friction.stiffness[self.friction.pairs].mean(axis=1) * (self.x_ref / self.r_ref)
-        )
+        mean = self.friction.stiffness[self.friction.pairs].mean(axis=1)
+        return np.asarray(mean * (self.x_ref / self.r_ref))
 
     def _parts(self, y: Array) -> tuple[Array, Array, Array]:
-        """E, F_lambda and F_gamma."""
+        """Return E, F_lambda and F_gamma at y."""
         friction = self.friction
         z, reaction, gamma = friction.split(y)
         body = super().residual(z)
@@ -143,61 +167,68 @@ class ScaledFrictionStep(ScaledStep):
         pairs = reaction[friction.pairs]
         still = self._origin - z[friction.tangent]
         still[friction.pairs] += gamma[:, None] * pairs
-        return body, still, self.disk_limits - np.sum(pairs**2, axis=1) * self.disk_inverse
+        room = self.disk_limits - np.sum(pairs**2, axis=1) * self.disk_inverse
+        return body, still, room
 
     def disks(self, y: Array) -> tuple[Array, Array, Array]:
         """Return (D, 2) lambda, (D, 2) F_lambda and (D,) gamma of the points with disks."""
         friction = self.friction
         z, reaction, gamma = friction.split(y)
         pairs = reaction[friction.pairs]
-        return (
-            pairs,
-            (self._origin - z[friction.tangent])[friction.pairs] + gamma[:, None] * pairs,
-            gamma,
-        )
+        still = (self._origin - z[friction.tangent])[friction.pairs]
+        return pairs, still + gamma[:, None] * pairs, gamma
 
     def residual(self, y: Array) -> Array:
         """Return F(y) as SNES sees it."""
         friction = self.friction
         body, still, room = self._parts(y)
-        pairs, moved, _ = self.disks(y)
-        room += self.disk_stiffness * self.disk_inverse * np.sum(pairs * moved, axis=1)
+
+        # What tells the signs after a projection: c lambda·F_lambda / s of disks, E_t / c of lines.
+        pairs, of_disks, _ = self.disks(y)
+        room += self.disk_stiffness * self.disk_inverse * np.sum(pairs * of_disks, axis=1)
         line = friction.line
-        still[line] += (
-            body[friction.tangent[line]] * (self.r_ref / self.x_ref) / friction.stiffness[line]
-        )
-        # lambda and gamma on both their bounds, where any F but zero keeps them
+        unbalanced = body[friction.tangent[line]] * (self.r_ref / self.x_ref)
+        still[line] += unbalanced / friction.stiffness[line]
+
+        # Where s = 0 lambda and gamma are on both their bounds, and any F but zero keeps them.
         held = self.limit == 0.0
-        still[held[friction.point]], room[held[friction.disk]] = 1.0, 1.0
+        still[held[friction.point]] = 1.0
+        room[held[friction.disk]] = 1.0
         return np.concatenate([body, still, room])
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the errors as without friction.
+        """Return the errors as without friction; the second counts slips and disks too. Collective.
 
-        The second counts what is wrong in slips and disks too.
+        F is not used: it is not what the certificate judges.
         """
-        friction, s = self.friction, self.disk_limits
+        friction = self.friction
+        s = self.disk_limits
         _, reaction, gamma = friction.split(y)
         body, still, room = self._parts(y)
         force, gap, backward = super().errors(y[: self.system.size], body)
-        low, high = (friction.split(bound)[1] for bound in (self.lower, self.upper))
+
+        # Slips that are wrong in size or sign beside the bounds of lambda.
+        _, low, _ = friction.split(self.lower)
+        _, high, _ = friction.split(self.upper)
         wrong = np.where(reaction >= high, np.maximum(still, 0.0), still)
         wrong = np.where(reaction <= low, np.minimum(still, 0.0), wrong)
         wrong[low == high] = 0.0
         slip, y_max = self.system.max(max_abs(wrong), max_abs(y[: self.system.rows]))
+
+        # Of a disk either the slip or the distance from its edge is zero, as shares of their sizes.
         edge = np.minimum(gamma * s / y_max if y_max > 0.0 else gamma, room * self.disk_inverse)
         disk = float(self.system.max(max_abs(edge))[0])
         return force, max(gap, fraction(slip, y_max), disk), backward
 
     def sliding(self, y: Array) -> Mask:
-        """Return (m,) points on the edge of their disk."""
+        """Return (m,) which points are on the edge of their disk."""
         friction = self.friction
         _, reaction, gamma = friction.split(y)
-        at_edge = np.abs(reaction) >= self.limit[friction.point]
-        found = np.zeros(len(self.limit), dtype=bool)
-        found[friction.point[friction.line]] = at_edge[friction.line]
-        found[friction.disk] = gamma > 0.0
-        return found | (self.limit == 0.0)
+        at_bound = np.abs(reaction) >= self.limit[friction.point]
+        slides = np.zeros(len(self.limit), dtype=bool)
+        slides[friction.point[friction.line]] = at_bound[friction.line]
+        slides[friction.disk] = gamma > 0.0
+        return slides | (self.limit == 0.0)
 
     def physical(self, y: Array) -> FrictionUnknowns:
         """Return y in the units of the step."""
@@ -212,16 +243,22 @@ class ScaledFrictionStep(ScaledStep):
         moved = z[friction.tangent] - self._origin * self.x_ref
         return np.where(sliding[friction.point], moved, 0.0)
 
-    def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
-        """Return the state with reactions in new disks (m,).
+    def fit_to_limits(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
+        """Return the state with reactions in new disks.
 
-        Sliding points are on their edge, along their slip (L,).
+        Args:
+            state: the unknowns.
+            slip: (L,); points that slide are put on the edge of their disk, along their slip.
+            limit: (m,) radii of the disks [as r_t].
         """
-        friction, s = self.friction, limit
-        way, inside = friction.by_point(slip), project(friction.by_point(state.reaction), s)
-        speed = np.linalg.norm(way, axis=1)
-        table = np.divide(way * s[:, None], speed[:, None], out=inside, where=speed[:, None] > 0.0)
-        gamma = np.divide(speed, s, out=np.zeros_like(s), where=s > 0.0)
+        friction = self.friction
+        way = friction.by_point(slip)
+        length = np.linalg.norm(way, axis=1)
+        inside = project(friction.by_point(state.reaction), limit)
+        reaction = np.divide(
+            way * limit[:, None], length[:, None], out=inside, where=length[:, None] > 0.0
+        )
+        gamma = np.divide(length, limit, out=np.zeros_like(limit), where=limit > 0.0)
         return FrictionUnknowns(
-            state.z, table[friction.point, friction.component], gamma[friction.disk]
+            state.z, reaction[friction.point, friction.component], gamma[friction.disk]
         )

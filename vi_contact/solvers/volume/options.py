@@ -1,11 +1,9 @@
 """Hold PETSc's options; refuse combinations that are known to give wrong answers.
 
-There is one prefix and three layers.
-
-Layers, the later wins: the method's defaults, ``petsc_options`` of the settings, PETSc's own
-database (command line, PETSC_OPTIONS). SNES VI reads its options again whenever the active set
-changes, so they stay in the database for as long as a solve runs and are taken out afterwards: two
-solvers with one prefix do not meet.
+There are three layers under one prefix, of which the later wins: the method's defaults,
+``petsc_options`` of the settings, PETSc's own database (command line, PETSC_OPTIONS). SNES VI reads
+its options again whenever the active set changes, so they stay in the database for as long as a
+solve runs and are taken out afterwards: two solvers with one prefix do not meet.
 """
 
 import ctypes
@@ -34,7 +32,10 @@ class OptionLayers:
 
     ``in_force`` puts them into PETSc's database.
 
-    own: the user's options; read: those of them that PETSc has read.
+    Attributes:
+        prefix: of the options on the command line.
+        own: the user's options.
+        read: those of them that PETSc has read.
     """
 
     def __init__(
@@ -42,11 +43,16 @@ class OptionLayers:
     ) -> None:
         """Take the layers of options.
 
-        ``read`` holds the user's own options that PETSc has read so far, shared with other layers
-        of one solver.
+        Args:
+            prefix: of the options on the command line.
+            defaults: the method's.
+            own: the user's.
+            read: those of the user's that PETSc has read so far, shared with other layers of one
+                solver.
         """
         self.prefix = prefix
-        self._defaults, self.own = defaults, {key.lstrip("-"): value for key, value in own.items()}
+        self._defaults = defaults
+        self.own = {key.lstrip("-"): value for key, value in own.items()}
         self.read: set[str] = set() if read is None else read
 
     def apply(self, solver: Any, check: "Callable[[Any, OptionLayers], None]") -> None:
@@ -99,15 +105,16 @@ class OptionLayers:
         self._tell_unread(owner, comm)
 
     def _unread(self, comm: Comm) -> list[str]:
-        """Return the user's options that no rank has read: one without rows makes no blocks.
+        """Return the user's options that no rank has read. Collective.
 
-        Collective.
+        Some ranks may not read an option of blocks, as one without rows has none.
         """
-        lists = comm.gather([key for key in self.own if key not in self.read])
-        everywhere = (
-            None if lists is None else [key for key in lists[0] if all(key in one for one in lists)]
-        )
-        return list(comm.bcast(everywhere))
+        unread_here = [key for key in self.own if key not in self.read]
+        of_ranks = comm.gather(unread_here)
+        unread = None
+        if of_ranks is not None:  # on the first rank
+            unread = [key for key in of_ranks[0] if all(key in keys for keys in of_ranks)]
+        return list(comm.bcast(unread))
 
     def _tell_unread(self, owner: str, comm: Comm) -> None:
         """Warn, once, of options of the command line that this solver has not read.
@@ -139,33 +146,37 @@ class OptionLayers:
         return "what it is for is not part of this solver as it is set, so leave it out"
 
     def chosen(self, key: str) -> str:
-        """Return the value in force; call inside ``in_force``."""
+        """Return the value of an option. To be called inside ``in_force``."""
         return str(PETSc.Options(self.prefix).getString(key, ""))
 
 
 @cache
 def _options_used() -> Any:
-    """Return PetscOptionsUsed of the PETSc library that petsc4py has loaded.
-
-    That is not offered by petsc4py itself.
-    """
+    """Return PetscOptionsUsed of the library that petsc4py has loaded, but does not offer."""
     call = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
-    call.argtypes, call.restype = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p], ctypes.c_int
+    call.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+    call.restype = ctypes.c_int
     return call
 
 
 def was_read(name: str) -> bool:
-    """Return whether PETSc has read an option since it came into the database.
+    """Say whether PETSc has read an option, of this whole name, since it came into the database.
 
-    The option is given by its whole name; the answer is that of this rank.
+    Ranks may have different answers.
     """
-    found = ctypes.c_int(0)  # PetscBool is an int, and one byte since PETSc 3.24
-    _options_used()(None, name.encode(), ctypes.byref(found))
-    return found.value != 0
+    was_used = ctypes.c_int(0)  # PetscBool is an int, and one byte since PETSc 3.24
+    _options_used()(None, name.encode(), ctypes.byref(was_used))
+    return was_used.value != 0
 
 
 def refuse(combination: str, reason: str, remedy: str) -> None:
-    """Raise InputError of an unsound choice."""
+    """Raise InputError for a combination of options.
+
+    Args:
+        combination: what was chosen.
+        reason: why it is refused.
+        remedy: what to choose.
+    """
     raise InputError(f"{combination} is refused because {reason}: {remedy}")
 
 
@@ -231,37 +242,39 @@ REDUCED_PC = {
 
 
 def _part(key: str) -> str:
-    """Return with what the name of an option begins that belongs to a part of a solver.
-
-    Such parts are blocks or levels.
-    """
-    return next((one for one in PARTS if key.startswith(one)), "")
+    """Return how the name of an option begins that is for blocks or levels; else an empty text."""
+    return next((part for part in PARTS if key.startswith(part)), "")
 
 
 EXCHANGE = ("umfpack", "superlu")  # solvers that exchange rows
 
 
 def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
-    """Return the options of a direct solver, "cholesky" or "lu".
+    """Return the options of a direct solver that this PETSc was built with.
 
-    It is one of what this PETSc was built with: MUMPS, or one of one rank, of which every rank has
-    a copy; the log says which where it is not MUMPS. SuperLU_DIST is never taken: it ends the
-    process where a row is zero.
+    It is MUMPS, or else a solver for one rank, of which every rank has a copy; the log says which.
+    SuperLU_DIST is never taken: it ends the process where a row is zero.
 
-    ``exchanges``: whether rows have to be exchanged, as beside zeros on the diagonal, which PETSc's
-    own does not do. InputError where nothing else is there.
+    Args:
+        kind: "cholesky" or "lu".
+        ranks: their number.
+        exchanges: whether rows have to be exchanged, as beside zeros on the diagonal, which PETSc's
+            own solver does not do.
+
+    Raises:
+        InputError: rows have to be exchanged, and no solver does.
     """
     if packages.petsc_has("mumps"):
         return {**MUMPS, "pc_type": kind}
     own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
     if exchanges:
-        found = [name for name in EXCHANGE if packages.petsc_has(name)]
-        if not found:
+        solvers = [name for name in EXCHANGE if packages.petsc_has(name)]
+        if not solvers:
             raise InputError(
                 "Volume() with friction needs a direct solver that exchanges rows, and this PETSc "
                 "has none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()"
             )
-        own["pc_factor_mat_solver_type"] = found[0]
+        own["pc_factor_mat_solver_type"] = solvers[0]
     else:
         own["pc_factor_mat_ordering_type"] = "nd"
     log.info(
@@ -271,17 +284,15 @@ def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
     )
     if ranks == 1:
         return own
-    return {
-        "ksp_type": "preonly",
-        "pc_type": "redundant",
-        **{f"redundant_{key}": one for key, one in own.items()},
-    }
+    copies = {f"redundant_{key}": value for key, value in own.items()}
+    return {"ksp_type": "preonly", "pc_type": "redundant", **copies}
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
     """Refuse what does not work on the reduced systems of VINEWTONRSLS."""
     _check_type(snes, "vinewtonrsls", layers)
-    pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
+    pc = snes.ksp.pc.getType()
+    ksp = snes.ksp.getType()
     if pc in REDUCED_PC:
         refuse(
             f"pc_type {pc} with vinewtonrsls",
@@ -299,10 +310,7 @@ def check_semismooth(snes: Any, layers: OptionLayers) -> None:
 
 
 def check_friction(snes: Any, layers: OptionLayers) -> None:
-    """Refuse what does not go with friction.
-
-    This is what needs a symmetric matrix, and what fails on the reduced systems of VINEWTONRSLS.
-    """
+    """Refuse what needs a symmetric matrix, and what fails on reduced systems of VINEWTONRSLS."""
     pc = snes.ksp.pc.getType()
     if pc in REDUCED_PC:
         refuse(f"pc_type {pc} with friction", REDUCED_PC[pc], "use lu with MUMPS")
@@ -312,8 +320,18 @@ def check_friction(snes: Any, layers: OptionLayers) -> None:
 def _check_unsymmetric(
     snes: Any, layers: OptionLayers, wanted: str, what: str, matrix: str
 ) -> None:
+    """Refuse what needs a symmetric matrix.
+
+    Args:
+        snes: the solver, set up by the options.
+        layers: the options.
+        wanted: its type.
+        what: for which it is, in messages.
+        matrix: its name, in messages.
+    """
     _check_type(snes, wanted, layers)
-    pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
+    pc = snes.ksp.pc.getType()
+    ksp = snes.ksp.getType()
     for kind, name, symmetric in (
         ("pc", pc, ("cholesky", "icc")),
         ("ksp", ksp, SYMMETRIC_KSP),
@@ -330,6 +348,7 @@ def _check_unsymmetric(
 
 
 def _check_type(snes: Any, wanted: str, layers: OptionLayers) -> None:
+    """Refuse another type than the method's."""
     if snes.getType() != wanted:
         refuse(
             f"option {layers.prefix}snes_type {snes.getType()}",
@@ -339,6 +358,7 @@ def _check_type(snes: Any, wanted: str, layers: OptionLayers) -> None:
 
 
 def _check_line_search(layers: OptionLayers) -> None:
+    """Refuse line searches that ignore the bounds."""
     kind = layers.chosen("snes_linesearch_type")
     if kind in ("cp", "bisection") and PETSc.Sys.getVersion() < (3, 23, 0):
         refuse(

@@ -1,6 +1,4 @@
-"""Solve the step on all unknowns, by PETSc's solvers for inequalities and bounds.
-
-This is the volume route; the inequalities are variational.
+"""Solve the step on all unknowns, by PETSc's solvers for bounds: the volume route.
 
     A x = b - B_nᵀ r_n,    0 <= r_n  ⊥  bound - B_n x + compliance r_n / scale >= 0
 
@@ -37,14 +35,19 @@ __all__ = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 class Method(Protocol):
     """Say how the bounded problem is solved: settings that make a driver.
 
-    One that ``carries_friction`` makes two, as ReducedNewton does.
+    One that carries friction has ``friction_defaults`` and ``friction_driver`` too, as
+    ReducedNewton has.
     """
 
     @property
-    def carries_friction(self) -> bool: ...
+    def carries_friction(self) -> bool:
+        """Say whether it solves steps with friction."""
 
-    def defaults(self, ranks: int) -> Options: ...
-    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any: ...
+    def defaults(self, ranks: int) -> Options:
+        """Return the options that come before the user's, on so many ranks."""
+
+    def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any:
+        """Return what runs PETSc's solver of a scaled step, with these options."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +87,9 @@ class Volume:
             )
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction that the method cannot carry.
+        """Raise InputError for friction that the method cannot carry, or that does not fit.
 
-        So it does for friction without a tangent, or of wrong length.
+        So it does for friction without a tangential direction, or of a wrong length.
         """
         if problem.frictional and not self.method.carries_friction:
             raise InputError(
@@ -101,15 +104,21 @@ class Volume:
     def prepare(
         self, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> "PreparedVolume":
-        """Return the solver for one effective matrix; collective.
+        """Return the solver for one effective matrix. Collective.
 
-        InputError for options that cannot work.
+        Args:
+            A: the effective matrix.
+            surface: the contact surface.
+            scale: of reactions, over which compliances are divided.
+
+        Raises:
+            InputError: for options that cannot work.
         """
         return PreparedVolume(self, A, surface, scale)
 
 
 class PreparedVolume:
-    """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
+    """Run a PETSc solver bound to A. ``close`` frees it.
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is
     collective.
@@ -118,38 +127,45 @@ class PreparedVolume:
     def __init__(
         self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> None:
+        """Make the solver without friction: see ``Volume.prepare``."""
+        self._settings = settings
+        self._method = settings.method
+        self._name = f"Volume({type(settings.method).__name__})"
+        self._comm = surface.comm
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
-        self._settings, self._method = settings, settings.method
-        self._comm, self._read, self._all_read = surface.comm, set[str](), False
-        ranks = surface.comm.size
-        own = settings.method.defaults(ranks)
-        self._layers = self._layered(
-            own if self._system.symmetric else {**own, **direct("lu", ranks)}
-        )
-        self._scaled = ScaledStep(self._system, settings.tolerance)
-        self._name = f"Volume({type(settings.method).__name__})"
-        self._friction: VolumeFriction | None = None
-        self._driver: SnesDriver | TaoDriver | None = self._method.driver(
-            self._scaled, self._layers
-        )
 
-    def _layered(self, defaults: Options) -> OptionLayers:
-        return OptionLayers(
-            self._settings.prefix, defaults, self._settings.petsc_options, self._read
-        )
+        # Options; a matrix that is not symmetric has no Cholesky factor.
+        self._read: set[str] = set()  # options of the user that PETSc has read
+        self._all_read = False  # whether it is known that PETSc reads all of them
+        ranks = surface.comm.size
+        defaults = settings.method.defaults(ranks)
+        if not self._system.symmetric:
+            defaults = {**defaults, **direct("lu", ranks)}
+        self._layers = self._make_layers(defaults)
+
+        self._scaled = ScaledStep(self._system, settings.tolerance)
+        self._friction: VolumeFriction | None = None
+        self._driver: SnesDriver | TaoDriver | None
+        self._driver = self._method.driver(self._scaled, self._layers)
+
+    def _make_layers(self, defaults: Options) -> OptionLayers:
+        """Return the options of the user over these."""
+        settings = self._settings
+        return OptionLayers(settings.prefix, defaults, settings.petsc_options, self._read)
 
     def _friction_method(self) -> VolumeFriction:
-        """Return the problem with friction, in the place of the other one.
+        """Return the solver of steps with friction, made at the first of them.
 
-        It is made at the first step that has some.
+        It takes the place of the other one.
         """
         if self._friction is None:
             self.close()
-            method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
-            scaled = ScaledFrictionStep(FrictionSystem(self._system), tolerance)
-            defaults = method.friction_defaults(self._system.comm.size)
-            self._driver = method.friction_driver(scaled, self._layered(defaults))
+            method = cast(ReducedNewton, self._method)
+            friction_system = FrictionSystem(self._system)
+            scaled = ScaledFrictionStep(friction_system, self._settings.tolerance)
+            layers = self._make_layers(method.friction_defaults(self._system.comm.size))
+            self._driver = method.friction_driver(scaled, layers)
             self._friction = VolumeFriction(scaled, self._driver, self._name)
         return self._friction
 
@@ -164,6 +180,7 @@ class PreparedVolume:
         return self._petsc("TAO")
 
     def _petsc(self, kind: str) -> Any:
+        """Return the PETSc object if it is of this kind."""
         solver = None if self._driver is None else self._driver.solver
         return solver if isinstance(solver, getattr(PETSc, kind)) else None
 
@@ -174,9 +191,16 @@ class PreparedVolume:
         self._driver = self._friction = None
 
     def solve(self, step: StepProblem) -> StepResult:
-        """Return the step; StepFailure with PETSc's reason when it does not converge."""
+        """Return the answer to a step. Collective.
+
+        Raises:
+            StepFailure: PETSc's solver does not converge; the error tells its reason.
+        """
         try:
-            found = self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
+            if step.slip0 is None:
+                result = self._solve_without_friction(step)
+            else:
+                result = self._friction_method().solve(step)
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:
@@ -186,28 +210,23 @@ class PreparedVolume:
         except StepFailure:
             self.close()
             raise
-        self._refuse_unread(found.iterations)
-        return found
+        self._refuse_unread(result.iterations)
+        return result
 
     def excuse_options(self) -> None:
-        """Take options that nothing reads.
-
-        They are for another method, in whose place this one is tried.
-        """
+        """Do not refuse options that nothing reads: they are for a method that was tried before."""
         self._all_read = True
 
     def _refuse_unread(self, iterations: int) -> None:
-        """Raise InputError for options that nothing has read.
-
-        It is asked once the parts of the solver have been at work.
-        """
+        """Raise InputError for options that nothing has read after the first iterations."""
         if iterations and not self._all_read:
             self._all_read = True
             self._layers.refuse_unread(self._name, self._comm)
 
-    def _solve(self, step: StepProblem) -> StepResult:
-        """Solve the step without friction."""
-        system, scaled = self._system, self._scaled
+    def _solve_without_friction(self, step: StepProblem) -> StepResult:
+        """Return the answer to a step without friction."""
+        system = self._system
+        scaled = self._scaled
         if self._driver is None or self._friction is not None:
             self.close()
             self._driver = self._method.driver(scaled, self._layers)

@@ -24,42 +24,55 @@ INDEFINITE = 1e-8  # of the sizes in a curvature below zero: far above its round
 class ScaledStep:
     """Evaluate F(y) = (A x_ref y - b) / r_ref with bounds on y, for the step set last.
 
-    ``worst``: error found last.
+    Attributes:
+        system: A, the surface and its springs.
+        tolerance: the largest relative error that is accepted.
+        b: (n,) the load [N].
+        x_ref, r_ref: units of z and of forces.
+        lower, upper: (n,) bounds of y.
+        start: (n,) where to begin.
+        worst: relative error found last.
     """
 
     def __init__(self, system: BoundedSystem, tolerance: float) -> None:
-        self.system, self.tolerance = system, tolerance
+        """Note the system; ``set`` takes a step."""
+        self.system = system
+        self.tolerance = tolerance
         self._norm = system.norm()
 
     def set(self, step: StepProblem, start: Array) -> None:
-        """Take a step that starts from z = start."""
+        """Take a step that starts from z = start (n,). Collective."""
         system = self.system
         self.b = system.load(step.b)
         lower, upper = system.bounds(step)
-        # boxes may be wider than anything in them
-        reach = upper[np.isfinite(upper) & (step.lower is None)]
+
+        # Units: the largest displacements and forces that are known before the step is solved.
+        # Bounds from both sides tell nothing: boxes may be wider than anything in them.
+        reach = upper[:0] if step.lower is not None else upper[np.isfinite(upper)]
         z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
-            z_max = self._along(self.b, b_max)
+            z_max = self._size_along(self.b, b_max)
         if b_max <= ROUND_OFF * self._norm * z_max:  # nothing, or what rounding left of it
             b_max = max(b_max, float(system.max(max_abs(system.apply(start)))[0]))
-        self.x_ref, self.r_ref = _power_of_two(max(z_max, bound_max)), _power_of_two(b_max)
-        self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
+        self.x_ref = _power_of_two(max(z_max, bound_max))
+        self.r_ref = _power_of_two(b_max)
+
+        self.lower = lower / self.x_ref
+        self.upper = upper / self.x_ref
         self.start = start / self.x_ref
         self._b_max = b_max / self.r_ref
         self.worst = np.inf
 
-    def _along(self, b: Array, b_max: float) -> float:
-        """Return the size of the minimiser of ½ zᵀA z - bᵀz along b.
+    def _size_along(self, b: Array, b_max: float) -> float:
+        """Return the size of the minimiser of ½ zᵀA z - bᵀz along b, of largest entry b_max.
 
-        It is the size of z when nothing else is known.
+        It stands for the size of z when nothing else is known.
         """
         if b_max == 0.0:
             return 0.0
         unit = b / b_max
-        bb, bAb = self.system.surface.comm.sum(
-            np.array([unit @ unit, unit @ self.system.apply(unit)])
-        )
+        local = np.array([unit @ unit, unit @ self.system.apply(unit)])
+        bb, bAb = self.system.surface.comm.sum(local)
         return b_max * bb / bAb if bAb > 0.0 else 0.0
 
     def residual(self, y: Array) -> Array:
@@ -71,70 +84,79 @@ class ScaledStep:
         F.array[:] = self.residual(y.array_r)
 
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
-        """Return f(y) - f(origin) and the gradient F(y), for TAO.
+        """Return f(y) - f(origin) and write the gradient F(y) into G, for TAO.
 
         f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
 
         A line search compares values, which agree in all their digits where the gradient still has
-        eight to lose.
+        eight to lose: values are therefore taken from an origin near the answer.
         """
         values = y.array_r
         F = self.residual(values)
         G.array[:] = F
-        energy = 0.5 * ((values - self._zero[0]) @ (F + self._zero[1]))
+        energy = 0.5 * ((values - self._origin) @ (F + self._F_at_origin))
         return total(self.system.surface.comm, energy)
 
     def measure_from(self, y: Array) -> None:
         """Take y as the origin of the objective."""
-        self._zero = y, self.residual(y)
+        self._origin = y
+        self._F_at_origin = self.residual(y)
 
     def curves_down(self, y: Array, F: Array) -> bool:
-        """Say whether dy·H dy is below zero by more than rounding.
+        """Say whether dy·H dy is below zero by more than rounding. Collective.
 
-        dy is the way from the origin of the objective. Below zero, H is not positive definite.
-        Collective.
+        dy is the way from the origin of the objective to y, where the residual is F. If so, H is
+        not positive definite.
         """
-        dy, dF = y - self._zero[0], F - self._zero[1]
-        comm = self.system.surface.comm
-        curvature, sizes = comm.sum(
-            np.array([dy @ dF, np.abs(dy) @ (np.abs(F) + np.abs(self._zero[1]))])
-        )
+        dy = y - self._origin
+        dF = F - self._F_at_origin
+        sizes_of_F = np.abs(F) + np.abs(self._F_at_origin)
+        local = np.array([dy @ dF, np.abs(dy) @ sizes_of_F])
+        curvature, sizes = self.system.surface.comm.sum(local)
         return bool(curvature < -INDEFINITE * sizes)
 
     def active(self, y: Array, F: Array) -> Mask:
-        """Return (m,) what the natural map chooses.
-
-        It is True where the reaction exceeds the remaining gap.
-        """
-        i = self.system.bounded
-        above, below = self.upper[i] - y[i] < -F[i], y[i] - self.lower[i] < F[i]
-        return np.asarray(above | below | (self.lower[i] == self.upper[i]))
+        """Return (m,) the active set of the natural map: where the reaction exceeds the gap."""
+        bounded = self.system.bounded
+        values = y[bounded]
+        force = F[bounded]
+        lower = self.lower[bounded]
+        upper = self.upper[bounded]
+        at_upper = upper - values < -force
+        at_lower = values - lower < force
+        return np.asarray(at_upper | at_lower | (lower == upper))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
-        """Return the largest |F| off the active set and |gap| on it, as in the certificate.
+        """Return relative errors of y, at which the residual is F. Collective.
 
-        The backward error of F follows.
+        Returns:
+            The largest |F| off the active set and |gap| on it, as in the certificate, and the
+            backward error of F. All are NaN where F is.
         """
-        system, i = self.system, self.system.bounded
+        system = self.system
+        bounded = system.bounded
         active = self.active(y, F)
-        gap = np.where(y[i] - self.lower[i] < F[i], y[i] - self.lower[i], self.upper[i] - y[i])[
-            active
-        ]
+
+        # Distances from the bounds that are active.
+        above_lower = y[bounded] - self.lower[bounded]
+        below_upper = self.upper[bounded] - y[bounded]
+        gap = np.where(above_lower < F[bounded], above_lower, below_upper)[active]
+
+        # Forces that no bound carries; the body feels what is left over on its springs.
         force = F.copy()
-        force[i[active]] = 0.0
-        # the body feels what is left over on its springs
+        force[bounded[active]] = 0.0
         force[system.feet] += force[system.rows :]
         Ax = F + self.b / self.r_ref
         Ax[system.feet] += F[system.rows :]
-        local = (
+
+        force_max, gap_max, y_max, Ax_max, is_nan = system.max(
             max_abs(force),
             max_abs(gap),
             max_abs(y),
             max_abs(Ax[: system.rows]),
             float(np.isnan(F).any()),
         )
-        force_max, gap_max, y_max, Ax_max, broken = system.max(*local)
-        if broken:
+        if is_nan:
             return np.nan, np.nan, np.nan
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
         return (
@@ -144,17 +166,17 @@ class ScaledStep:
         )
 
     def verdict(self, y: Array, F: Array) -> int:
-        """Return SNES's reason.
+        """Return SNES's reason to stop at y, where the residual is F. Collective.
 
-        It is 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.
-
-        PETSc's own tests are relative to the first residual, which a good prediction makes
-        unreachable.
+        It is 0 to go on, 2 where the step is solved to round-off, and 4 below the tolerance where
+        the error no longer falls. PETSc's own tests are relative to the first residual, which a
+        good prediction makes so small that they cannot be met.
         """
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
             return NOT_A_NUMBER
-        worst, before = max(force, gap), self.worst
+        before = self.worst
+        worst = max(force, gap)
         self.worst = worst
         if backward <= ROUND_OFF and worst <= self.tolerance and gap <= ROUND_OFF:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
@@ -163,22 +185,30 @@ class ScaledStep:
         return 0
 
     def answer(self, driver: Any, name: str) -> tuple[Array, Mask, Array, int]:
-        """Run a PETSc solver of this step; return (y, active (m,), r_n (m,), iterations).
+        """Run a PETSc solver of this step. Collective.
 
-        StepFailure with its reason.
+        Args:
+            driver: of the solver.
+            name: of the route, for messages.
 
-        Off the active set r_n is zero, so that what is left of F shows in the certificate.
+        Returns:
+            y (n,), the active set (m,), r_n (m,) and the number of iterations. Off the active set
+            r_n is zero, so that what is left of F shows in the certificate.
+
+        Raises:
+            StepFailure: it stopped above the tolerance; the error tells PETSc's reason.
         """
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not self.accepts(y, F):
             raise reason_failure(name, driver.reasons, reason, iterations, self.worst)
         active = self.active(y, F)
-        return y, active, np.where(active, self.system.reactions(F * self.r_ref), 0.0), iterations
+        r_n = np.where(active, self.system.reactions(F * self.r_ref), 0.0)
+        return y, active, r_n, iterations
 
     def accepts(self, y: Array, F: Array) -> bool:
-        """Return True below the tolerance.
+        """Say whether the error at y is below the tolerance. Collective.
 
-        A solver whose line search fails at the floor of round-off is done.
+        So a solver is done whose line search fails at the floor of round-off.
         """
         force, gap, _ = self.errors(y, F)
         self.worst = max(force, gap)
@@ -186,11 +216,13 @@ class ScaledStep:
 
 
 def _power_of_two(value: float) -> float:
-    """Return the power of two next above the value.
+    """Return the power of two next above the value; one for zero, infinity and NaN.
 
-    It is one for zero, infinity and NaN, which PETSc reports itself.
+    PETSc reports these itself.
     """
-    return float(np.exp2(np.ceil(np.log2(value)))) if 0.0 < value < np.inf else 1.0
+    if not 0.0 < value < np.inf:
+        return 1.0
+    return float(np.exp2(np.ceil(np.log2(value))))
 
 
 def fraction(value: float, reference: float) -> float:

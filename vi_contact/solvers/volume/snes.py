@@ -31,7 +31,11 @@ from .scaled_step import ScaledStep
 
 
 class SnesDriver:
-    """Run a SNES object bound to a scaled step; ``solver`` is the PETSc object."""
+    """Run a SNES object bound to a scaled step.
+
+    Attributes:
+        solver: the PETSc object.
+    """
 
     reasons = PETSc.SNES.ConvergedReason
 
@@ -44,9 +48,24 @@ class SnesDriver:
         snes_type: str,
         check: Callable[[Any, OptionLayers], None],
     ) -> None:
-        self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
+        """Make the solver.
+
+        Args:
+            scaled: evaluates the step.
+            layers: PETSc's options.
+            jacobian: holds the derivatives.
+            snes_type: PETSc's name of the method.
+            check: refuses options that give wrong answers.
+
+        Raises:
+            InputError: PETSc or ``check`` does not take the options.
+        """
+        self._scaled = scaled
+        self._layers = layers
+        self._jacobian = jacobian
         self._y, self._F = jacobian.mat.createVecs()
-        self._lower, self._upper = self._y.duplicate(), self._y.duplicate()
+        self._lower = self._y.duplicate()
+        self._upper = self._y.duplicate()
         self.solver = PETSc.SNES().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType(snes_type)  # before the convergence test, which it would overwrite
@@ -59,19 +78,27 @@ class SnesDriver:
 
     def run(self) -> tuple[Array, Array, int, int]:
         """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
-        scaled, snes = self._scaled, self.solver
+        scaled = self._scaled
+        snes = self.solver
         self._jacobian.rescale(scaled.x_ref / scaled.r_ref)
         self._y.array[:] = scaled.start
         write_bounds(scaled, self._lower, self._upper)
         with self._layers.in_force():
             snes.solve(None, self._y)
-        y, F = np.array(self._y.array_r), np.array(self._F.array_r)
+        y = np.array(self._y.array_r)
+        F = np.array(self._F.array_r)
         return y, F, snes.getConvergedReason(), snes.getIterationNumber()
 
     def _test(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
         """Return PETSc's reason to stop; 0 to go on.
 
-        It is our verdict, or the user's tolerance, which counts relative to |b|.
+        It is our verdict, or by tolerances of the user, which are relative to |b| and to the first
+        norm.
+
+        Args:
+            snes: the solver.
+            iteration: number of the iteration.
+            norms: of x, of the step, and of F.
         """
         reason = self._scaled.verdict(snes.getSolution().array_r, snes.getFunction()[0].array_r)
         if reason:
@@ -92,10 +119,10 @@ class SnesDriver:
 
 
 def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the bound method without keeping its object alive: what PETSc may hold.
+    """Return a function that calls the bound method, and does not keep its object alive.
 
-    petsc4py frees a solver late and all at once; whatever PETSc object only its callbacks kept
-    alive would then be lost to the clean-up and never be freed.
+    That is what PETSc may hold: petsc4py frees a solver late and all at once; whatever PETSc object
+    only its callbacks kept alive would then be lost to the clean-up and never be freed.
     """
     reference = weakref.WeakMethod(method)
 
@@ -108,23 +135,18 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Lent:
-    """Pass an object to PETSc as context without giving it away.
-
-    ``weakly`` does so with a method.
-    """
+    """Pass an object to PETSc as context, and do not keep it alive: see ``weakly``."""
 
     def __init__(self, lent: Any) -> None:
         self._lent = weakref.ref(lent)
 
     def __getattr__(self, name: str) -> Any:
+        """Return what the object has of this name."""
         return getattr(self._lent(), name)
 
 
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
-    """Write the bounds of a step into PETSc's vectors.
-
-    Only PETSc's own infinities mean no bound.
-    """
+    """Write the bounds of a step into PETSc's vectors, with PETSc's own infinities for none."""
     lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)
     upper.array[:] = np.minimum(scaled.upper, PETSc.INFINITY)
 
@@ -133,13 +155,18 @@ class AssembledJacobian:
     """Assemble H = A x_ref / r_ref as an AIJ matrix.
 
     It is positive definite, and symmetric where A is.
+
+    Attributes:
+        mat: the matrix.
     """
 
     def __init__(self, system: BoundedSystem) -> None:
+        """Make a matrix of the pattern of A. Collective."""
         self._A = system.assembled()
         self._own = self._A is not getattr(system.A.matrix, "mat", None)
         self.mat = self._A.duplicate(copy=True)
-        self._ratio, self._symmetric = np.nan, system.symmetric
+        self._symmetric = system.symmetric
+        self._ratio = np.nan
 
     def rescale(self, ratio: float) -> None:
         """Take the units of a step."""
@@ -152,6 +179,7 @@ class AssembledJacobian:
         """Do nothing: the matrix is constant."""
 
     def _copy(self) -> None:
+        """Write H into the matrix."""
         self._A.copy(self.mat, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self.mat.scale(self._ratio)
 
@@ -182,11 +210,9 @@ class SemismoothJacobian(AssembledJacobian):
 class ReducedNewton:
     """Solve by an active set method of PETSc, SNES VINEWTONRSLS.
 
-    It makes a factor by MUMPS in every iteration.
-
-    Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg
-    and fieldsplit are refused, they do not survive the reduction. With friction, and where A is not
-    symmetric, LU in place of Cholesky.
+    It makes a factor by MUMPS in every iteration: Cholesky's, or with friction, and where A is not
+    symmetric, LU. Other linear solvers are chosen by ``petsc_options``, e.g. {"ksp_type": "cg",
+    "pc_type": "hypre"}; gamg, mg and fieldsplit are refused, they do not survive the reduction.
     """
 
     carries_friction: ClassVar[bool] = True
@@ -201,28 +227,26 @@ class ReducedNewton:
         return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_reduced)
 
     def friction_defaults(self, ranks: int) -> Options:
-        """Return options before the user's: LU, the system with friction is not symmetric.
+        """Return the options that come before the user's, with friction.
 
-        Its zeros on the diagonal delay pivots, for which MUMPS on several ranks needs more room
-        than usual, or stops with INFOG(1) = -9.
+        They take LU, as the system with friction is not symmetric. Its zeros on the diagonal delay
+        pivots, for which MUMPS on several ranks needs more room than usual, or stops with
+        INFOG(1) = -9.
         """
         return {**NEWTON, **direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
-        return SnesDriver(
-            scaled, layers, FrictionJacobian(scaled), snes_type="vinewtonrsls", check=check_friction
-        )
+        jacobian = FrictionJacobian(scaled)
+        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_friction)
 
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS.
+    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS, with LU by MUMPS.
 
-    It takes LU by MUMPS, and is a diagnostic.
-
-    Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer than the body its line
-    search may fail.
+    It is a diagnostic. Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer
+    than the body its line search may fail.
     """
 
     carries_friction: ClassVar[bool] = False

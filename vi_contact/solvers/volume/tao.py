@@ -17,12 +17,13 @@ from .options import REDUCED_PC, TRON, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
 
+BETTER = 0.9  # of the error: what a run from a new origin must leave at most
+
 
 def check_tao(tao: Any, layers: OptionLayers) -> None:
-    """Refuse other types and preconditioners that give wrong answers.
+    """Raise InputError for types and preconditioners, given as options, that give wrong answers.
 
-    So it does when they come from options (docs/reference/petsc.md: many types ignore bounds, and
-    bqpip reports garbage as converged).
+    Many types ignore bounds, and bqpip reports garbage as converged: docs/reference/petsc.md.
     """
     if tao.getType() != "tron":
         refuse(
@@ -36,54 +37,69 @@ def check_tao(tao: Any, layers: OptionLayers) -> None:
 
 
 class TaoDriver:
-    """Run a TAO object bound to a scaled step; ``solver`` is the PETSc object."""
+    """Run a TAO object bound to a scaled step.
+
+    Attributes:
+        solver: the PETSc object.
+    """
 
     reasons = PETSc.TAO.Reason
 
     def __init__(self, scaled: ScaledStep, layers: OptionLayers) -> None:
-        self._scaled, self._layers = scaled, layers
+        """Make the solver; InputError where PETSc or we do not take the options."""
+        self._scaled = scaled
+        self._layers = layers
         self._hessian = AssembledJacobian(scaled.system)
-        self._y, G = self._hessian.mat.createVecs()
-        self._vectors = [self._y, G, self._y.duplicate(), self._y.duplicate()]
+        self._y, self._gradient = self._hessian.mat.createVecs()
+        self._lower = self._y.duplicate()
+        self._upper = self._y.duplicate()
         self.solver = PETSc.TAO().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType("tron")
-        self.solver.setObjectiveGradient(weakly(scaled.objective), G)
+        self.solver.setObjectiveGradient(weakly(scaled.objective), self._gradient)
         self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
-        self.solver.setVariableBounds((self._vectors[2], self._vectors[3]))
+        self.solver.setVariableBounds((self._lower, self._upper))
         self.solver.setSolution(self._y)
         self.solver.setConvergenceTest(weakly(self._test))
         layers.apply(self.solver, check_tao)
 
     def run(self) -> tuple[Array, Array, int, int]:
         """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
-        scaled, tao = self._scaled, self.solver
+        scaled = self._scaled
+        tao = self.solver
         self._hessian.rescale(scaled.x_ref / scaled.r_ref)
         y = np.clip(scaled.start, scaled.lower, scaled.upper)
-        write_bounds(scaled, self._vectors[2], self._vectors[3])
-        iterations, before = 0, np.inf
+        write_bounds(scaled, self._lower, self._upper)
+        iterations = 0
+        before = np.inf
         while True:
+            # Values of the objective are differences to the one at y.
             scaled.measure_from(y)
             self._y.array[:] = y
             with self._layers.in_force():
                 tao.solve(self._y)
-            y, reason = np.array(self._y.array_r), tao.getConvergedReason()
-            F, iterations = scaled.residual(y), iterations + tao.getIterationNumber()
+            y = np.array(self._y.array_r)
+            F = scaled.residual(y)
+            reason = tao.getConvergedReason()
+            iterations += tao.getIterationNumber()
+
+            # Where a line search fails, the values it compared may have been round-off: measured
+            # from here they have all digits again. NaN ends it too.
             failed = reason == PETSc.TAO.Reason.DIVERGED_LS_FAILURE and not scaled.accepts(y, F)
-            if not (failed and scaled.worst <= 0.9 * before):  # NaN ends it too
+            if not (failed and scaled.worst <= BETTER * before):
                 return y, F, reason, iterations
-            # the values compared were round-off: measured from here they have all digits again
             before = scaled.worst
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""
-        for item in (self.solver, self._hessian, *self._vectors):
+        vectors = (self._y, self._gradient, self._lower, self._upper)
+        for item in (self.solver, self._hessian, *vectors):
             item.destroy()
 
     def _test(self, tao: Any) -> int | None:
-        """Return PETSc's reason to stop; None to go on.
+        """Return PETSc's reason to stop by our verdict; None to go on.
 
-        It is its own, which only the user's tolerances bring, then our verdict.
+        A reason of its own, which only tolerances of the user bring, stays.
         """
         if tao.getConvergedReason():
             return None
@@ -99,19 +115,17 @@ class TaoDriver:
 
 @dataclass(frozen=True)
 class TaoTron:
-    """Solve by TAO TRON.
+    """Solve by TAO TRON, Newton's method with a trust region.
 
-    This is trust region Newton with projected searches, conjugate gradients and incomplete
-    Cholesky.
-
-    Slow, or a StepFailure, with springs more than about 1e3 times stiffer than the body: they
-    shrink its trust region.
+    It has projected searches, conjugate gradients and incomplete Cholesky. With springs more than
+    about 1e3 times stiffer than the body, which shrink its trust region, it is slow or ends in a
+    StepFailure.
     """
 
     carries_friction: ClassVar[bool] = False
 
     def defaults(self, ranks: int) -> Options:
-        """Return the options that come before the user's.
+        """Return the options that come before the user's, on so many ranks.
 
         PETSc has no incomplete Cholesky for several ranks.
         """
