@@ -248,7 +248,7 @@ def test_petsc_options_are_told_from_ours():
 def test_cases_are_listed(capsys):
     assert main(["cases"]) == 0
     *lines, folder = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["channel", "wall"]
+    assert [line.split()[0] for line in lines] == ["beam", "channel", "layer", "wall"]
     assert (Path(folder.removeprefix("the files: ")) / "wall.toml").is_file()
 
 
