@@ -135,6 +135,18 @@ def test_the_force_of_a_particle_acts_towards_the_wall():
     np.testing.assert_allclose(history["u_x_particle"], t + 0.75 * t**2, rtol=1e-9, atol=1e-12)
 
 
+def test_a_motion_shakes_a_particle_along_its_way(tmp_path):
+    """In the frame of the ground, u'' = -a, before the particle is at the layer."""
+    t = 0.01 * np.arange(11)
+    np.savetxt(tmp_path / "motion.txt", np.column_stack([t, 0.0 * t + 2.0]), fmt="%.6f")
+    out, more = str(tmp_path / "out"), ["--set", "excitation.1.record.units=m/s2"]
+    words = ["run", "layer", "--motion", str(tmp_path / "motion.txt"), *more]
+    assert main([*words, "--set", "particle.distance=1.0", "--quiet", "--out", out]) == 0
+    history = vc.read_run(out).history
+    found = history["u_x_particle"][-1]
+    assert history["t"][-1] == pytest.approx(0.1) and found == pytest.approx(0.09, rel=1e-9)
+
+
 def test_a_body_with_a_mesh_may_have_a_layer(tmp_path):
     """A stiff block that starts at rest on its support, moving into it, returns at half its
     speed: the layer stands before the support."""
@@ -160,6 +172,7 @@ def test_a_run_goes_on_after_a_stop(name, tmp_path):
     assert one == two
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["beam", "layer"])
 def test_a_run_folder_is_whole_and_is_reported(name, tmp_path):
     settings = SMALL if name == "beam" else ["run.dt=0.002"]
@@ -172,6 +185,7 @@ def test_a_run_folder_is_whole_and_is_reported(name, tmp_path):
     assert all(path.stat().st_size > 0 for path in files) and len(files) >= 3
 
 
+@pytest.mark.slow
 def test_a_beam_is_refined_and_a_particle_has_no_elements(tmp_path):
     read_case(located("beam"), SMALL).run(COMM, out=tmp_path / "beam", progress=False)
     assert refine(tmp_path / "beam", COMM, progress=False) == {}

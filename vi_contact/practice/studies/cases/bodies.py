@@ -10,7 +10,7 @@ in the place of [friction], [impact] and [scheme], before a body of either kind.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -186,15 +186,14 @@ def contact_layer(
     known = {one.value: one for one in (layers.Metric.BLENDED, layers.Metric.FLAT)}
     if metric not in known:
         raise InputError(f'metric is "{metric}": give {" or ".join(map(repr, known))}')
-    return layers.contact_layer(
-        e,
-        mass=mass,
-        speed=speed,
-        width=width,
-        start=start,
-        strength=strength,
-        metric=known[metric],
-    )
+    given = {"mass": mass, "speed": speed, "width": width, "start": start, "strength": strength}
+    return _found(e, metric=known[metric], **given)
+
+
+@lru_cache
+def _found(e: float, **given: Any) -> Any:
+    """Return the law; it is looked for once, as a search takes two seconds."""
+    return layers.contact_layer(e, **given)
 
 
 def own_body(tables: Mapping[str, Any]) -> str:

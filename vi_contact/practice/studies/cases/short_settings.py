@@ -11,6 +11,7 @@ from typing import Any
 
 from ....core.checks import shown
 from ....core.errors import InputError
+from .bodies import own_body
 from .parsing import nearest
 from .quantities import text_node
 from .stage_tables import refuse_own
@@ -63,7 +64,7 @@ class ShortOptions:
         files = self.motion.split(",")
         before = _tables(tables.get("excitation"))
         direction = before[0].get("direction") if before else None
-        axes = len(direction) if isinstance(direction, list) else 2
+        axes = len(direction) if isinstance(direction, list) else _axes(tables)
         if not all(files) or len(files) > 2:
             raise InputError(
                 f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
@@ -175,6 +176,12 @@ class ShortOptions:
         return [
             f"solver={toml_value({'type': 'CrossChecked', 'primary': solver, 'others': [other]})}"
         ]
+
+
+def _axes(tables: Mapping[str, Any]) -> int:
+    """Return the dimension of a body, as far as its tables tell: one of a rod and a particle."""
+    body = next(iter(_tables(tables.get(own_body(tables)))), {})
+    return 1 if "particle" in tables or body.get("type") == "rod_problem" else 2
 
 
 def _tables(value: Any) -> list[dict[str, Any]]:
