@@ -164,7 +164,7 @@ def test_functions_say_the_same() -> None:
     ],
 )
 def test_remedies_are_told_from_the_ends(limit: Between, whole: bool, said: str) -> None:
-    assert limit.told(whole) == f"give {said}"
+    assert limit.in_words(whole) == f"give {said}"
 
 
 def test_annotations_are_read_as_they_are_written() -> None:

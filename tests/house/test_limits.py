@@ -88,7 +88,9 @@ def test_every_limit_of_an_annotation_is_told() -> None:
                     call(found, argument, wrong, values)
                 defects.append(f"{name}({argument}={wrong}) is taken")
             except InputError as error:
-                if asked.named(argument) not in str(error) or limit.told(whole) not in str(error):
+                if asked.named(argument) not in str(error) or limit.in_words(whole) not in str(
+                    error
+                ):
                     defects.append(f"{name}({argument}={wrong}): {error}")
             except Exception as error:  # what is made without a body may raise anything
                 defects.append(f"{name}({argument}={wrong}): {type(error).__name__} {error}")

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .algebra import Array
-from .checks import at
+from .checks import place_in_words
 
 NAMED = 3  # places of a kind that are named
 # kind -> what that means for the conditions
@@ -28,9 +28,7 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class Census:
-    """Count the nodes of one contact boundary by their kinds.
-
-    The places of those that are not plain contact points are held.
+    """Count the nodes of one contact boundary by their kinds, and say where the odd ones are.
 
     Args:
         name: the boundary, as the user named it; of a pair, that of side 1.
@@ -49,16 +47,14 @@ class Census:
     places: Mapping[str, Array] = field(default_factory=dict)
 
     def in_words(self) -> str:
-        """Return in words how many points of how many nodes there are.
-
-        The other kinds follow with their first places.
-        """
-        kinds = [self._kind(kind, points) for kind, points in self.places.items()]
+        """Return how many points of how many nodes there are, and each kind with first places."""
+        kinds = [self._describe(kind, points) for kind, points in self.places.items()]
         return "; ".join([f"{self.points} points of {self.nodes} nodes", *kinds])
 
-    def _kind(self, kind: str, points: Array) -> str:
+    def _describe(self, kind: str, points: Array) -> str:
+        """Return how many nodes of a kind there are, and the first places of theirs (k, d) [m]."""
         meaning = f" ({MEANINGS[kind]})" if kind in MEANINGS else ""
-        named = ", ".join(at(point) for point in points[:NAMED])
+        named = ", ".join(map(place_in_words, points[:NAMED]))
         more = f" and {len(points) - NAMED} more places" if len(points) > NAMED else ""
         nodes = "1 node" if len(points) == 1 else f"{len(points)} nodes"
         return f"{nodes} {kind}{meaning}, at {named}{more}"

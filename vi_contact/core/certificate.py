@@ -1,7 +1,4 @@
-"""Judge one step: how far an answer is from solving its inequality problem.
-
-``core.verify`` computes it.
-"""
+"""Judge one step: how far an answer is from solving it; ``core.verify`` computes that."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,9 +6,7 @@ from functools import cached_property
 
 @dataclass(frozen=True)
 class Certificate:
-    """Hold the dimensionless residuals of the inequality problem of one step.
-
-    Each is 0 for an exact solution.
+    """Hold the dimensionless residuals of one step, each 0 for an exact solution.
 
     Attributes:
         equilibrium: |A x - b + B_nᵀ r_n|_max / max(|b|_max, |A x|_max, 1e-5 |A_ii|_max |x|_max).

@@ -1,7 +1,4 @@
-"""Name the ways a run stops early.
-
-These are wrong input, a step that no method could certify, and that somebody asked it to.
-"""
+"""Name the ways a run stops early: wrong input, a step without a certificate, a signal."""
 
 import errno
 import signal
@@ -42,24 +39,24 @@ class InputError(ViContactError, ValueError):
 
 
 class StepFailure(ViContactError, RuntimeError):
-    """Say that a step stayed above the certificate tolerance with every method.
-
-    Nothing before it is lost.
-    """
+    """Say that a step passed no certificate with any method; nothing before it is lost."""
 
 
 class Interrupted(KeyboardInterrupt):
     """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks.
 
-    The run's folder has all so far.
+    The run's folder has all steps so far. Like Ctrl-C it is no ``Exception``: no loop over runs
+    goes on.
 
-    Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal;
-    ``status``: 128 + number.
+    Attributes:
+        number: that of the signal.
+        status: with which a command exits, 128 + number.
     """
 
     def __init__(self, message: str = "interrupted", number: int = signal.SIGINT) -> None:
         super().__init__(message, number)
-        self.number, self.status = number, 128 + number
+        self.number = number
+        self.status = 128 + number
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -77,33 +74,37 @@ class OutOfTime(Interrupted):
 
 
 def of_memory(error: BaseException) -> bool:
-    """Say whether an error, or one it came from, says that there is no memory.
+    """Say whether an error, or one it came from, is that there is no memory.
 
     Errors of Python, numpy, HDF5 and PETSc are known.
     """
-    return any(
-        isinstance(one, MemoryError)
-        or getattr(one, "errno", None) == errno.ENOMEM
-        or getattr(one, "ierr", None) == PETSC_ERR_MEM
-        or (
-            not isinstance(one, ViContactError)
-            and any(word in str(one).lower() for word in _MEMORY)
-        )
-        for one in _chain(error)
-    )
+    return any(map(_lacks_memory, _causes(error)))
+
+
+def _lacks_memory(error: BaseException) -> bool:
+    """Say whether an error itself is that there is no memory."""
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+        return True
+    if getattr(error, "ierr", None) == PETSC_ERR_MEM:
+        return True
+    # The package's own sentences may name memory and mean something else.
+    if isinstance(error, ViContactError):
+        return False
+    text = str(error).lower()
+    return any(words in text for words in _MEMORY)
 
 
 def of_machine(error: BaseException) -> bool:
-    """Say whether an error tells of the machine: memory, permissions, open files.
+    """Say whether an error comes from the machine: from memory, permissions, open files.
 
-    Such an error says nothing of what a file holds.
-
-    A handler that takes other errors for the damage of a file raises these again.
+    Such an error says nothing of what a file holds. A handler that takes other errors for the
+    damage of a file raises these again.
     """
     return of_memory(error) or (isinstance(error, OSError) and error.errno in _MACHINE)
 
 
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and those it came from, each once."""
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
         seen.add(id(error))

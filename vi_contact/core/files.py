@@ -34,33 +34,37 @@ _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 FRAME = re.compile(r"frame_(\d{6,})\.h5")  # a file of one frame, with the number of its step
-FRAMES = re.compile(r"frames_\d{6,}\.h5")  # a file of several frames
+FRAMES = re.compile(r"frames_\d{6,}\.h5")  # a file of several frames, each in a group of its step
 
 
 def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
     """Return where the frames of an XDMF series in a run folder are.
 
-    The answer is step -> (HDF5 file, group in it).
+    Returns:
+        Step -> (HDF5 file, group in it).
 
-    InputError where the folder of fields, or a file of frames, is a link.
+    Raises:
+        InputError: the folder of fields, or a file of frames, is a link.
     """
     fields = inner_folder(folder, FIELDS)
     names = sorted(os.listdir(fields)) if fields.is_dir() else []
-    found = {
-        int(match[1]): (fields / name, "/") for name in names if (match := FRAME.fullmatch(name))
-    }
+    frames = {}
+    for name in names:
+        match = FRAME.fullmatch(name)
+        if match:
+            frames[int(match[1])] = (fields / name, "/")
     for name in filter(FRAMES.fullmatch, names):
         with open_hdf5(fields / name) as file:
-            found |= {int(step): (fields / name, f"/{step}") for step in file if step.isdecimal()}
-    return found
+            for step in filter(str.isdecimal, file):
+                frames[int(step)] = (fields / name, f"/{step}")
+    return frames
 
 
 def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
-    """Return the action's value on rank 0, None elsewhere.
+    """Return the action's value on rank 0, None elsewhere. Collective.
 
-    What it raises there is raised on every rank.
-
-    An OSError becomes a ViContactError of one sentence with path and reason. Collective.
+    What it raises there is raised on every rank. An OSError becomes a ViContactError of one
+    sentence with path and reason.
     """
     value: T | None = None
     failure: Exception | None = None
@@ -72,12 +76,14 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
             failure.__cause__ = error
         except Exception as error:  # the other ranks must not wait for this one
             failure = error
-    told = (
-        failure
-        if isinstance(failure, ViContactError) or failure is None
-        else ViContactError(f"rank 0: {failure!r}")
-    )
-    kind, text = comm.bcast((type(told), str(told)) if told is not None else (None, ""))
+
+    # The others raise the package's own errors alike, and tell of any other.
+    message: tuple[type[ViContactError] | None, str] = (None, "")
+    if isinstance(failure, ViContactError):
+        message = (type(failure), str(failure))
+    elif failure is not None:
+        message = (ViContactError, f"rank 0: {failure!r}")
+    kind, text = comm.bcast(message)
     if failure is not None:
         raise failure
     if kind is not None:
@@ -111,21 +117,28 @@ def sentence(error: OSError) -> str:
 
 
 def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
-    """Write a file as a whole or not at all; OSError names it.
+    """Write a file as a whole or not at all.
 
-    ``safe``: even if the power fails, which takes time.
+    Args:
+        path: the file.
+        data: its content.
+        safe: whether this must hold even if the power fails, which takes time.
+
+    Raises:
+        OSError: names the file.
     """
-    with _whole_or_not_at_all(path, safe) as file:
+    with _replace_when_complete(path, safe) as file:
         write_all(file, data)
 
 
 def write_output(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file that a user has named, as a whole or not at all.
 
-    To a stream, such as /dev/stdout, it is written as it is.
+    Data for a stream, such as /dev/stdout, are written as they are. A link of this name is
+    replaced, and what it points at stays as it is.
 
-    OSError names the file. A link of this name is replaced, and what it points at stays as it
-    is.
+    Raises:
+        OSError: names the file.
     """
     if is_stream(Path(path)):
         with open(path, "ab", buffering=0) as file:
@@ -137,12 +150,20 @@ def write_output(path: str | os.PathLike[str], data: bytes) -> None:
 def copy_start(source: Path, target: Path, length: int) -> None:
     """Copy the first bytes of a file of a run, as a whole or not at all.
 
+    Args:
+        source: the file that is copied.
+        target: the copy.
+        length: number of bytes; fewer where the file is shorter.
+
     Raises:
         OSError: names the target.
     """
-    with open_to_read(source) as old, _whole_or_not_at_all(target) as new:
+    with open_to_read(source) as old, _replace_when_complete(target) as new:
         left = length
-        while left and (data := old.read(min(left, STRIDE))):
+        while left:
+            data = old.read(min(left, STRIDE))
+            if not data:
+                break
             write_all(new, data)
             left -= len(data)
 
@@ -157,13 +178,23 @@ def write_all(file: Any, data: bytes) -> None:
     """Write every byte to an unbuffered file: one call may write less when the disk fills up."""
     view = memoryview(data)
     while view:
-        view = view[file.write(view) :]
+        written = file.write(view)
+        view = view[written:]
 
 
 def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
-    """Write a table as a whole and return its path: numbers to the last bit, None empty.
+    """Write a table as a whole: numbers to the last bit, and nothing for None.
 
-    ViContactError if it fails.
+    Args:
+        path: the file.
+        header: names of the columns.
+        rows: the rows, each as long as the header.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ViContactError: it cannot be written.
     """
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows([header, *rows])
@@ -180,11 +211,11 @@ def to_json(facts: Mapping[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Types that JSON knows."""
+    """Return the value in types that JSON knows."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(member) for key, member in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(member) for member in value]
     if isinstance(value, np.generic):
         return _plain(value.item())
     if isinstance(value, float) and not np.isfinite(value):
@@ -193,8 +224,10 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
+def _replace_when_complete(path: Path, safe: bool = True) -> Iterator[Any]:
     """Open an unbuffered file beside ``path`` that takes its place at the end.
+
+    It is pushed onto the medium before where it must be ``safe`` even if the power fails.
 
     Raises:
         OSError: names ``path``.
@@ -223,27 +256,36 @@ def open_hdf5(path: Path) -> StoredFile:
 
 
 def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
-    """Write an HDF5 file likewise, which need not fit the memory."""
+    """Write an HDF5 file as a whole or not at all; it need not fit the memory.
+
+    Args:
+        path: the file.
+        fill: writes into the open file.
+
+    Raises:
+        OSError: names the file.
+    """
     import h5py  # late: the package is imported without it
 
-    with _whole_or_not_at_all(path) as raw:
-        kept = _Kept(raw)
-        with h5py.File(kept, "w", driver="fileobj") as file:
+    with _replace_when_complete(path) as raw:
+        tolerant = _TolerantFile(raw)
+        with h5py.File(tolerant, "w", driver="fileobj") as file:
             fill(file)
-        if kept.error is not None:
-            raise kept.error
+        if tolerant.error is not None:
+            raise tolerant.error
 
 
-class _Kept:
+class _TolerantFile:
     """Hold a file for HDF5, which does not survive a full disk.
 
-    The error is kept, and what comes after it is dropped.
+    The first error is kept, and what is written after it is dropped.
     """
 
     def __init__(self, file: Any) -> None:
         self._file = file
         self.error: OSError | None = None
-        self.seek, self.flush = file.seek, file.flush  # asked for all the time
+        self.seek = file.seek  # both are asked for all the time
+        self.flush = file.flush
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._file, name)

@@ -1,6 +1,4 @@
-"""Read HDF5 files of run folders.
-
-Only numbers that are stored in that very file are read, and no more than the memory can hold.
+"""Read HDF5 files of run folders: numbers stored in that very file, as many as memory can hold.
 
 An HDF5 file may send its reader on: by a soft or external link, by a virtual data set, by external
 storage. It may announce an array that no memory holds. Nothing of this is followed. Writing is in
@@ -23,46 +21,52 @@ _NUMBERS = "fiub"  # kinds of numpy: floats, whole numbers, truth values
 class StoredGroup:
     """Hold a group of an HDF5 file that is open to be read.
 
-    ``group[name]`` is a group or a data set of numbers.
-
-    KeyError for a name that is not there, InputError for what does not lie in this file.
+    ``group[name]`` is a group or a data set of numbers. It raises KeyError for a name that is not
+    there, InputError for what does not lie in this file.
     """
 
     def __init__(self, path: Path, group: Any, size: int) -> None:
-        self._path, self._group, self._size = path, group, size
+        """Hold an open group.
+
+        Args:
+            path: of the file, for sentences.
+            group: of h5py.
+            size: of the file [bytes].
+        """
+        self._path = path
+        self._group = group
+        self._size = size
 
     def __getitem__(self, name: str) -> Any:
-        found: Any = self
+        item: Any = self
         for part in filter(None, name.split("/")):
-            if not isinstance(found, StoredGroup):
+            if not isinstance(item, StoredGroup):
                 raise KeyError(name)
-            found = found._member(part)
-        return found
+            item = item._member(part)
+        return item
 
     def _member(self, name: str) -> Any:
-        """Return a group or data set that lies here.
-
-        Its link is looked at before it is followed.
-        """
+        """Return a group or data set of this group; its link is checked before it is followed."""
         import h5py  # late: no step needs it
 
         link = self._group.get(name, getlink=True)
         if link is None:
             raise KeyError(name)
         if not isinstance(link, h5py.HardLink):
-            raise self._wrong(name, "lies in another file, or elsewhere in this one")
+            raise self._damage(name, "lies in another file, or elsewhere in this one")
         item = self._group[name]
         if isinstance(item, h5py.Group):
             return StoredGroup(self._path, item, self._size)
         if not isinstance(item, h5py.Dataset):
-            raise self._wrong(name, "is no array of numbers of this file")
+            raise self._damage(name, "is no array of numbers of this file")
         if item.external is not None or item.is_virtual:
-            raise self._wrong(name, "lies in another file")
+            raise self._damage(name, "lies in another file")
         if item.dtype.kind not in _NUMBERS or item.nbytes > DENSEST * self._size:
-            raise self._wrong(name, "is no array of numbers of this file")
+            raise self._damage(name, "is no array of numbers of this file")
         return item
 
-    def _wrong(self, name: str, what: str) -> InputError:
+    def _damage(self, name: str, what: str) -> InputError:
+        """Return the error about a member that a run would not have written."""
         return InputError(
             f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, "
             "or run again"
@@ -76,15 +80,15 @@ class StoredGroup:
 
     def copy_to(self, target: Any, name: str) -> None:
         """Copy all data sets of this group into the group ``name`` of a file that is written."""
-        for one in self:
-            self[one]  # refuses what lies elsewhere
+        for member in self:
+            self[member]  # refuses what lies elsewhere
         self._group.copy(self._group, target, name=name)
 
 
 class StoredFile(StoredGroup):
     """Open an HDF5 file of a run folder to be read.
 
-    OSError when it is none, InputError when it is a link.
+    OSError is raised when it is no HDF5 file, InputError when it is a link.
     """
 
     def __init__(self, path: Path) -> None:
@@ -93,8 +97,8 @@ class StoredFile(StoredGroup):
         with open_to_read(path) as own:  # a regular file; HDF5 opens it once more by its name
             status = os.fstat(own.fileno())
             self._file = h5py.File(path, "r")
-            found = os.fstat(self._file.id.get_vfd_handle())
-            if not os.path.samestat(status, found):
+            status_of_hdf5 = os.fstat(self._file.id.get_vfd_handle())
+            if not os.path.samestat(status, status_of_hdf5):
                 self._file.close()
                 raise OSError(None, "it was replaced while it was opened", str(path))
         super().__init__(path, self._file, status.st_size)

@@ -1,7 +1,4 @@
-"""Give a package its public names, each imported when it is first used.
-
-What nobody asks for need not be installed.
-"""
+"""Give a package its public names, each imported when it is first used, and none before."""
 
 import ast
 import sys
@@ -18,47 +15,40 @@ from .renamed import NAMES
 def lazy(
     package: str, file: str
 ) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562).
+    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562), from its stub.
 
-    The stub beside its ``__init__.py`` says what they are.
-
-    A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module,
-    here and for checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a
-    room and hands on all its names; ``from .practice import soil as soil`` hands on a room.
+    A line ``from .module import Name as Name`` of the ``__init__.pyi`` beside its ``__init__.py``
+    is a public name and its module, here and for checkers of types (Scientific Python, SPEC 1);
+    ``from .room import *`` imports a room and hands on all its names, and
+    ``from .practice import soil as soil`` hands on a room.
     """
-    home: dict[str, str] = {}
-    # importing pathlib takes longer than all stubs
+    home: dict[str, str] = {}  # name -> module that has it
+    # Importing pathlib would take longer than reading all stubs.
     with open(splitext(file)[0] + ".pyi", encoding="utf-8") as stub:
-        listed = ast.parse(stub.read()).body
-    for node in listed:
-        if isinstance(node, ast.ImportFrom):
-            # each dot after the first leads out of a package
-            base = package.split(".")[: 1 - node.level or None]
-            module = ".".join([*base, str(node.module)])
-            for one in node.names:
-                home.update(
-                    dict.fromkeys(
-                        import_module(module).__all__ if one.name == "*" else [one.name], module
-                    )
-                )
+        statements = ast.parse(stub.read()).body
+    for statement in statements:
+        if isinstance(statement, ast.ImportFrom):
+            # Each dot after the first leads out of a package.
+            base = package.split(".")[: 1 - statement.level or None]
+            module = ".".join([*base, str(statement.module)])
+            for alias in statement.names:
+                names = import_module(module).__all__ if alias.name == "*" else [alias.name]
+                home.update(dict.fromkeys(names, module))
     public = sorted(home)
 
     def get(name: str) -> Any:
-        if name not in home:
-            renamed = _renamed(package, name)
-            if renamed is None:
-                raise AttributeError(f"module '{package}' has no attribute '{name}'")
-            return renamed
-        module = import_module(home[name])
-        if not hasattr(module, name):
-            return import_module(f"{home[name]}.{name}")  # a room that is handed on
-        return getattr(module, name)
+        if name in home:
+            module = import_module(home[name])
+            if not hasattr(module, name):
+                return import_module(f"{home[name]}.{name}")  # a room that is handed on
+            return getattr(module, name)
+        value = _get_renamed(package, name)
+        if value is None:
+            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+        return value
 
     class Room(ModuleType):
-        """Keep names when Python binds a module of the same name.
-
-        So ``run.simulate`` stays the function.
-        """
+        """Keep names when Python binds a module of the same name: run.simulate is the function."""
 
         def __setattr__(self, name: str, value: Any) -> None:
             if name not in home or not isinstance(value, ModuleType):
@@ -68,10 +58,10 @@ def lazy(
     return public, get, lambda: public
 
 
-def _renamed(package: str, name: str) -> Any:
-    """Return what an old public name of a package is called now, with a warning.
+def _get_renamed(package: str, name: str) -> Any:
+    """Return the thing that had a public name of a package before, with a warning.
 
-    It is None for a name that never was.
+    Returns None for a name that never was.
     """
     path = NAMES.get(package, {}).get(name)
     if path is None:

@@ -12,9 +12,17 @@ from .system import SemiDiscreteSystem
 
 @dataclass(frozen=True)
 class StepEnergy:
-    """Say where energy went [J].
+    """Say where energy went in a step [J].
 
     The ledger is change = input - damping - contact - friction - algorithmic + defect.
+
+    Attributes:
+        change: of kinetic and strain energy.
+        input: work of loads and of a moving obstacle.
+        damping: work lost in viscous damping.
+        contact: work lost to the support, stored or dissipated there.
+        friction: work lost in friction.
+        algorithmic: what the time scheme loses, or gains where it is negative.
     """
 
     change: float
@@ -26,20 +34,23 @@ class StepEnergy:
 
     @property
     def defect(self) -> float:
-        """Return what the ledger cannot explain.
+        """Return what the ledger cannot explain [J].
 
         It is rounding and the tolerance of the solver when the step was solved.
         """
-        return self.change - (
-            self.input - self.damping - self.contact - self.friction - self.algorithmic
-        )
+        explained = self.input - self.damping - self.contact - self.friction - self.algorithmic
+        return self.change - explained
 
 
 @dataclass(frozen=True)
 class Energies:
-    """Hold M v, K u and the energies of a state [J].
+    """Hold the energies of a state; a ledger carries them on, so that none is made twice.
 
-    A ledger carries them on, so that none is made twice.
+    Attributes:
+        momentum: M v (n,) [N s].
+        elastic: K u (n,) [N].
+        kinetic: ½ vᵀMv [J].
+        strain: ½ uᵀKu [J].
     """
 
     momentum: Array
@@ -54,18 +65,33 @@ class Energies:
 
 
 def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
-    """Return the energies of displacement u and velocity v: two products, unless they are known."""
-    momentum, elastic = system.product("M", v), system.product("K", u)
-    kinetic, strain = _dots(system, (v, momentum), (u, elastic))
+    """Return the energies of a state: two products, unless they are known. Collective.
+
+    Args:
+        system: the equations that are marched.
+        u: displacement (n,) [m].
+        v: velocity (n,) [m/s].
+    """
+    momentum = system.product("M", v)
+    elastic = system.product("K", u)
+    kinetic, strain = _dot_pairs(system, (v, momentum), (u, elastic))
     return Energies(momentum, elastic, 0.5 * kinetic, 0.5 * strain)
 
 
-def _dots(
+def _dot_pairs(
     system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()
 ) -> list[float]:
-    """Inner products, and sums over the ranks, with one reduction for all."""
-    comm, found = system.algebra.comm, [*[float(x.dot(y)) for x, y in pairs], *sums]
-    return found if comm.size == 1 else comm.sum(np.array(found)).tolist()
+    """Return inner products and sums over all ranks, by one reduction.
+
+    Args:
+        system: whose ranks count.
+        pairs: pairs of vectors (n,), for the inner products.
+        sums: terms of this rank, for the sums.
+    """
+    comm = system.algebra.comm
+    terms = [float(x.dot(y)) for x, y in pairs]
+    terms += sums
+    return terms if comm.size == 1 else comm.sum(np.array(terms)).tolist()
 
 
 def energy_balance(
@@ -89,38 +115,46 @@ def energy_balance(
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
 
     algorithmic is 0 for the midpoint rule, and change is the difference of the energies themselves,
-    so the defect measures the equation of motion. ``before``, ``after``: the energies of both
-    states, when known; one product (two with damping) is left then.
+    so the defect measures the equation of motion. Collective.
+
+    Args:
+        problem: the problem that is marched.
+        old: the state before the step.
+        new: the state after it, before the impact law.
+        balance: the equation of motion that the step satisfied.
+        before: the energies of ``old``, when they are known.
+        after: those of ``new``. With both, one product is left, two with damping.
     """
-    system, surface = problem.equations, problem.surface
+    system = problem.equations
+    surface = problem.surface
     before = before or energies(system, old.u, old.v)
     after = after or energies(system, new.u, new.v)
     du = new.u - old.u
-    pushed, dragged = _obstacle_work(problem, old.t, new.t, balance)
-    rubbing = (
-        0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du)))
-    )
-    work, inertia, kinetic, stiffness, lost, *local = _dots(
+
+    # What this rank has of each work, and of the difference of the scheme's averages from the mean
+    # of both ends; one reduction adds all of it up over the ranks.
+    push, drag = _obstacle_work(problem, old.t, new.t, balance)
+    rub = 0.0
+    if balance.r_t is not None:
+        rub = float(np.sum(balance.r_t * surface.tangential_values(du)))
+    damp = 0.0
+    if system.C is not None:
+        damp = float(du.dot(system.product("C", balance.v)))
+    load, inertia, kinetic, stiffness, press, rub, push, drag, damp = _dot_pairs(
         system,
         (du, balance.f),
         (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
         (balance.r_n, surface.normal_values(du)),
-        sums=(
-            rubbing,
-            pushed,
-            dragged,
-            0.0 if system.C is None else float(du.dot(system.product("C", balance.v))),
-        ),
+        sums=(rub, push, drag, damp),
     )
-    rubbing, pushed, dragged, damping = local
     return StepEnergy(
         change=after.total - before.total,
-        input=work + pushed + dragged,
-        damping=damping,
-        contact=lost + pushed,
-        friction=rubbing + dragged,
+        input=load + push + drag,
+        damping=damp,
+        contact=press + push,
+        friction=rub + drag,
         algorithmic=inertia - kinetic + stiffness,
     )
 
@@ -128,13 +162,18 @@ def energy_balance(
 def _obstacle_work(
     problem: ContactProblem, start: float, end: float, balance: Balance
 ) -> tuple[float, float]:
-    """Return the work that a moving obstacle does on the body on this rank.
+    """Return the work [J] of a moving obstacle on this rank: r_n·advance and -r_t·sliding.
 
-    It is (normal, tangential): r_n·advance and -r_t·sliding.
+    Args:
+        problem: the problem that is marched.
+        start: time of the beginning of the step [s].
+        end: time of its end [s].
+        balance: the equation of motion, with the reactions.
     """
-    advance, sliding = problem.surface.advance(start, end), problem.surface.sliding(start, end)
-    pushed = 0.0 if advance is None else float(balance.r_n @ advance)
-    dragged = (
-        0.0 if sliding is None or balance.r_t is None else -float(np.sum(balance.r_t * sliding))
-    )
-    return pushed, dragged
+    advance = problem.surface.advance(start, end)
+    sliding = problem.surface.sliding(start, end)
+    normal = 0.0 if advance is None else float(balance.r_n @ advance)
+    tangential = 0.0
+    if sliding is not None and balance.r_t is not None:
+        tangential = -float(np.sum(balance.r_t * sliding))
+    return normal, tangential

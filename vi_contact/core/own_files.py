@@ -1,6 +1,4 @@
-"""Open the files of a run folder.
-
-These are regular files of that very folder, never what a link there points at.
+"""Open the files of a run folder: regular files of that very folder, never what a link points at.
 
 Every file that a run, a report or a study reads or writes in a run folder is opened here (HDF5
 files: ``core.hdf5``).
@@ -30,10 +28,10 @@ _KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-# nonblocking: to open a pipe would wait for its other end
+# Nonblocking, as opening a pipe would wait for its other end.
 _SAFE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 TRIES = 10  # to make a file anew, while somebody else makes one of that name
-# where users name a stream as an output
+# Folders of the streams that users name as outputs.
 DEVICES = (Path("/dev"), Path("/dev/fd"), Path("/proc/self/fd"))
 
 
@@ -74,25 +72,35 @@ def make_inner_folder(folder: Path, *names: str) -> Path:
 def open_to_read(path: Path) -> Any:
     """Open a regular file, buffered.
 
-    InputError for anything else of this name; OSError names the file.
+    Raises:
+        InputError: there is anything else of this name.
+        OSError: names the file.
     """
-    return os.fdopen(_opened(path, os.O_RDONLY), "rb")
+    return os.fdopen(_open_descriptor(path, os.O_RDONLY), "rb")
 
 
 def open_to_append(path: Path, *, make: bool = False) -> Any:
     """Open a regular file, unbuffered, to read it and to write at its end.
 
-    ``make`` it where there is none.
-
     A file that has another name too (a hard link) stays as it is under that name: this one gets a
-    copy. InputError for anything but a regular file; OSError names the file.
+    copy.
+
+    Args:
+        path: the file.
+        make: whether to make it where there is none.
+
+    Raises:
+        InputError: there is anything but a regular file of this name.
+        OSError: names the file.
     """
-    flags = os.O_RDWR | os.O_APPEND | (os.O_CREAT if make else 0)
-    file = _unbuffered(_opened(path, flags), path, "ab+")
+    flags = os.O_RDWR | os.O_APPEND
+    if make:
+        flags |= os.O_CREAT
+    file = _wrap_unbuffered(_open_descriptor(path, flags), path, "ab+")
     if names(file) > 1:
         file.close()
-        _copied(path)
-        file = _unbuffered(_opened(path, flags), path, "ab+")
+        _replace_by_copy(path)
+        file = _wrap_unbuffered(_open_descriptor(path, flags), path, "ab+")
     return file
 
 
@@ -102,27 +110,24 @@ def open_lock(path: Path) -> Any:
     Raises:
         InputError: there is anything else of this name.
     """
-    return _unbuffered(_opened(path, os.O_RDWR | os.O_CREAT), path, "rb+")
+    return _wrap_unbuffered(_open_descriptor(path, os.O_RDWR | os.O_CREAT), path, "rb+")
 
 
 def names(file: Any) -> int:
-    """Return how many names an open file has.
-
-    There are more than one where there are hard links, and 0 when it was removed.
-    """
+    """Return how many names an open file has: more with hard links, 0 when it was removed."""
     return os.fstat(file.fileno()).st_nlink
 
 
 def open_new(path: Path) -> Any:
     """Make a file anew, unbuffered, in the place of whatever has its name, but for a folder.
 
-    OSError names the file.
+    Raises:
+        OSError: names the file.
     """
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | _SAFE
     for _ in range(TRIES):
         try:
-            return _unbuffered(
-                os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _SAFE, 0o666), path, "wb+"
-            )
+            return _wrap_unbuffered(os.open(path, flags, 0o666), path, "wb+")
         except FileExistsError:
             remove(path)
     raise OSError(f"another program makes '{path}' again and again")
@@ -142,9 +147,9 @@ def read_bytes(path: Path) -> bytes:
 def read_text(path: Path) -> str:
     """Return the text of a regular file.
 
-    It raises what ``read_bytes`` raises, and further:
-
     Raises:
+        InputError: there is anything else of this name.
+        OSError: names the file.
         ValueError: it is not UTF-8.
     """
     return read_bytes(path).decode("utf-8")
@@ -153,17 +158,14 @@ def read_text(path: Path) -> str:
 def remove(path: Path) -> None:
     """Remove a name, if there is one: of a link the link alone.
 
-    OSError for a folder, which
-    stays.
+    Raises:
+        OSError: it is a folder, which stays.
     """
     path.unlink(missing_ok=True)
 
 
 def is_stream(path: Path) -> bool:
-    """Return whether a user has named a stream, such as /dev/stdout, as the place of an output.
-
-    Never replace these.
-    """
+    """Return whether a user has named a stream, such as /dev/stdout; these are never replaced."""
     path = Path(os.path.abspath(path))
     return path.parent in DEVICES and os.path.lexists(path)
 
@@ -184,9 +186,10 @@ def _mode(path: Path) -> int | None:
         return None
 
 
-def _opened(path: Path, flags: int) -> int:
-    """Return the descriptor of a regular file."""
-    # the sentence says what it is; a link that is made after this is not followed either
+def _open_descriptor(path: Path, flags: int) -> int:
+    """Open a regular file, and return its descriptor."""
+    # The first check says what it is. A link that is made after it is not followed either, and what
+    # was opened is looked at once more.
     is_own(path)
     descriptor = os.open(path, flags | _SAFE, 0o666)
     mode = os.fstat(descriptor).st_mode
@@ -196,7 +199,7 @@ def _opened(path: Path, flags: int) -> int:
     return descriptor
 
 
-def _copied(path: Path) -> None:
+def _replace_by_copy(path: Path) -> None:
     """Put a copy of a file in its place."""
     copy = temporary_of(path)
     with open_to_read(path) as old, open_new(copy) as new:
@@ -209,15 +212,21 @@ def temporary_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}.tmp")
 
 
-def _unbuffered(descriptor: int, path: Path, mode: str) -> Any:
-    """Return a file object that knows its name."""
+def _wrap_unbuffered(descriptor: int, path: Path, mode: str) -> Any:
+    """Return an unbuffered file object, which knows its name, for a descriptor."""
     return open(path, mode, buffering=0, opener=lambda *_: descriptor)
 
 
 def _foreign(path: Path, mode: int, wanted: str) -> InputError:
-    kind = next(
-        (name for test, name in _KINDS if test(mode)), "a file" if wanted == "folder" else "no file"
-    )
+    """Return the error about what is no file, or no folder, of the run's own.
+
+    Args:
+        path: its name.
+        mode: what ``os.lstat`` says of it.
+        wanted: "file" or "folder".
+    """
+    other = "a file" if wanted == "folder" else "no file"
+    kind = next((name for is_kind, name in _KINDS if is_kind(mode)), other)
     return InputError(
         f"'{path}' is {kind}, and a run reads and writes only files of its own folder: put a "
         f"{wanted} in its place, remove it, or choose another folder"

@@ -1,6 +1,4 @@
-"""Ask which packages PETSc was built with, without an import of PETSc.
-
-Rooms that do without it may ask too.
+"""Ask which packages PETSc was built with, without an import of PETSc, as any room may.
 
 Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on somebody's machine.
 """
@@ -8,7 +6,7 @@ Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on 
 import sys
 
 PETSC = "petsc4py.PETSc"
-# one package to PETSc before 3.22, and from then on each by itself
+# One package to PETSc before 3.22, and from then on each by itself.
 OF_SUITESPARSE = ("amd", "cholmod", "umfpack")
 
 
@@ -18,10 +16,7 @@ def petsc_is_here() -> bool:
 
 
 def petsc_has(package: str) -> bool:
-    """Say whether PETSc is in this process, and was built with a package.
-
-    The package is given by its name in PETSc's configuration.
-    """
+    """Say whether PETSc is in this process, and was built with a package of its configuration."""
     if not petsc_is_here():
         return False
     names = [package, "suitesparse"] if package in OF_SUITESPARSE else [package]

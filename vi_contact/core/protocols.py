@@ -1,7 +1,4 @@
-"""Describe what a problem asks of its laws and of what shakes it.
-
-These are the protocols that users' own classes satisfy.
-"""
+"""Describe what a problem asks of its laws and of what shakes it: protocols for users' classes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,30 +19,21 @@ Direction = Annotated[tuple[float, ...], Finite, RATIO]
 
 
 class Excitation(Protocol):
-    """Shake the ground in one direction, or give any motion its history.
-
-    This is the contract of every excitation.
-    """
+    """Shake the ground in one direction, or give any motion its history."""
 
     @property
     def direction(self) -> tuple[float, ...]:
-        """Return the components of the direction, (d,), not all zero.
-
-        Its length is a factor of the acceleration.
-        """
+        """Return the direction (d,), not all zero; its length is a factor of the acceleration."""
 
     @property
     def duration(self) -> float:
-        """Return the time [s] after which the acceleration stays zero or negligible.
-
-        It is infinite if the acceleration never does.
-        """
+        """Return the time [s] after which it stays zero or negligible, or infinity."""
 
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] at time ``t`` [s], positive along the direction.
 
-        Asked for at any time >= 0, also twice and between the steps; the same on every rank, a
-        finite number.
+        It is asked for at any time >= 0, also twice and between the steps. It is a finite number,
+        the same on every rank.
         """
 
     def __call__(self, t: float) -> Array:
@@ -70,7 +58,12 @@ def check_excitation(excitation: Excitation) -> None:
 
 
 def finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float, ...]:
-    """Return `values` as a tuple of floats.
+    """Return numbers as a tuple of floats.
+
+    Args:
+        owner: class that asks, the first word of the sentence.
+        name: the argument.
+        values: what the user gave.
 
     Raises:
         InputError: names the first entry that is not a finite number.
@@ -87,32 +80,25 @@ class FrictionLaw(Protocol):
     """
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return the largest tangential reaction of each condition, (m,), >= 0.
-
-        It is in the unit of ``r_n``.
+        """Return the largest tangential reactions (m,) >= 0, in the unit of ``r_n``.
 
         Args:
             r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as
                 zero.
             weights: tributary lengths times thickness, or areas (m,) [m²]: what turns stresses into
                 forces.
-            scale: of the step: 1 for forces, dt [s] for impulses. A limit that ignores r_n is
+            scale: that of the step, 1 for forces, dt [s] for impulses. A limit that ignores r_n is
                 multiplied by it.
         """
 
     def slope(self, weights: Array) -> Array:
-        """Return d limit / d r_n >= 0 of each condition under pressure, (m,).
-
-        ``weights`` are as in ``limit``.
-        """
+        """Return d limit / d r_n >= 0 (m,) under pressure; the weights are as in ``limit``."""
 
     def at(self, speed: Array) -> "FrictionLaw":
-        """Return the law at slip rates ``speed`` = |v_t| (m,) [m/s], >= 0.
-
-        That law has a limit and slope of its own.
+        """Return the law at slip rates |v_t| (m,) [m/s] >= 0, with its own limit and slope.
 
         ``limit`` and ``slope`` of the law itself are those at rest. A law without rates returns
-        itself: no iteration.
+        itself; then nothing is iterated.
         """
 
 
@@ -123,7 +109,7 @@ class Frictionless:
     never_negative: ClassVar[bool] = True
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return zeros, shape (m,)."""
+        """Return zeros, shape (m,); the arguments are those of ``FrictionLaw``."""
         return np.zeros_like(r_n, dtype=float)
 
     def slope(self, weights: Array) -> Array:
@@ -144,7 +130,8 @@ class Impact:
     Attributes:
         before: (m,) normal velocities before the step [m/s], > 0 towards the obstacle.
         v_n: (m,) normal velocities that the step left [m/s].
-        active: (m,) which are closed. closing: (m,) which have just closed.
+        active: (m,) True for closed conditions.
+        closing: (m,) True for those that have just closed.
     """
 
     before: Array
@@ -156,32 +143,28 @@ class Impact:
 class ImpactLaw(Protocol):
     """Change velocities after a step in which conditions are closed.
 
-    It is a law of ``laws.impact``, or your own. One that says ``by_rows = True`` also gets those of
-    several runs, (k, m) and (k, n), and returns them.
+    It is a law of ``laws.impact``, or your own. A law that says ``by_rows = True`` also gets
+    velocities of several runs, (k, m) and (k, n), and returns such.
     """
 
     def target(self, impact: Impact) -> Array:
-        """Return the normal velocities (m,) [m/s] after ``impact``.
+        """Return the normal velocities (m,) [m/s] after an impact, NaN where they stay as they are.
 
-        They are NaN where the law leaves the velocity alone.
-
-        > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is
-        active.
+        > 0 is towards the obstacle, so a rebound is negative. The loop calls it only when some
+        condition is active.
         """
 
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
-        """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,).
-
-        Velocities are left alone where ``target`` is NaN. Collective.
+        """Return the velocity vector (n,) [m/s] with the wanted normal velocities. Collective.
 
         Args:
             system: the equations that are marched, whose M says what an impulse does.
-            surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to
+            surface: its contact conditions; ``surface.normal_values(v)`` are the velocities to
                 change.
             v: the velocity (n,) [m/s] that the step left; not to be written to.
-            target: normal velocities (m,) [m/s], NaN where the velocity is left alone.
+            target: wanted normal velocities (m,) [m/s], NaN where they stay as they are.
         """
 
 
@@ -191,9 +174,10 @@ class MassLaw(Protocol):
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
-        """Return ``system`` with the wanted mass matrix.
+        """Return ``system.changed(M=…, massless=…)`` with the wanted mass, or ``system`` as it is.
 
-        It is ``system.changed(M=…, massless=…)``, or ``system`` as it is.
+        Total mass and centre of mass should stay as they are; C and the load follow when inertia is
+        moved. Collective.
 
         Args:
             system: in the rotated basis of ``surface``, every body in its own unknowns, before the
@@ -202,7 +186,4 @@ class MassLaw(Protocol):
                 unknowns without).
             tangential: whether there is friction: then tangential contact unknowns matter as normal
                 ones do.
-
-        Total mass and centre of mass should stay as they are; C and the load follow when inertia is
-        moved. Collective.
         """

@@ -42,12 +42,14 @@ class Remedy(NamedTuple):
 
 
 class Between(NamedTuple):
-    """Bound a number by two ends.
+    """Bound a number by two ends; whole numbers where the annotation is ``int``.
 
-    ends: "[]", "()", "[)" or "(]": a square bracket for an end that is included, a round one for
-    an end that is not; infinite numbers never hold. remedy: what to do, such as "give a ratio, not
-    per cent"; without one it is told from the ends. Where the annotation is ``int`` it bounds whole
-    numbers.
+    Attributes:
+        low: the lower end.
+        high: the upper end; infinite numbers never hold.
+        ends: "[]", "()", "[)" or "(]": a square bracket for an end that is included, a round one
+            for an end that is not.
+        remedy: what to do, such as "give a ratio, not per cent"; "" for words made of the ends.
     """
 
     low: float
@@ -61,16 +63,17 @@ class Between(NamedTuple):
 
     def holds(self, value: float) -> bool:
         """Return whether a number is finite and between the ends."""
-        return (
-            self.low <= value <= self.high
-            and math.isfinite(value)
-            and (value != self.low or self.ends[0] == "[")
-            and (value != self.high or self.ends[1] == "]")
-        )
+        if not (self.low <= value <= self.high and math.isfinite(value)):
+            return False
+        if value == self.low and self.ends[0] == "(":
+            return False
+        return value != self.high or self.ends[1] == "]"
 
-    def told(self, whole: bool = False) -> str:
-        """Return the remedy: what to give, as the end of a sentence."""
-        return self.remedy or f"give {self._whole() if whole else self._real()}"
+    def in_words(self, whole: bool = False) -> str:
+        """Return the remedy as the end of a sentence: what to give, or which whole number."""
+        if self.remedy:
+            return self.remedy
+        return f"give {self._describe_whole() if whole else self._describe_real()}"
 
     def least(self) -> float:
         """Return the least whole number that holds; -inf where there is none."""
@@ -82,24 +85,32 @@ class Between(NamedTuple):
         most = math.floor(self.high) if math.isfinite(self.high) else self.high
         return most - 1 if self.ends[1] == ")" and most == self.high else most
 
-    def _whole(self) -> str:
-        ends = [f"at least {self.least()}"] if math.isfinite(self.low) else []
-        ends += [f"at most {self.most()}"] if math.isfinite(self.high) else []
-        return f"a whole number{' of ' if ends else ''}{' and '.join(ends)}"
+    def _describe_whole(self) -> str:
+        """Return the words for whole numbers that hold."""
+        ends = []
+        if math.isfinite(self.low):
+            ends.append(f"at least {self.least()}")
+        if math.isfinite(self.high):
+            ends.append(f"at most {self.most()}")
+        return f"a whole number of {' and '.join(ends)}" if ends else "a whole number"
 
-    def _real(self) -> str:
+    def _describe_real(self) -> str:
+        """Return the words for numbers that hold."""
         if self in _WORDS:
             return _WORDS[self]
-        opened, closed = self.ends[0] == "(", self.ends[1] == ")"
+        excludes_low = self.ends[0] == "("
+        excludes_high = self.ends[1] == ")"
         if math.isinf(self.high):
-            return f"a finite number {'above' if opened else 'of at least'} {self.low:g}"
+            return f"a finite number {'above' if excludes_low else 'of at least'} {self.low:g}"
         if math.isinf(self.low):
-            return f"a finite number {'below' if closed else 'of at most'} {self.high:g}"
-        if opened and closed:
+            return f"a finite number {'below' if excludes_high else 'of at most'} {self.high:g}"
+        if excludes_low and excludes_high:
             return f"a number between {self.low:g} and {self.high:g}, both excluded"
-        lower = f"above {self.low:g} and" if opened else f"from {self.low:g}"
-        upper = "to less than" if closed else "at most" if opened else "to"
-        return f"a number {lower} {upper} {self.high:g}"
+        if excludes_low:
+            return f"a number above {self.low:g} and at most {self.high:g}"
+        if excludes_high:
+            return f"a number from {self.low:g} to less than {self.high:g}"
+        return f"a number from {self.low:g} to {self.high:g}"
 
 
 Finite = Between(-math.inf, math.inf)
@@ -122,8 +133,12 @@ _WORDS = {
 class Quantity:
     """Hold what the annotation of an argument says of it.
 
-    kind: its type without marks; meaning: words for it, with its name in them; other: what to do
-    about another type.
+    Attributes:
+        kind: its type without marks.
+        limit: the limits of its numbers; None for none.
+        unit: its unit; None for none.
+        meaning: words for it, with its name in them; "" for none.
+        other: what to do about a value of another type; None for words made of the type.
     """
 
     kind: Any
@@ -138,7 +153,7 @@ class Quantity:
         return "" if self.unit in (None, RATIO) else self.unit.symbol
 
     def named(self, name: str) -> str:
-        """Return the words for it in a sentence, of which the unit is one.
+        """Return the words for it in a sentence, its meaning with the unit, or its name.
 
         The unit of an argument without a meaning stands in the remedy.
         """
@@ -149,8 +164,9 @@ class Quantity:
         """Return the end of the sentence about a wrong number; "" where all are right."""
         if self.limit is None:
             return ""
-        plain = self.symbol and not (self.meaning or self.limit.remedy)
-        return f"{self.limit.told(whole)}{f' in {self.symbol}' if plain else ''}"
+        needs_unit = self.symbol and not (self.meaning or self.limit.remedy)
+        unit = f" in {self.symbol}" if needs_unit else ""
+        return f"{self.limit.in_words(whole)}{unit}"
 
 
 @cache
@@ -161,39 +177,41 @@ def quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
     that it inherits from. Of a class whose own annotations cannot be resolved, as one made in a
     function, those that it inherits are read.
     """
-    inherited = (
-        quantities(owner.__mro__[1]) if isinstance(owner, type) and owner is not object else {}
-    )
+    inherited: Mapping[str, Quantity] = {}
+    if isinstance(owner, type) and owner is not object:
+        inherited = quantities(owner.__mro__[1])
     try:
-        marked, bare = get_type_hints(owner, include_extras=True), get_type_hints(owner)
+        marked = get_type_hints(owner, include_extras=True)
+        bare = get_type_hints(owner)
     except NameError:
         if not isinstance(owner, type) or owner.__base__ is object:
             raise
         return inherited
-    found = {name: _quantity(marked[name], bare[name]) for name in bare}
-    for name, one in inherited.items():
-        if name in found and not any(_marks(marked[name])):
-            found[name] = replace(one, kind=found[name].kind)
-    return MappingProxyType(found)
+    result = {name: _read_hint(marked[name], bare[name]) for name in bare}
+    for name, quantity in inherited.items():
+        if name in result and not any(_marks(marked[name])):
+            result[name] = replace(quantity, kind=result[name].kind)
+    return MappingProxyType(result)
 
 
-def _quantity(hint: Any, kind: Any) -> Quantity:
+def _read_hint(hint: Any, kind: Any) -> Quantity:
     """Return what a hint says; the kind is the hint without marks."""
-    found: dict[type, Any] = {}
+    mark_of: dict[type, Any] = {}
     for mark in _marks(hint):
-        if found.setdefault(type(mark), mark) != mark:
-            raise TypeError(f"{hint} says two things at once: {found[type(mark)]!r} and {mark!r}")
-    limit = found.get(Between)
+        first = mark_of.setdefault(type(mark), mark)
+        if first != mark:
+            raise TypeError(f"{hint} says two things at once: {first!r} and {mark!r}")
+    limit = mark_of.get(Between)
     if limit is not None and (limit.ends not in ENDS or not limit.low < limit.high):
         raise TypeError(f"{hint}: give low < high, and ends out of {', '.join(ENDS)}")
-    return Quantity(kind, limit, found.get(Unit), found.get(str, ""), found.get(Remedy))
+    return Quantity(kind, limit, mark_of.get(Unit), mark_of.get(str, ""), mark_of.get(Remedy))
 
 
 def _marks(hint: Any) -> Iterator[Any]:
     """Yield the marks of a hint, those inside unions and lists too."""
     if get_origin(hint) is Annotated:
-        yield from (
-            one for one in hint.__metadata__ if isinstance(one, Between | Unit | Remedy | str)
-        )
-    for one in get_args(hint):
-        yield from _marks(one)
+        for mark in hint.__metadata__:
+            if isinstance(mark, Between | Unit | Remedy | str):
+                yield mark
+    for argument in get_args(hint):
+        yield from _marks(argument)

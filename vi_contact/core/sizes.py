@@ -1,19 +1,22 @@
-"""Say which problems are small.
-
-These are those that a dense matrix on every rank, or a factor made in passing, suits.
-"""
+"""Say which problems suit a dense matrix on every rank, or a factor that is made in passing."""
 
 from .algebra import Comm, total
 from .errors import InputError
 
 DENSE_ROWS = 10_000  # 0.8 GB a matrix, and its factor and a copy while it is made, on every rank
-# beyond it a factor of the mass matrix takes seconds, conjugate gradients a tenth of one
+# Beyond it a factor of the mass matrix takes seconds, conjugate gradients a tenth of one.
 OWN_UNKNOWNS = 50_000
 OWN_CONDITIONS = 1_000  # as many back-substitutions, and a dense matrix
 
 
 def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which stores none") -> None:
-    """Raise InputError for more contact unknowns than a dense matrix on every rank suits."""
+    """Raise InputError for more contact unknowns than a dense matrix on every rank suits.
+
+    Args:
+        owner: class that stores the matrix, the first word of the sentence.
+        rows: number of contact unknowns.
+        instead: what to take, for the sentence.
+    """
     if rows > DENSE_ROWS:
         raise InputError(
             f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, "
@@ -22,14 +25,17 @@ def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which st
 
 
 def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
-    """Say whether what the package solves beside the steps is small.
+    """Say whether a problem that the package solves beside the steps is small. Collective.
 
-    The unknowns and contact conditions of this rank decide.
+    Small ones are condensed with a factor of their own, whatever solves the steps; larger ones are
+    solved by conjugate gradients.
 
-    Such problems are condensed with a factor of their own, whatever solves the steps; larger ones
-    are solved by conjugate gradients. ``worth``: for problems that come again and again, so many
-    times larger. Collective.
+    Args:
+        comm: the ranks.
+        unknowns: number of unknowns of this rank.
+        conditions: number of contact conditions of this rank.
+        worth: so many times more unknowns count as few, for problems that come again and again.
     """
-    return (
-        total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
-    )
+    if total(comm, unknowns) > worth * OWN_UNKNOWNS:
+        return False
+    return total(comm, conditions) <= OWN_CONDITIONS

@@ -1,7 +1,4 @@
-"""Make the state a run begins with; check that a state belongs to a problem.
-
-The check looks at its time and its arrays on every rank.
-"""
+"""Make the state that a run begins with, and check that a state belongs to a problem."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,6 +10,9 @@ from .checks import instance, number, refuse, shown, whole
 from .errors import InputError
 from .problem import ContactProblem
 from .step import State
+
+# Of the largest displacement or gap: how far round-off may put a body into its obstacle.
+OVERLAP = 1e-9
 
 
 def check_problem_given(owner: str, value: Any) -> None:
@@ -32,15 +32,24 @@ def start_time(owner: str, state: Any) -> float:
 
 
 def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
-    """Raise InputError, on all ranks, for a state of another problem. Collective."""
+    """Raise InputError, on all ranks, for a state of another problem. Collective.
+
+    Args:
+        owner: class or function that asks, the first word of the sentence.
+        problem: the problem.
+        state: the state, which may be anything on any rank.
+    """
     start_time(owner, state)
     instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run")
-    refuse((f"{owner}: {text}" for text in _of_state(problem, state)), problem.surface.comm)
+    defects = _find_defects_of_state(problem, state)
+    refuse((f"{owner}: {text}" for text in defects), problem.surface.comm)
 
 
-def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
-    """Say what is wrong with a state on this rank."""
-    n, m, d = problem.system.rows, problem.surface.count, problem.system.influence.shape[1]
+def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[str]:
+    """Yield a sentence for each wrong array of a state on this rank."""
+    n = problem.system.rows
+    m = problem.surface.count
+    d = problem.system.influence.shape[1]
     shapes: dict[str, tuple[int, ...]] = {
         "u": (n,),
         "v": (n,),
@@ -52,33 +61,37 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
         value = getattr(state, name)
         if name == "r_t" and value is None:
             continue
-        kinds, wanted = (
-            ("b", "True or False") if name == "active" else ("iuf", "finite real numbers")
-        )
         if not isinstance(value, np.ndarray) or value.shape != shape:
             yield (
                 f"the state has {name} of shape {np.shape(value)} and the problem needs {shape}: "
                 "give its own state"
             )
-        elif value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
+            continue
+        kinds = "b" if name == "active" else "iuf"
+        if value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
+            wanted = "True or False" if name == "active" else "finite real numbers"
             yield f"{name} of the state is {shown(value)}: give {wanted}"
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
-    """Return u0 and v0 of the system in the rotated basis, without reaction.
+    """Return u0 and v0 of the system in the rotated basis, without reaction. Collective.
+
+    Args:
+        problem: the problem.
+        t: time [s] of the state, and of the place of a moving obstacle.
 
     Raises:
         InputError: u0 is in the obstacle.
     """
-    system, surface = problem.equations, problem.surface
+    system = problem.equations
+    surface = problem.surface
     gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)
-    sizes = np.array(
-        [np.max(-gap, initial=-np.inf), max_abs(system.u0), np.max(surface.gap0, initial=0.0)]
-    )
-    behind, *size = surface.comm.max(sizes)
-    if behind > 1e-9 * max(size):
+    overlap = np.max(-gap, initial=-np.inf)
+    gap0 = np.max(surface.gap0, initial=0.0)
+    overlap, *sizes = surface.comm.max(np.array([overlap, max_abs(system.u0), gap0]))
+    if overlap > OVERLAP * max(sizes):
         raise InputError(
-            f"the initial displacement penetrates the obstacle by {behind:.3g} m: reduce it or "
+            f"the initial displacement penetrates the obstacle by {overlap:.3g} m: reduce it or "
             "enlarge the gap; a press fit begins in touch, and quasi_static closes it on a surface "
             "that moves, surface.moving(towards=…)"
         )

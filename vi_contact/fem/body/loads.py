@@ -16,7 +16,7 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import Array, Comm, Indices
-from ...core.checks import ended, function, number, optional, refuse, shown
+from ...core.checks import explain_error, function, number, optional, refuse, shown
 from ...core.quantities import Unit
 from .. import compat
 from ..mesh.group_checks import components_given, components_of, facets_of, field_given
@@ -64,7 +64,7 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
         )
     except Exception as error:
         # of a user's function, at the points of one rank: the others must not wait for it
-        return np.zeros_like(points), ended(f"{name} at t = {t:g} s", error)
+        return np.zeros_like(points), explain_error(f"{name} at t = {t:g} s", error)
     if result.dtype.kind not in "iuf":
         defect = f"{name} returned {shown(result)}: return real numbers"
     elif result.shape != points.shape:

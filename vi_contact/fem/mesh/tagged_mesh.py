@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from ...core.checks import ended, function, instance, mask, provides, refuse, shown, whole
+from ...core.checks import explain_error, function, instance, mask, provides, refuse, shown, whole
 from ...core.collective import Parts, agree
 from ...core.errors import InputError
 from ...core.files import on_root
@@ -139,7 +139,7 @@ class Group:
                         owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],)
                     )
             except Exception as error:  # of a user's function, which may raise anything
-                defects.append(ended(f"{owner}: the marker of '{name}'", error))
+                defects.append(explain_error(f"{owner}: the marker of '{name}'", error))
             return np.zeros(x.shape[1], dtype=bool)
 
         chosen = compat.entities_where(mesh, mesh.topology.dim - cls.codimension, safe)
