@@ -1,6 +1,4 @@
-"""Condense A onto contact unknowns c.
-
-What comes of it is their flexibility, their motion without reactions, and the answer to reactions.
+"""Condense A onto contact unknowns c: their flexibility, free motion, and the answer to reactions.
 
     G = (A⁻¹)_cc,    free: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
 
@@ -24,53 +22,79 @@ from .contact_last import ContactLast
 
 def condense(
     A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False
-) -> "Last | _Twice":
-    """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns.
+) -> "CondensedLast | CondensedTwice":
+    """Factorise A and condense it onto contact unknowns. Collective.
 
-    Collective.
+    Args:
+        A: the effective matrix.
+        surface: the contact surface.
+        frictional: whether tangential unknowns count, beside the normal ones.
     """
-    mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
+    # Contact unknowns of this rank, a row for each condition, and of all ranks by global numbers;
+    # -1 stands for one that cannot move.
+    first = A.algebra.first(A.matrix.rows)
+    own = surface.owned[:, None]
     if frictional:
-        mine = np.hstack([mine, surface.tangents])
-    unknowns = surface.everywhere(np.where(mine >= 0, mine + first, -1)).ravel()
-    last = unknowns[unknowns >= 0]
-    factor = A.contact_last(last) if len(np.unique(last)) == len(last) else None
+        own = np.hstack([own, surface.tangents])
+    unknowns = surface.everywhere(np.where(own >= 0, own + first, -1)).ravel()
+    moves = unknowns >= 0
+    last = unknowns[moves]
+
+    # An unknown of two conditions cannot be last twice.
+    are_different = len(np.unique(last)) == len(last)
+    factor = A.contact_last(last) if are_different else None
     if factor is not None:
-        return Last(factor, unknowns >= 0)
-    places = surface.slots[:, None] * mine.shape[1] + np.arange(mine.shape[1])
-    return _Twice(A, surface, mine[mine >= 0], places[mine >= 0], unknowns >= 0)
+        return CondensedLast(factor, moves)
+    width = own.shape[1]
+    places = surface.slots[:, None] * width + np.arange(width)
+    return CondensedTwice(A, surface, own[own >= 0], places[own >= 0], moves)
 
 
-class Last:
+class CondensedLast:
     """Hold A condensed onto k contact unknowns, which come last in its factor.
 
-    ``free`` begins a step, ``answer`` ends it; collective. ``flexibility`` (k, k); ``there`` (k,):
-    what can move.
+    ``free`` begins a step, and ``answer`` ends it. Their arguments may also be those of several
+    steps, a row for each.
+
+    Attributes:
+        flexibility: (k, k) G.
+        there: (k,) which unknowns can move.
     """
 
     def __init__(self, factor: ContactLast, there: Mask) -> None:
-        self._factor, self.there, corner = factor, there, factor.corner
+        """Invert the corner of the factor; ``there`` (k,) says which unknowns can move."""
+        self._factor = factor
+        self.there = there
         self._all = bool(there.all())
+        corner = factor.corner
         inverse = lapack.dpotri(corner, lower=1)[0] if len(corner) else corner
         self.flexibility: Array = np.zeros((len(there), len(there)))
         self.flexibility[np.ix_(there, there)] = np.tril(inverse) + np.tril(inverse, -1).T
 
     def free(self, b: Array) -> Array:
-        """Return x_c (k,) of A⁻¹b; of several loads, a row for each."""
+        """Return x_c (k,) of A⁻¹b, and keep b for ``answer``. Collective."""
         self._y = self._factor.forward(b)
-        self._x = x = self._factor.free(self._y)
-        if not self._all:
+        x = self._factor.free(self._y)
+        if self._all:
+            self._x = x
+        else:
             self._x = np.zeros((*b.shape[:-1], len(self.there)))
             self._x.T[self.there] = x.T
         return self._x
 
-    def _moving(self, x: NDArray[Any]) -> NDArray[Any]:
-        return x if self._all else x.T[self.there].T
+    def _moving(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the values of unknowns that can move."""
+        return values if self._all else values.T[self.there].T
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
-        """Return x = A⁻¹(b - r), owned rows, with ``held`` unknowns (k,) on these values.
+        """Return x = A⁻¹(b - r), owned rows, with some unknowns on given values. Collective.
 
-        Holding them removes round-off only.
+        To hold them where they would be but for rounding removes this rounding.
+
+        Args:
+            r: (k,) reactions.
+            held: (k,) which unknowns are held.
+            values: (k,) on what.
         """
         if np.count_nonzero(r):
             x = self._factor.free(self._y - self._factor.reduced(self._moving(r)))
@@ -79,16 +103,13 @@ class Last:
         return self._factor.backward(np.where(self._moving(held), self._moving(values), x))
 
     def response(self, r: Array) -> Array:
-        """Return A⁻¹ r, owned rows, of forces r (k,)."""
+        """Return A⁻¹ r, owned rows, of forces r (k,). Collective."""
         self._factor.unloaded()
         return self._factor.backward(self._factor.free(self._factor.reduced(r[self.there])))
 
 
-class _Twice:
-    """Hold the same with any factor of A.
-
-    There are ``owned`` contact unknowns of this rank and they have ``places`` among all.
-    """
+class CondensedTwice:
+    """Hold A condensed onto k contact unknowns, with any factor of A: see ``CondensedLast``."""
 
     def __init__(
         self,
@@ -98,34 +119,52 @@ class _Twice:
         places: Indices,
         there: Mask,
     ) -> None:
-        self._A, self._comm, self._owned, self._places, self.there = (
-            A,
-            surface.comm,
-            owned,
-            places,
-            there,
-        )
+        """Solve for a unit force on each contact unknown. Collective.
+
+        Args:
+            A: the effective matrix.
+            surface: the contact surface.
+            owned: the contact unknowns of this rank,
+            places: and where they stand among all.
+            there: (k,) which unknowns can move.
+        """
+        self._A = A
+        self._comm = surface.comm
+        self._owned = owned
+        self._places = places
+        self.there = there
         G = self._everywhere(A.factor.solve_units(owned, places, len(there), owned))
         self.flexibility: Array = 0.5 * (G + G.T) if A.algebra.symmetric else G
 
     def _everywhere(self, values: Array) -> Array:
+        """Return the values at this rank's contact unknowns, for those of all ranks. Collective."""
         whole = np.zeros((len(self.there), *values.shape[1:]))
         whole[self._places] = values
         return self._comm.sum(whole)
 
     def free(self, b: Array) -> Array:
+        """Return x_c (k,) of A⁻¹b, and keep A⁻¹b for ``answer``. Collective."""
         self._x = self._A.factor.solve(b)
         return self._everywhere(self._x[self._owned])
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
-        x, mine = self._x - self.response(r) if r.any() else self._x, held[self._places]
-        x[self._owned[mine]] = values[self._places[mine]]
+        """Return x = A⁻¹(b - r), owned rows, with some unknowns on given values. Collective.
+
+        Args:
+            r: (k,) reactions.
+            held: (k,) which unknowns are held.
+            values: (k,) on what.
+        """
+        x = self._x - self.response(r) if r.any() else self._x
+        held_here = held[self._places]
+        x[self._owned[held_here]] = values[self._places[held_here]]
         return x
 
     def response(self, r: Array) -> Array:
+        """Return A⁻¹ r, owned rows, of forces r (k,). Collective."""
         load = np.zeros(self._A.matrix.rows)
         load[self._owned] = r[self._places]
         return self._A.factor.solve(load)
 
 
-Condensation = Last | _Twice
+Condensation = CondensedLast | CondensedTwice

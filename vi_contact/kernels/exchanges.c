@@ -4,64 +4,92 @@
 
 #include "fastest.h"
 
-#define BELOW(value) ((value) >= 0.0 ? 0.0 : (value)) /* the negative part */
+#define NEGATIVE_PART(value) ((value) >= 0.0 ? 0.0 : (value))
+#define NO_SET 2 /* in the first place of a remembered set: none is remembered */
 
-/* The first exchanges of the active-set method for k small problems 0 <= r, q + G r >= 0 with one G of m rows: see
-   active_set.py, which has the same for one of them, and goes on where changes[] says -1. `limit` times |r|_max is the
-   rounding of q + G r. `sets` and `factors` (k, m, m) are kept from call to call: the last set of every row, 2 in its first
-   place where there is none, and its factor; moved (k, most): rows that changed sides in each exchange; room: 3 m
-   numbers. */
-static inline __attribute__((always_inline)) int decompose(const int n, double *restrict L) { /* column by column, lower */
+/* Factorise a positive definite matrix of n rows in place, L L' with L column by column in the
+   lower triangle. Returns 0 where a pivot is not positive. */
+static inline __attribute__((always_inline)) int
+decompose(const int n, double *restrict L) {
     for (int j = 0; j < n; j++) {
-        double *mine = L + (long) j * n;
-        if (!(mine[j] > 0.0)) return 0;
-        const double pivot = sqrt(mine[j]);
-        for (int i = j; i < n; i++) mine[i] /= pivot;
+        double *column = L + (long) j * n;
+        if (!(column[j] > 0.0)) return 0;
+        const double pivot = sqrt(column[j]);
+        for (int i = j; i < n; i++) column[i] /= pivot;
+
+        /* What is left of the columns to the right. */
         for (int c = j + 1; c < n; c++) {
             double *other = L + (long) c * n;
-            const double t = mine[c];
-            for (int i = c; i < n; i++) other[i] -= t * mine[i];
+            const double t = column[c];
+            for (int i = c; i < n; i++) other[i] -= t * column[i];
         }
     }
     return 1;
 }
 
-static inline __attribute__((always_inline)) void substituted(const int n, const double *L, double *restrict y) {
+/* y <- (L L')^-1 y, forward and backward. The sums of the backward one go in four parts, which is
+   an order of their own: they do not wait for each other. */
+static inline __attribute__((always_inline)) void
+substitute_both_ways(const int n, const double *L, double *restrict y) {
     for (int j = 0; j < n; j++) {
-        const double *mine = L + (long) j * n, t = y[j] /= mine[j];
-        for (int i = j + 1; i < n; i++) y[i] -= t * mine[i];
+        const double *column = L + (long) j * n;
+        const double t = y[j] /= column[j];
+        for (int i = j + 1; i < n; i++) y[i] -= t * column[i];
     }
     for (int j = n - 1; j >= 0; j--) {
-        const double *mine = L + (long) j * n;
+        const double *column = L + (long) j * n;
         double s[4] = {0.0, 0.0, 0.0, 0.0};
         int i = j + 1;
         for (; i + 3 < n; i += 4)
-            for (int c = 0; c < 4; c++) s[c] += mine[i + c] * y[i + c];
-        for (; i < n; i++) s[0] += mine[i] * y[i];
-        y[j] = (y[j] - ((s[0] + s[1]) + (s[2] + s[3]))) / mine[j];
+            for (int c = 0; c < 4; c++) s[c] += column[i + c] * y[i + c];
+        for (; i < n; i++) s[0] += column[i] * y[i];
+        y[j] = (y[j] - ((s[0] + s[1]) + (s[2] + s[3]))) / column[j];
     }
 }
 
-/* w = gap + G r for the r of the places in `at`. */
+/* w = gap + G r (m), for an r that is zero but at n places. */
 static inline __attribute__((always_inline)) void
-pushed(const int m, const int n, const int *at, const double *G, const double *gap, const double *r, double *restrict w) {
+add_reactions(const int m, const int n, const int *places, const double *G, const double *gap,
+              const double *r, double *restrict w) {
     memcpy(w, gap, m * sizeof(double));
     for (int a = 0; a < n; a++) {
-        const double *row = G + (long) at[a] * m, t = r[at[a]];
+        const double *row = G + (long) places[a] * m;
+        const double t = r[places[a]];
         for (int j = 0; j < m; j++) w[j] += t * row[j];
     }
 }
 
-FASTEST void exchanges(int k, int m, int most, double limit, double tolerance, const double *G, const double *scale,
-                       const char *held, const double *q, const char *guess, char *sets, double *factors, double *room,
-                       int *places, double *r, char *closed, double *residual, int *changes, int *moved) {
-    for (; k > 0; k--, q += m, guess += m, sets += m, factors += (long) m * m, r += m, closed += m, residual++,
-                  changes++, moved += most) {
-        double *gap = room, *w = room + m, *part = room + 2 * m, unit = 0.0;
+/* The first exchanges of the active-set method for k small problems 0 <= r, q + G r >= 0 with one G
+   of m rows: see active_set.py, which has the same for one of them, and goes on where changes[]
+   says -1.
+
+   most:      number of exchanges after which they end
+   limit:     times |r|_max, the rounding of q + G r
+   tolerance: residual, over the largest violation by q, that an answer may have
+   G, scale:  d G d (m, m), and d (m)
+   held:      (m) which rows are equations
+   q, guess:  (k, m)
+   sets, factors: (k, m) and (k, m, m), kept from call to call: the last set of every row, NO_SET in
+              its first place where there is none, and its factor
+   room, places: 3 m and m numbers
+   r, closed, residual, changes: the answers, (k, m) and (k)
+   moved:     (k, most) rows that changed sides in each exchange */
+FASTEST void
+exchanges(int k, int m, int most, double limit, double tolerance, const double *G,
+          const double *scale, const char *held, const double *q, const char *guess, char *sets,
+          double *factors, double *room, int *places, double *r, char *closed, double *residual,
+          int *changes, int *moved) {
+    for (; k > 0; k--) {
+        double *gap = room;
+        double *w = room + m;
+        double *part = room + 2 * m; /* r on the set, then the rows that are wrong */
+        double unit = 0.0;
         int sound = 1;
+
+        /* Scaled gaps, the set to start from, and the violation by r = 0. */
         for (int j = 0; j < m; j++) {
             gap[j] = q[j] * scale[j];
-            const double off = held[j] ? fabs(gap[j]) : BELOW(gap[j]);
+            const double off = held[j] ? fabs(gap[j]) : NEGATIVE_PART(gap[j]);
             sound &= fabs(off) < HUGE_VAL;
             unit = fmax(unit, fabs(off));
             closed[j] = held[j] || (guess[j] && gap[j] < HUGE_VAL);
@@ -69,25 +97,44 @@ FASTEST void exchanges(int k, int m, int most, double limit, double tolerance, c
         }
         *residual = 0.0;
         *changes = sound && unit == 0.0 ? 0 : -1;
+
         for (int change = 0; sound && unit > 0.0 && change <= most; change++) {
+            /* The factor of G on the set, unless it is that of the last one. */
             if (memcmp(closed, sets, m)) {
                 int n = 0;
                 for (int j = 0; j < m; j++)
                     if (closed[j]) places[n++] = j;
                 for (int a = 0; a < n; a++)
-                    for (int c = a; c < n; c++) factors[(long) a * n + c] = G[(long) places[a] * m + places[c]];
+                    for (int c = a; c < n; c++)
+                        factors[(long) a * n + c] = G[(long) places[a] * m + places[c]];
                 memcpy(sets, closed, m);
-                if (!decompose(n, factors)) { sets[0] = 2; break; }
+                if (!decompose(n, factors)) {
+                    sets[0] = NO_SET;
+                    break;
+                }
             }
-            int n = 0, wrong = 0;
+
+            /* r with w = 0 on the set, and w off it. */
+            int n = 0;
+            int wrong = 0;
             for (int j = 0; j < m; j++) {
                 r[j] = 0.0;
-                if (closed[j]) { part[n] = -gap[j]; places[n++] = j; }
+                if (closed[j]) {
+                    part[n] = -gap[j];
+                    places[n++] = j;
+                }
             }
-            substituted(n, factors, part);
-            double top = 0.0, least = 0.0, off = 0.0;
-            for (int a = 0; a < n; a++) { r[places[a]] = part[a]; top = fmax(top, fabs(part[a])); }
-            pushed(m, n, places, G, gap, r, w);
+            substitute_both_ways(n, factors, part);
+            double top = 0.0;
+            double least = 0.0;
+            double off = 0.0;
+            for (int a = 0; a < n; a++) {
+                r[places[a]] = part[a];
+                top = fmax(top, fabs(part[a]));
+            }
+            add_reactions(m, n, places, G, gap, r, w);
+
+            /* Rows whose sign is wrong by more than rounding: they change sides. */
             for (int j = 0; j < m; j++) {
                 if (held[j]) continue;
                 const int other = (closed[j] ? r[j] : w[j]) < -limit * top;
@@ -102,22 +149,37 @@ FASTEST void exchanges(int k, int m, int most, double limit, double tolerance, c
                     if (!held[j] && part[j] != 0.0) closed[j] = !closed[j];
                 continue;
             }
-            if (least < 0.0) { /* by rounding: r >= 0 holds exactly */
+
+            /* None is wrong: what is negative by rounding becomes zero, as r >= 0 holds exactly. */
+            if (least < 0.0) {
                 for (int j = 0; j < m; j++)
                     if (!held[j]) r[j] = fmax(r[j], 0.0);
-                pushed(m, n, places, G, gap, r, w);
+                add_reactions(m, n, places, G, gap, r, w);
             }
+
+            /* The residual; the comparison keeps NaN. */
             for (int j = 0; j < m; j++) {
-                const double one = fabs(held[j] ? w[j] : fmin(r[j], w[j]));
-                off = one <= off ? off : one;
+                const double violation = fabs(held[j] ? w[j] : fmin(r[j], w[j]));
+                off = violation <= off ? off : violation;
             }
             *residual = off / unit;
             if (*residual <= tolerance) *changes = change;
             break;
         }
+
+        /* The answer in newtons, and on to the next problem. */
         for (int j = 0; j < m; j++) {
             closed[j] = held[j] || r[j] > 0.0;
             r[j] *= scale[j];
         }
+        q += m;
+        guess += m;
+        sets += m;
+        factors += (long) m * m;
+        r += m;
+        closed += m;
+        residual++;
+        changes++;
+        moved += most;
     }
 }

@@ -1,5 +1,5 @@
-/* FASTEST: compile a function twice, for processors with AVX2 and for all others; the processor that
-   runs it chooses. */
+/* FASTEST: compile a function twice, for processors with AVX2 and for all others; the processor
+   that runs it chooses. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__GLIBC__)
 #define FASTEST __attribute__((target_clones("avx2", "default")))
 #else

@@ -32,7 +32,7 @@ from ..core.sizes import refuse_dense
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.timing import report_time
-from ..kernels.condensation import Condensation, Last, condense
+from ..kernels.condensation import Condensation, CondensedLast, condense
 from .certified import check_laws
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
@@ -226,7 +226,7 @@ class PreparedCondensed:
             condensed = self.friction.condensed
         else:
             condensed, small = self._condense_normal()
-        if self._surface.comm.size > 1 or not isinstance(condensed, Last):
+        if self._surface.comm.size > 1 or not isinstance(condensed, CondensedLast):
             return None
         if has_friction:
             return self.friction.solve_many(many, own, self._rigid)
