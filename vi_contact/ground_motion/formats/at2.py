@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from ...core.errors import InputError
 from ..record import Record, canonical_units, known_units
-from .statements import agreed, refuse_other_motion, stated_counts, stated_steps
+from .statements import agree, find_counts, find_steps, refuse_other_motion
 from .text import NUMBER, TextFile
 
 HEADER_LINES = 8  # NPTS and DT are looked for in this many first lines
@@ -49,7 +49,7 @@ def recognises(text: TextFile) -> bool:
     """
     start = begin_data(text)
     if start is not None:
-        rows = list(text.rows(text.filled(start)))
+        rows = list(text.rows(text.find_filled(start)))
         pairs = all(len(row) == 2 for row in rows)
         return not (pairs and all(after[0] > before[0] >= 0.0 for before, after in pairwise(rows)))
     header = [line for line in text.heads[:HEADER_LINES] if not line.startswith("#")]
@@ -137,11 +137,11 @@ def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float]
     ]
     # a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one, says the same
     # as NPTS and DT
-    sentences = stated_steps(text, prose)
+    sentences = find_steps(text, prose)
     if len({value for _, value in sentences}) == 1:
         steps += sentences
     return (
-        agreed(text, "the number of samples", [*counts, *stated_counts(text, prose)]),
-        agreed(text, "the time step", steps),
+        agree(text, "the number of samples", [*counts, *find_counts(text, prose)]),
+        agree(text, "the time step", steps),
         start,
     )

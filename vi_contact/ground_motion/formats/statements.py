@@ -93,7 +93,7 @@ TIME_UNITS = {
 }
 
 
-def stated_steps(text: TextFile, indices: Iterable[int]) -> list[Found]:
+def find_steps(text: TextFile, indices: Iterable[int]) -> list[Found]:
     """Return the lines that state a time step, or a sampling rate, and the step [s]."""
     found: list[Found] = []
     for index in indices:
@@ -113,7 +113,7 @@ def stated_steps(text: TextFile, indices: Iterable[int]) -> list[Found]:
     return found
 
 
-def stated_counts(text: TextFile, indices: Iterable[int]) -> list[Found]:
+def find_counts(text: TextFile, indices: Iterable[int]) -> list[Found]:
     """Return the lines that state a number of samples, and that number."""
     return [
         (index, text.number(index, match[1]))
@@ -123,7 +123,7 @@ def stated_counts(text: TextFile, indices: Iterable[int]) -> list[Found]:
     ]
 
 
-def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
+def find_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
     """Return the lines that state units of acceleration, and the units, as keys of UNITS.
 
     Lines about peaks and filters are left out: a peak may be given in other units than the
@@ -146,7 +146,7 @@ def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]
     return found
 
 
-def agreed(
+def agree(
     text: TextFile, what: str, found: Sequence[Found], *, rounding: float = 1e-6
 ) -> Found | None:
     """Return the first of several statements.
@@ -162,7 +162,7 @@ def agreed(
     return found[0] if found else None
 
 
-def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int, str] | None:
+def agree_on_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int, str] | None:
     """Return the units that all statements share.
 
     They are None where there are none; it raises InputError where they contradict.
@@ -176,7 +176,7 @@ def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int,
     return found[0] if found else None
 
 
-def unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | None:
+def find_unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | None:
     """Return the line that says "units of X" or "units: X", and X.
 
     It does so where X is no unit of acceleration.

@@ -78,7 +78,7 @@ def time_step(
     return step, SAME_STEP, True
 
 
-def interpolated(times: Array, samples: Array, step: float) -> Array:
+def interpolate(times: Array, samples: Array, step: float) -> Array:
     """Return the samples on even times from the first one on.
 
     They are read off straight lines; the last one is kept.
