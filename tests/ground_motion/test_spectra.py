@@ -30,7 +30,7 @@ from vi_contact.practice.ground_motion import (
     rms,
     significant_duration,
 )
-from vi_contact.practice.ground_motion.spectra import _factors, _moved
+from vi_contact.practice.ground_motion.spectra import _factors, _move
 
 pytestmark = pytest.mark.serial
 
@@ -64,7 +64,7 @@ def test_one_step_is_the_matrix_exponential(zeta, omega):
     factors = _factors(h, h, np.array([omega]), zeta)
     wanted = exact @ [u, v, a0, (a1 - a0) / h]
     size = np.array([abs(u) + h * abs(v), abs(v) + h * omega**2 * abs(u)])
-    assert np.all(np.abs(_moved(factors, u, v, a0, a1)[:, 0] - wanted) < 1e-13 * size)
+    assert np.all(np.abs(_move(factors, u, v, a0, a1)[:, 0] - wanted) < 1e-13 * size)
 
 
 @pytest.mark.parametrize("dt", [0.5, 0.1, 0.01])

@@ -164,7 +164,7 @@ PACKAGE = ROOT / "vi_contact"
 ROOMS = {  # name -> folder
     stub.parent.name: stub.parent
     for stub in [*PACKAGE.glob("*/__init__.pyi"), *PACKAGE.glob("practice/*/__init__.pyi")]
-    if stub.parent.name not in ("laws", "vi", "cli", "run")  # words of sentences, files, variables
+    if stub.parent.name not in ("laws", "vi", "cli", "run", "exact")  # words, files, variables
 }
 
 

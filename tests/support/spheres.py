@@ -145,7 +145,7 @@ class Rubbed:
             Equilibria(self.spheres.problem, solver=Condensed()),
             initial_state(self.spheres.problem),
         )
-        return [smooth.after(start, float(STAGES * i)) for i in range(len(self.approaches))]
+        return [smooth.solve(start, float(STAGES * i)) for i in range(len(self.approaches))]
 
     def stages(self, stages: Sequence[int], mu: float = MU) -> list[list[Contact]]:
         """What these stages leave, of every approach; each begins where the one before has left the
@@ -154,7 +154,7 @@ class Rubbed:
         found = []
         for i, state in enumerate(self._pressed):
             states = accumulate(
-                stages, lambda old, j, i=i: rough.after(old, float(STAGES * i + j)), initial=state
+                stages, lambda old, j, i=i: rough.solve(old, float(STAGES * i + j)), initial=state
             )
             found.append([self.spheres.found(one) for one in islice(states, 1, None)])
         return found

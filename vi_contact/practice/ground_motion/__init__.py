@@ -1,6 +1,4 @@
-"""Read, write, process and make ground motions.
-
-There are record files, spectra, intensity measures and synthetic motions.
+"""Read, write, process and make ground motions: records, spectra, intensities, synthetic motions.
 
 ``read_record`` reads one, ``Processing`` makes another of it, ``GroundMotion`` shakes with it:
 docs/guide/records.md.

@@ -1,7 +1,4 @@
-"""Prepare records by the usual steps in the usual order.
-
-The last step scales them to a measure.
-"""
+"""Prepare records by the usual steps in the usual order, and scale them to a measure at last."""
 
 import math
 from dataclasses import dataclass
@@ -28,14 +25,27 @@ from .record import Record
 class Processing:
     """Say what to do with a record; calling it gives the new one.
 
-    Fields are in order, each step is optional.
+    The steps are taken in the order of the fields, and each is optional. Filtering and tapering
+    need the record's own step, the baseline the final samples; scaling commutes with all.
 
-    trim: (start, end) [s]; pad: zeros (before, after) [s]; mean: remove the mean; taper: fraction
-    of the duration at each end; low, high: Butterworth corners [Hz] with order and causal;
-    resample: time step [s]; baseline: degree of `baseline_corrected`; then one of scale (factor),
-    pga [m/s²], arias [m/s], psa (value [m/s²], period [s]). Filtering and tapering need the
-    record's own step, the baseline the final samples; scaling commutes with all. Raises InputError
-    when more than one scaling is asked for; calling raises that of the steps.
+    Attributes:
+        trim: (start, end) of what is kept [s].
+        pad: zeros (before, after) [s].
+        mean: whether the mean is removed.
+        taper: fraction of the duration that is tapered at each end.
+        low: corner of a Butterworth high-pass [Hz].
+        high: corner of a Butterworth low-pass [Hz].
+        order: of the filter.
+        causal: whether the filter runs forward only.
+        resample: time step of the new record [s].
+        baseline: degree of `baseline_corrected`.
+        scale: a factor. Only one of the four scalings may be given.
+        pga: largest |acceleration| [m/s²].
+        arias: Arias intensity [m/s].
+        psa: (pseudo-acceleration [m/s²], period [s]).
+
+    Raises:
+        InputError: more than one scaling. Calling raises the errors of the steps.
     """
 
     trim: Annotated[tuple[float, float | None] | None, Unit("s")] = None
@@ -54,9 +64,8 @@ class Processing:
     psa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        asked = [
-            name for name in ("scale", "pga", "arias", "psa") if getattr(self, name) is not None
-        ]
+        scalings = ("scale", "pga", "arias", "psa")
+        asked = [name for name in scalings if getattr(self, name) is not None]
         if len(asked) > 1:
             raise InputError(
                 f"Processing: {' and '.join(asked)} were both given; scale a record only once"
@@ -120,11 +129,16 @@ def scaled_to_psa(
     *,
     damping: float = 0.05,
 ) -> Record:
-    """Scale a record so that its pseudo-acceleration at `period` [s] is `target`.
+    """Scale a record so that its pseudo-acceleration is `target`, and keep its sign.
 
-    Its sign is kept.
+    Args:
+        record: that is not all zero.
+        target: pseudo-acceleration [m/s²].
+        period: of the oscillator [s].
+        damping: its ratio.
 
-    Raises InputError for a record that is all zero.
+    Raises:
+        InputError: a record that is all zero.
     """
     return scaled(record, factor=_ratio(record, target, psa(record, period, damping=damping)))
 
@@ -139,7 +153,7 @@ def scaled_to_arias(record: Record, target: Annotated[float, Positive, Unit("m/s
 
 
 def _ratio(record: Record, target: float, value: float) -> float:
-    """Return target / value."""
+    """Return target / value, or raise InputError where the record is all zero."""
     if value == 0.0:
         raise InputError(f"{record.source or 'Record'}: every sample is zero; scale another record")
     return target / value

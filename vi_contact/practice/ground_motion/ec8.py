@@ -1,6 +1,6 @@
-"""Give the elastic response spectra of Eurocode 8(EN 1998-1:2004).
+"""Give the elastic response spectra of Eurocode 8 (EN 1998-1:2004).
 
-They are those of 3.2.2.2 (horizontal) and 3.2.2.3 (vertical).
+Clause 3.2.2.2 has the horizontal ones, 3.2.2.3 the vertical ones.
 """
 
 import math
@@ -25,11 +25,19 @@ TYPES = dict(enumerate(_TABLES["type"], start=1))  # of spectra: 1, or 2 for wea
 class EC8Spectrum:
     """Hold the elastic spectrum of EN 1998-1, S_e(T) of eqs. 3.2 to 3.5.
 
-    `on_ground` and `vertical` have its tables.
+    `on_ground` and `vertical` have its tables. A National Annex may give other numbers.
 
-    ag: design ground acceleration on ground A, gamma_I a_gR; s: soil factor; tb, tc, td: corner
-    periods; damping: ratio; plateau: 2.5, or 3.0 vertically. A National Annex may give other
-    numbers. Raises InputError unless tb <= tc <= td.
+    Attributes:
+        ag: design ground acceleration on ground A, gamma_I a_gR [m/s²].
+        s: soil factor.
+        tb: where the plateau begins [s].
+        tc: where the plateau ends [s].
+        td: where the displacement becomes constant [s].
+        damping: ratio.
+        plateau: 2.5, or 3.0 vertically.
+
+    Raises:
+        InputError: periods without tb <= tc <= td.
     """
 
     ag: Annotated[float, Positive, Unit("m/s²")]
@@ -52,9 +60,13 @@ class EC8Spectrum:
     def on_ground(
         cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05
     ) -> "EC8Spectrum":
-        """Return the horizontal spectrum of type `kind` on ground "A" to "E".
+        """Return the horizontal spectrum of a ground.
 
-        The type is 1, or 2 for weak near earthquakes.
+        Args:
+            ground: "A" to "E".
+            ag: design ground acceleration on ground A [m/s²].
+            kind: type of the spectrum, 1, or 2 for weak near earthquakes.
+            damping: ratio.
         """
         if kind not in TYPES or ground not in TYPES[kind]["ground"]:
             raise InputError(
@@ -67,9 +79,12 @@ class EC8Spectrum:
     @classmethod
     @checked
     def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
-        """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11.
+        """Return the vertical spectrum S_ve(T) of every ground, eqs. 3.8 to 3.11.
 
-        It holds for every ground; ag is the horizontal one.
+        Args:
+            ag: horizontal design ground acceleration [m/s²].
+            kind: type of the spectrum, 1 or 2.
+            damping: ratio.
         """
         if kind not in TYPES:
             raise InputError(f"EC8Spectrum: type {kind!r}; give 1 or 2")
@@ -86,15 +101,16 @@ class EC8Spectrum:
         t = np.asarray(periods, dtype=float)
         if np.any(t < 0.0):
             raise InputError("EC8Spectrum: a period is negative; give seconds from 0 upwards")
+        # The four branches of S_e / (ag s): rising, plateau, falling like 1/T and like 1/T².
         top = self.plateau * self.eta
         later = np.maximum(t, self.tc)  # no division by zero at T = 0
-        shape = np.where(t <= self.tb, 1.0 + t / self.tb * (top - 1.0), top * self.tc / later)
+        rising = 1.0 + t / self.tb * (top - 1.0)
+        shape = np.where(t <= self.tb, rising, top * self.tc / later)
         shape = np.where((t > self.tb) & (t <= self.tc), top, shape)
         shape = np.where(t > self.td, top * self.tc * self.td / later**2, shape)
         return self.ag * self.s * shape
 
     def displacement(self, periods: Array) -> Array:
         """Return S_De = S_e (T / 2 pi)² [m], eq. 3.7."""
-        return (
-            self.acceleration(periods) * (np.asarray(periods, dtype=float) / (2.0 * math.pi)) ** 2
-        )
+        inverse_frequency = np.asarray(periods, dtype=float) / (2.0 * math.pi)
+        return self.acceleration(periods) * inverse_frequency**2

@@ -11,13 +11,15 @@ from .record import Record
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """Describe a recorded motion.
+    """Describe a recorded motion a(t): straight lines between the samples, times a factor.
 
-    It is a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
+    It is zero before the first and after the last sample. Use a time step no longer than that of
+    the record, or resample the record first.
 
-    It is zero before the first and after the last sample. scale: a factor; for a peak use
-    `scaled_to_pga(record, pga)`. Use a time step no longer than that of the record, or resample the
-    record first.
+    Attributes:
+        record: whose sample k is at k · dt.
+        direction: unit vector.
+        scale: the factor; for a peak use `scaled_to_pga(record, pga)`.
     """
 
     record: Record
@@ -25,13 +27,8 @@ class GroundMotion:
     scale: Annotated[float, Finite, RATIO] = 1.0
 
     def __post_init__(self) -> None:
-        instance(
-            "GroundMotion",
-            "record",
-            self.record,
-            Record,
-            "pass a Record, such as read_record(path)",
-        )
+        remedy = "pass a Record, such as read_record(path)"
+        instance("GroundMotion", "record", self.record, Record, remedy)
         check_excitation(self)
 
     @property
@@ -47,8 +44,7 @@ class GroundMotion:
         position = t / record.dt
         k = min(int(position), record.acceleration.size - 2)
         w = position - k
-        return self.scale * float(
-            (1.0 - w) * record.acceleration[k] + w * record.acceleration[k + 1]
-        )
+        before, after = record.acceleration[k : k + 2]
+        return self.scale * float((1.0 - w) * before + w * after)
 
     __call__ = vector

@@ -1,8 +1,4 @@
-"""Measure how strong a record is.
-
-There are peaks, Arias intensity, durations, and what spectra say; there is also a table of what it
-holds.
-"""
+"""Measure how strong a record is: peaks, Arias intensity, durations, and what spectra say."""
 
 import math
 from collections.abc import Callable
@@ -38,7 +34,8 @@ def pgv(record: Record) -> float:
 
     It is the largest |v| at the samples of the integrated record [m/s].
     """
-    return float(np.max(np.abs(integrated(record)[0])))
+    velocity, _ = integrated(record)
+    return float(np.max(np.abs(velocity)))
 
 
 @checked
@@ -47,7 +44,8 @@ def pgd(record: Record) -> float:
 
     It is the largest |u| of the twice integrated samples, their drift included [m].
     """
-    return float(np.max(np.abs(integrated(record)[1])))
+    _, displacement = integrated(record)
+    return float(np.max(np.abs(displacement)))
 
 
 @checked
@@ -81,9 +79,14 @@ def husid(record: Record) -> Array:
 
 @checked
 def significant_duration(record: Record, start: float, end: float) -> float:
-    """Return the time between fractions `start` and `end` of the Arias intensity [s].
+    """Return the time between two fractions of the Arias intensity [s].
 
-    It is zero if all is zero.
+    It is zero for a record that is all zero.
+
+    Args:
+        record: the motion.
+        start: the first fraction, from 0.
+        end: the second fraction, above the first and up to 1.
     """
     if not 0.0 <= start < end <= 1.0:
         raise InputError(
@@ -102,8 +105,9 @@ def cav(record: Record) -> float:
 
     It is exact for straight lines between samples.
     """
-    a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
-    # two triangles where the sign changes
+    a = np.abs(record.acceleration[:-1])
+    b = np.abs(record.acceleration[1:])
+    # Between two samples |a| is a trapezium, or two triangles where the sign changes.
     change = record.acceleration[:-1] * record.acceleration[1:] < 0.0
     total = np.where(change, a + b, 1.0)
     return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
@@ -123,8 +127,15 @@ PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)
 
 @checked
 def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
-    """Return the pseudo-acceleration at one period [m/s²]."""
-    return float(response_spectrum(record, np.array([period]), damping=damping).psa[0])
+    """Return the pseudo-acceleration at one period [m/s²].
+
+    Args:
+        record: the motion.
+        period: of the oscillator [s].
+        damping: its ratio.
+    """
+    spectrum = response_spectrum(record, np.array([period]), damping=damping)
+    return float(spectrum.psa[0])
 
 
 @checked
@@ -139,25 +150,27 @@ def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
 
 @checked
 def predominant_period(record: Record, *, damping: float = 0.05) -> float:
-    """Return the period of the largest pseudo-acceleration.
+    """Return the period of the largest pseudo-acceleration, from 0.02 to 10 s [s].
 
-    The range is from 0.02 (or ten steps of the record) to 10 s [s].
+    Periods below ten steps of the record are left out.
     """
     periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
     if not periods.size:
         raise InputError(
             f"predominant_period: a step of {record.dt:g} s resolves no period; use a smaller step"
         )
-    return float(periods[np.argmax(response_spectrum(record, periods, damping=damping).psa)])
+    spectrum = response_spectrum(record, periods, damping=damping)
+    return float(periods[np.argmax(spectrum.psa)])
 
 
 @checked
 def mean_period(record: Record) -> float:
     """Return the mean period of Rathje, Abrahamson and Bray (1998) [s].
 
-    It is sum(C²/f) / sum(C²) over 0.25 <= f <= 20 Hz.
+    It is sum(C²/f) / sum(C²) over 0.25 <= f <= 20 Hz, where C are the Fourier amplitudes.
 
-    C are the Fourier amplitudes. Raises InputError when nothing lies in that band.
+    Raises:
+        InputError: a record without motion in that band.
     """
     frequencies, amplitudes = fourier_spectrum(record)
     inside = (frequencies >= 0.25) & (frequencies <= 20.0)
@@ -173,40 +186,37 @@ def mean_period(record: Record) -> float:
 def record_info(record: Record) -> str:
     """Return the table of a record.
 
-    It says where it comes from, peaks, intensities, what is left at its end, what is doubted, and
-    notes.
+    It says where the record comes from, its peaks and intensities, what is left at its end, what is
+    doubted, and its notes.
     """
     measures = (pga, pga_time, pgv, pgd, arias, d5_95, cav, rms, housner_intensity)
-    found: dict[str, Any] = {one.__name__: one(record) for one in measures}
-    for one in (predominant_period, mean_period):
-        found[one.__name__] = _period_in_words(one, record) if found["pga"] > 0.0 else "(all zero)"
-    velocity, displacement = (values[-1] for values in integrated(record))
-    text = (
-        Path(__file__)
-        .with_name("record_info.txt")
-        .read_text(encoding="utf-8")
-        .format(
-            **found,
-            record=record,
-            title=record.title or "(none)",
-            station=record.station or "(not stated)",
-            component=record.component or "(not stated)",
-            unit=UNITS[record.units],
-            velocity=velocity,
-            displacement=displacement,
-            in_g=found["pga"] / STANDARD_GRAVITY,
-        )
+    values: dict[str, Any] = {measure.__name__: measure(record) for measure in measures}
+    for period in (predominant_period, mean_period):
+        all_zero = values["pga"] == 0.0
+        values[period.__name__] = "(all zero)" if all_zero else _period_in_words(period, record)
+    velocity, displacement = integrated(record)
+    template = Path(__file__).with_name("record_info.txt").read_text(encoding="utf-8")
+    table = template.format(
+        **values,
+        record=record,
+        title=record.title or "(none)",
+        station=record.station or "(not stated)",
+        component=record.component or "(not stated)",
+        unit=UNITS[record.units],
+        velocity=velocity[-1],
+        displacement=displacement[-1],
+        in_g=values["pga"] / STANDARD_GRAVITY,
     )
-    doubts = (f"{'doubt':<20}{doubt}" for doubt in record.doubts)
-    return "\n".join([text, *doubts, *(f"{'note':<20}{note}" for note in record.notes)])
+    doubts = [f"{'doubt':<20}{doubt}" for doubt in record.doubts]
+    notes = [f"{'note':<20}{note}" for note in record.notes]
+    return "\n".join([table, *doubts, *notes])
 
 
 def _period_in_words(period: Callable[[Record], float], record: Record) -> str:
-    """Return a period [s], or why the record has none.
-
-    All else of the table is told all the same.
-    """
+    """Return a period [s], or in brackets why the record has none."""
     try:
         return f"{period(record):.3g} s"
     except InputError as error:  # "name: why; remedy"
-        return f"({str(error).partition(': ')[2].partition(';')[0]})"
+        _, _, why_and_remedy = str(error).partition(": ")
+        why, _, _ = why_and_remedy.partition(";")
+        return f"({why})"

@@ -1,6 +1,6 @@
-"""Make stochastic motions: white noise filtered by the ground.
+"""Make stochastic motions: white noise that the ground has filtered, after Kanai and Tajimi.
 
-That is Kanai and Tajimi's filter; Clough and Penzien's leaves long periods out.
+A second filter, Clough and Penzien's, leaves long periods out.
 """
 
 import math
@@ -21,12 +21,20 @@ from .record import Record
 class KanaiTajimi:
     """Describe a two-sided power spectral density of the ground acceleration [m²/s³].
 
-    Its integral is the variance.
+    Its integral is the variance:
 
-    S = S0 (wg⁴ + 4 zg² wg² w²) / ((wg² - w²)² + 4 zg² wg² w²) · w⁴ / ((wf² - w²)² + 4 zf² wf² w²),
-    the last factor only when omega_f > 0 (Clough and Penzien, 1975). s0: density of the rock's
-    white noise; omega_g, omega_f: frequencies; zeta_g, zeta_f: damping ratios. The default is firm
+        S = S0 (wg⁴ + 4 zg² wg² w²) / ((wg² - w²)² + 4 zg² wg² w²)
+            · w⁴ / ((wf² - w²)² + 4 zf² wf² w²)
+
+    The last factor (Clough and Penzien, 1975) is there only when omega_f > 0. The default is firm
     ground.
+
+    Attributes:
+        s0: density of the rock's white noise, S0 [m²/s³].
+        omega_g: frequency of the ground, wg [rad/s].
+        zeta_g: damping ratio of the ground, zg.
+        omega_f: frequency of the second filter, wf [rad/s].
+        zeta_f: damping ratio of the second filter, zf.
     """
 
     s0: Annotated[float, Positive, Unit("m²/s³")]
@@ -47,18 +55,23 @@ class KanaiTajimi:
         if self.omega_f == 0.0:
             return values
         corner = self.omega_f**2
-        return (
-            values * square**2 / ((corner - square) ** 2 + 4.0 * self.zeta_f**2 * corner * square)
-        )
+        denominator = (corner - square) ** 2 + 4.0 * self.zeta_f**2 * corner * square
+        return values * square**2 / denominator
 
 
 @dataclass(frozen=True)
 class Envelope:
-    """Describe an envelope (t/rise)², then 1, then exp(-decay (t - end)).
+    """Describe the envelope of Jennings, Housner and Tsai (1968).
 
-    It is that of Jennings, Housner and Tsai (1968).
+    It is (t/rise)², then 1, then exp(-decay (t - end)).
 
-    rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise.
+    Attributes:
+        rise: until when it rises [s].
+        end: until when it is 1 [s], no earlier than ``rise``.
+        decay: of what follows [1/s], zero or more.
+
+    Raises:
+        InputError: other numbers.
     """
 
     rise: Annotated[float, Unit("s")]
@@ -86,15 +99,23 @@ def synthetic(
     seed: Annotated[int, Between(0, 2**63 - 1)],
     envelope: Envelope | None = None,
 ) -> Record:
-    """Make a motion of this density.
+    """Make a motion of this density by spectral representation (Shinozuka and Deodatis, 1991).
 
-    It is a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
-
-    Spectral representation (Shinozuka and Deodatis, 1991) with w_k = k dw, dw = 2 pi / period; the
+    It is a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k) with w_k = k dw and dw = 2 pi / period. The
     period, the next power of two of steps from twice the duration, keeps the motion from repeating.
     Without an envelope it is stationary over all seeds, of mean 0 and variance 2 sum S(w_k) dw. One
     seed gives one motion on all ranks. Scale with `scaled_to_pga`; correct the baseline where
-    displacements are prescribed. InputError unless 0 < dt < duration.
+    displacements are prescribed.
+
+    Args:
+        spectrum: S.
+        duration: of the motion [s].
+        dt: time step [s].
+        seed: of the phases phi_k, which are uniform.
+        envelope: that the motion is multiplied by; None for none.
+
+    Raises:
+        InputError: a step and a duration without 0 < dt < duration.
     """
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
@@ -105,11 +126,12 @@ def synthetic(
     step = 2.0 * math.pi / (size * dt)
     omega = step * np.arange(1, size // 2)
     phases = np.random.Generator(np.random.PCG64(seed)).uniform(0.0, 2.0 * math.pi, omega.size)
-    spectrum_line = np.zeros(size // 2 + 1, dtype=complex)
-    spectrum_line[1:-1] = (
-        np.sqrt(4.0 * spectrum.density(omega) * step) * np.exp(1j * phases) * size / 2.0
-    )
-    samples = np.fft.irfft(spectrum_line, size)[:count]
+
+    # The sum of cosines is one inverse transform.
+    amplitudes = np.sqrt(4.0 * spectrum.density(omega) * step)
+    lines = np.zeros(size // 2 + 1, dtype=complex)
+    lines[1:-1] = amplitudes * np.exp(1j * phases) * size / 2.0
+    samples = np.fft.irfft(lines, size)[:count]
     if envelope is not None:
         samples = samples * envelope(dt * np.arange(count))
     return Record(

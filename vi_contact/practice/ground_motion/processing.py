@@ -35,15 +35,15 @@ def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Reco
     """Return the record at time step dt.
 
     It is interpolated band-limited to smaller steps, and decimated with anti-aliasing to larger
-    ones.
+    ones, by scipy.signal.resample_poly: a zero-phase windowed-sinc filter (Kaiser, beta 5) whose
+    amplitude is halved at the lower of the two Nyquist frequencies 1 / (2 dt). The record is taken
+    as zero outside its samples, so a record that does not start and end near zero is bent towards
+    zero over ten steps, of the longer kind, at each end. dt must be the record's step times a ratio
+    of whole numbers up to 1000; `GroundMotion` interpolates for any other step. Sample 0 stays at
+    t = 0; the new record ends at the last multiple of dt inside the old one.
 
-    scipy.signal.resample_poly: a zero-phase windowed-sinc filter (Kaiser, beta 5) whose amplitude
-    is halved at the lower of the two Nyquist frequencies 1 / (2 dt). The record is taken as zero
-    outside its samples, so a record that does not start and end near zero is bent towards zero over
-    ten steps, of the longer kind, at each end. dt must be the record's step times a ratio of whole
-    numbers up to 1000; `GroundMotion` interpolates for any other step. Sample 0 stays at t = 0; the
-    new record ends at the last multiple of dt inside the old one. Raises InputError when dt is
-    not such a ratio, or longer than the record.
+    Raises:
+        InputError: a dt that is not such a ratio, or longer than the record.
     """
     dt = float(dt)
     counted("resampled", f"dt={dt!r} s", record.duration / dt)
@@ -71,30 +71,33 @@ def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Reco
 
 @checked
 def integrated(record: Record) -> tuple[Array, Array]:
-    """Return ground velocity [m/s] and displacement [m] at the samples.
+    """Return ground velocity (n,) [m/s] and displacement (n,) [m] at the samples.
 
-    Both have shape (n,) and are zero at t = 0.
-
-    Exact for an acceleration that is a straight line between samples: the trapezoidal rule for the
-    velocity, v_{k+1} = v_k + dt (a_k + a_{k+1}) / 2, and u_{k+1} = u_k + dt v_k + dt² (2 a_k +
-    a_{k+1}) / 6. Nothing is filtered and no baseline is corrected: what is left at the end is the
-    drift of the record.
+    Both are zero at t = 0. They are exact for an acceleration that is a straight line between
+    samples: the trapezoidal rule for the velocity, v_{k+1} = v_k + dt (a_k + a_{k+1}) / 2, and
+    u_{k+1} = u_k + dt v_k + dt² (2 a_k + a_{k+1}) / 6. Nothing is filtered and no baseline is
+    corrected: what is left at the end is the drift of the record.
     """
-    a, dt = record.acceleration, record.dt
-    velocity = np.concatenate(([0.0], np.cumsum(0.5 * dt * (a[:-1] + a[1:]))))
-    displacement = np.concatenate(
-        ([0.0], np.cumsum(dt * velocity[:-1] + dt**2 / 6.0 * (2.0 * a[:-1] + a[1:])))
-    )
+    a = record.acceleration
+    dt = record.dt
+    velocity_steps = 0.5 * dt * (a[:-1] + a[1:])
+    velocity = np.concatenate(([0.0], np.cumsum(velocity_steps)))
+    displacement_steps = dt * velocity[:-1] + dt**2 / 6.0 * (2.0 * a[:-1] + a[1:])
+    displacement = np.concatenate(([0.0], np.cumsum(displacement_steps)))
     return velocity, displacement
 
 
 @checked
 def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Record:
-    """Keep the samples at start <= t <= end [s]; the first one kept becomes t = 0.
+    """Keep the samples at start <= t <= end; the first one kept becomes t = 0.
 
-    end: the record's last sample.
+    Args:
+        record: the motion.
+        start: time of the first sample [s].
+        end: time of the last sample [s]; None for that of the record.
 
-    Raises InputError unless 0 <= start < end <= duration and two samples are left.
+    Raises:
+        InputError: times without 0 <= start < end <= duration; fewer than two samples left.
     """
     last = record.duration if end is None else end
     slack = 1e-9 * record.dt
@@ -108,29 +111,30 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
         raise InputError(
             f"trimmed: fewer than two samples lie from {start:g} to {last:g} s; give a longer piece"
         )
-    first = float(record.times[inside][0])
-    return record.changed(
-        record.acceleration[inside],
-        f"trimmed to {first:g} ... {float(record.times[inside][-1]):g} s",
-    )
+    times = record.times[inside]
+    note = f"trimmed to {float(times[0]):g} ... {float(times[-1]):g} s"
+    return record.changed(record.acceleration[inside], note)
 
 
 @checked
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
-    """Add zeros for `before` seconds ahead of the record and `after` seconds behind it.
+    """Add zeros before and behind the record.
 
-    Both are rounded up to whole steps.
+    Args:
+        record: the motion.
+        before: how long the zeros ahead of it last [s], rounded up to whole steps.
+        after: how long the zeros behind it last [s], rounded up likewise.
 
-    Raises InputError unless both are zero or positive.
+    Raises:
+        InputError: a length that is negative or infinite.
     """
     if not all(0.0 <= length < math.inf for length in (before, after)):
         raise InputError(
             f"padded: before={before!r} and after={after!r} s; give zero or positive lengths"
         )
     asked = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
-    counted(
-        "padded", f"before={before!r} and after={after!r} s", record.acceleration.size + sum(asked)
-    )
+    total = record.acceleration.size + sum(asked)
+    counted("padded", f"before={before!r} and after={after!r} s", total)
     counts = [math.ceil(samples) for samples in asked]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
     return record.changed(np.pad(record.acceleration, counts), note)
@@ -138,11 +142,9 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
 
 @checked
 def without_mean(record: Record, *, until: float | None = None) -> Record:
-    """Subtract the mean of the record, or of the samples at t <= until [s].
+    """Subtract the mean of the record, or that of the quiet before the shaking, t <= until [s].
 
-    These are the quiet before the shaking.
-
-    Raises InputError when until is not within the record.
+    Raises InputError when ``until`` is not within the record.
     """
     end = record.duration if until is None else until
     if not 0.0 <= end <= record.duration:
@@ -160,8 +162,8 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
 def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     """Bring both ends to zero by half a cosine over `fraction` of the record's duration.
 
-    w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end; InputError unless 0
-    < fraction <= 0.5.
+    The window is w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end.
+    Raises InputError unless 0 < fraction <= 0.5.
     """
     if not 0.0 < fraction <= 0.5:
         raise InputError(
@@ -182,25 +184,30 @@ def filtered(
     order: int = 4,
     causal: bool = False,
 ) -> Record:
-    """Apply a Butterworth high-pass above `low` [Hz], a low-pass below `high` [Hz], or a band-pass.
-
-    The band-pass lies between the two.
+    """Apply a Butterworth high-pass, a low-pass, or a band-pass, which is both.
 
     One pass has the gain |H|² = 1 / (1 + (f/high)^(2 order)) and likewise (low/f) of the high-pass,
     each applied by itself, so a band-pass has `order` on both flanks; the bilinear transform
-    replaces f by tan(pi f dt). causal: one pass forward, which delays. Otherwise (default) forward
-    and backward: no phase shift and the gain |H|², -6 dB at the corners. The record is taken as
-    zero outside; it keeps its length, so what a zero-phase filter sends out before the start and
-    after the end is cut off: use `padded` before where that matters. Raises InputError for corners
-    that are not 0 < low < high < Nyquist frequency, or an order outside 1 to 10.
+    replaces f by tan(pi f dt). The record is taken as zero outside; it keeps its length, so what a
+    zero-phase filter sends out before the start and after the end is cut off: use `padded` before
+    where that matters.
+
+    Args:
+        record: the motion.
+        low: corner of the high-pass [Hz]; None for no high-pass.
+        high: corner of the low-pass [Hz]; None for no low-pass.
+        order: of each filter, 1 to 10.
+        causal: True for one pass forward, which delays. False for forward and backward: no phase
+            shift, and the gain |H|², which is -6 dB at the corners.
+
+    Raises:
+        InputError: corners without 0 < low < high < Nyquist frequency; an order outside 1 to 10.
     """
     nyquist = 0.5 / record.dt
     corners = [corner for corner in (low, high) if corner is not None]
-    if (
-        not corners
-        or not all(0.0 < corner < nyquist for corner in corners)
-        or sorted(set(corners)) != corners
-    ):
+    in_range = all(0.0 < corner < nyquist for corner in corners)
+    rising = sorted(set(corners)) == corners
+    if not (corners and in_range and rising):
         raise InputError(
             f"filtered: corners low={low!r} and high={high!r} Hz; give one or both, rising, "
             f"between 0 and the Nyquist frequency {nyquist:g} Hz"
@@ -210,27 +217,29 @@ def filtered(
     # late: it takes longer to import than the rest of the package
     from scipy.signal import butter, sosfilt
 
-    stages = [
-        butter(order, corner, kind, fs=1.0 / record.dt, output="sos")
-        for corner, kind in ((low, "highpass"), (high, "lowpass"))
-        if corner is not None
-    ]
+    stages = []
+    for corner, kind in ((low, "highpass"), (high, "lowpass")):
+        if corner is not None:
+            stages.append(butter(order, corner, kind, fs=1.0 / record.dt, output="sos"))
     sections = np.concatenate(stages)
     if causal:
         samples = sosfilt(sections, record.acceleration)
     else:
-        # samples in which the slowest filter dies away: six of its periods
-        ringing = 6.0 / (min(corners) * record.dt)
-        counted(
-            "filtered", f"a corner of {min(corners):g} Hz", 3.0 * ringing + record.acceleration.size
-        )
+        # Zeros on both sides, for as many samples as the slowest filter takes to die away: six of
+        # its periods. Then forward, and backward in time.
+        lowest = min(corners)
+        ringing = 6.0 / (lowest * record.dt)
+        size = record.acceleration.size
+        counted("filtered", f"a corner of {lowest:g} Hz", 3.0 * ringing + size)
         tail = np.zeros(math.ceil(ringing))
         forward = sosfilt(sections, np.concatenate([tail, record.acceleration, tail]))
-        samples = sosfilt(sections, forward[::-1])[::-1][
-            tail.size : tail.size + record.acceleration.size
-        ]
+        both_ways = sosfilt(sections, forward[::-1])[::-1]
+        samples = both_ways[tail.size : tail.size + size]
     band = " to ".join(f"{corner:g}" for corner in corners)
-    kind = "band-pass" if len(corners) == 2 else "high-pass" if low is not None else "low-pass"
+    kinds = [
+        name for name, corner in (("high-pass", low), ("low-pass", high)) if corner is not None
+    ]
+    kind = "band-pass" if len(kinds) == 2 else kinds[0]
     passes = "causal" if causal else "zero phase (two passes)"
     return record.changed(samples, f"Butterworth {kind} {band} Hz, order {order}, {passes}")
 
@@ -239,32 +248,44 @@ def filtered(
 def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = False) -> Record:
     """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration.
 
-    The coefficients c fit the integrated motion.
+    The coefficients c minimise the sum of squares of the motion left over, subject to v(T) = u(T) =
+    0; v and u are those of `integrated`, so both end at zero to round-off. A second correction
+    changes nothing, and a record that is itself such a polynomial becomes zero.
 
-    c minimises the sum of squares of the velocity left over (of the displacement, if
-    `displacement`), subject to v(T) = u(T) = 0; v and u are those of `integrated`, so both end at
-    zero to round-off. A second correction changes nothing, and a record that is itself such a
-    polynomial becomes zero. Raises InputError unless degree is a whole number from 1 to 6 and below
-    the number of samples.
+    Args:
+        record: the motion.
+        degree: of the polynomial, from 1 to 6 and below the number of samples.
+        displacement: whether the displacement is minimised in the place of the velocity.
+
+    Raises:
+        InputError: another degree.
     """
     if degree not in range(1, min(HIGHEST, record.acceleration.size - 1) + 1):
         raise InputError(
             f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, "
             "below the number of samples"
         )
+    # The integrated motion of each power and of the record: (v or u, power, sample).
     powers = (record.times / record.duration)[:, None] ** np.arange(degree + 1)
     motions = [integrated(replace(record, acceleration=column)) for column in powers.T]
-    basis = np.array([motion[int(displacement)] for motion in motions]).T
-    target = integrated(record)[int(displacement)]
-    ends = np.array([[motion[k][-1] for motion in motions] for k in (0, 1)])
+    velocities = np.array([v for v, _ in motions])
+    displacements = np.array([u for _, u in motions])
+    velocity_of_record, displacement_of_record = integrated(record)
+    basis = displacements.T if displacement else velocities.T
+    target = displacement_of_record if displacement else velocity_of_record
+
+    # One polynomial that brings both to rest at the end.
     scale = np.array([[record.duration], [record.duration**2]])
-    wanted = np.array([[part[-1]] for part in integrated(record)]) / scale
-    # one that ends at rest, and
-    coefficients = np.linalg.lstsq(ends / scale, wanted, rcond=None)[0][:, 0]
-    # combinations of those that change nothing at the end
-    free = np.linalg.svd(ends / scale)[2][2:].T
+    ends = np.array([velocities[:, -1], displacements[:, -1]]) / scale
+    wanted = np.array([[velocity_of_record[-1]], [displacement_of_record[-1]]]) / scale
+    at_rest, *_ = np.linalg.lstsq(ends, wanted, rcond=None)
+    coefficients = at_rest[:, 0]
+
+    # The best of those that change nothing at the end, added to it.
+    _, _, rows = np.linalg.svd(ends)
+    free = rows[2:].T
     if free.shape[1]:
-        rest = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)[0]
+        rest, *_ = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)
         coefficients = coefficients + free @ rest
     kind = "displacement" if displacement else "velocity"
     note = f"baseline: polynomial of degree {degree} fitted to the {kind}, v = u = 0 at the end"

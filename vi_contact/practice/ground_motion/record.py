@@ -33,18 +33,29 @@ The strongest ground motions on record reach half of it.
 class Record:
     """Describe equally spaced accelerations.
 
-    Sample k is the acceleration at t = k · dt, the first one at t = 0.
+    Sample k is the acceleration at t = k · dt, the first one at t = 0. Between samples the
+    acceleration is a straight line. Two records are equal only if they are the same object.
 
-    acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0;
-    title; source: path of the file; format: name of its format; units: of the file, before
-    conversion to m/s²; sha256: of the file's bytes; notes: what the file says about station and
-    processing, then every change made since, one line each; station and component (direction): as
-    the file names them, empty where it does not; units_from, dt_from, samples_from: where the
-    units, the time step and the number of samples come from ("header, line 4", "option",
-    "counted"); doubts: what was read in one of several ways that were possible, one sentence each.
-    Between samples the acceleration is a straight line. Two records are equal only if they are the
-    same object. Raises InputError for NaN or infinite samples, fewer than two of them, or a time
-    step that is not positive.
+    Attributes:
+        acceleration: (n,), n >= 2 [m/s²], copied and made read-only.
+        dt: time step [s].
+        title: of the record.
+        source: path of the file.
+        format: name of its format.
+        units: of the file, before conversion to m/s².
+        sha256: of the file's bytes.
+        notes: what the file says about station and processing, then every change made since, one
+            line each.
+        station: as the file names it, empty where it does not.
+        component: direction, as the file names it, empty where it does not.
+        units_from: where the units come from, such as "header, line 4" or "option".
+        dt_from: where the time step comes from.
+        samples_from: where the number of samples comes from, such as "counted".
+        doubts: what was read in one of several ways that were possible, one sentence each.
+
+    Raises:
+        InputError: samples that are NaN or infinite; fewer than two samples; a time step that is
+            not positive.
     """
 
     acceleration: Array
@@ -74,16 +85,21 @@ class Record:
         object.__setattr__(self, "acceleration", samples)
 
     def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> "Record":
-        """Return a record with these samples, and a note of what was done."""
+        """Return a record with other samples.
+
+        Args:
+            acceleration: the samples [m/s²].
+            note: of what was done.
+            dt: time step of the samples [s]; None for that of this record.
+        """
+        same_number = acceleration.size == self.acceleration.size
         return replace(
             self,
             acceleration=acceleration,
             dt=dt or self.dt,
             notes=(*self.notes, note),
             dt_from="resampled" if dt else self.dt_from,
-            samples_from="changed after reading"
-            if acceleration.size != self.acceleration.size
-            else self.samples_from,
+            samples_from=self.samples_from if same_number else "changed after reading",
         )
 
     @property
@@ -116,15 +132,12 @@ _SPELLINGS = {
 
 def known_units(units: str) -> str | None:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"), or None."""
-    text = (
-        units.lower()
-        .strip(" ()[].,;:'\"")
-        .replace("²", "2")
-        .replace("^", "")
-        .replace("**", "")
-        .replace("*", "")
-    )
-    text = "".join(text.split()).replace("sec", "s").replace("/s/s", "/s2")
+    text = units.lower().strip(" ()[].,;:'\"")
+    text = text.replace("²", "2")
+    for power_sign in ("^", "*"):
+        text = text.replace(power_sign, "")
+    without_blanks = "".join(text.split())
+    text = without_blanks.replace("sec", "s").replace("/s/s", "/s2")
     text = _SPELLINGS.get(text, text)
     return text if text in UNITS else None
 
@@ -133,7 +146,7 @@ def known_units(units: str) -> str | None:
 def canonical_units(source: str, units: str) -> str:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2").
 
-    It raises InputError if there is none.
+    Raises InputError, which names the source, where there is none.
     """
     text = known_units(units) if isinstance(units, str) else None
     if text is None:

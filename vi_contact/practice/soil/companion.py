@@ -1,10 +1,8 @@
-"""March a small linear system beside a run.
+"""March a small linear system beside a run, with the run's own scheme and steps.
 
-It is the ground, or a free-field column, with the run's own scheme and steps.
-
-Loads of the run ask for its motion. Displacement and velocity are straight lines between the steps,
-as in the schemes' averages, so that such a load enters the equation of motion with the same weights
-as the run's own u and v.
+The system is the ground, or a free-field column. Loads of the run ask for its motion. Displacement
+and velocity are straight lines between the steps, as in the schemes' averages, so that such a load
+enters the equation of motion with the same weights as the run's own u and v.
 """
 
 from bisect import bisect_right
@@ -29,17 +27,24 @@ from ...run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
 
 
 class CompanionRun:
-    """March a serial system without contact from rest at t = 0.
+    """March a serial system without contact from rest at t = 0, as far as somebody asks.
 
-    It goes as far as somebody asks for its u(t) and v(t).
+    A run *binds* it to its scheme and time steps, with which the motion is then integrated. Each
+    rank marches its own copy.
 
-    ``name`` is for messages; ``problem`` makes the system, with consistent mass, when it is first
-    needed. A run *binds* it to its scheme and time steps, with which the motion is then integrated.
-    Each rank marches its own copy.
+    Attributes:
+        name: of the companion in messages.
     """
 
     def __init__(self, name: str, problem: Callable[[], ContactProblem]) -> None:
-        self.name, self._make = name, problem
+        """Note how the system is made.
+
+        Args:
+            name: of the companion in messages.
+            problem: makes the system when it is first needed; its mass becomes consistent.
+        """
+        self.name = name
+        self._make = problem
         self._bound: tuple[Scheme, TimeSteps] | None = None
 
     @cached_property
@@ -49,9 +54,10 @@ class CompanionRun:
     def bind(self, scheme: Scheme, dt: TimeSteps) -> None:
         """March with this scheme and these time steps [s] from now on.
 
-        Nothing happens when they are those it has.
+        Nothing happens where it has the same ones already.
 
-        InputError for steps that the run itself chooses while it goes (``HalvedAtImpact``).
+        Raises:
+            InputError: steps that the run itself chooses while it goes (``HalvedAtImpact``).
         """
         if self._bound is not None and self._bound == (scheme, dt):
             return
@@ -61,22 +67,27 @@ class CompanionRun:
                 f"the run has {dt!r}: give dt as a number or a Schedule"
             )
         self._bound = scheme, dt
-        # the last piece does not end: only the times of a run are asked for
+        # The last piece does not end: only the times of a run are asked for.
         if isinstance(dt, Schedule):
-            dt = Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf)))
+            *pieces, (last_step, _) = dt.pieces
+            dt = Schedule((*pieces, (last_step, inf)))
         self._steps: Iterator[tuple[State, Any]] = march(
             self._problem, scheme=scheme, dt=dt, steps=LARGEST
         )
         system = self._problem.system
-        self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
+        self._t = [0.0]
+        self._u = [system.u0.copy()]
+        self._v = [system.v0.copy()]
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Return (u, v) at time t [s]; up to t = 0 the system is as it starts.
 
-        InputError before a run has bound it.
+        Raises:
+            InputError: no run has bound it yet.
         """
         if t <= 0.0:
-            return self._problem.system.u0.copy(), self._problem.system.v0.copy()
+            system = self._problem.system
+            return system.u0.copy(), system.v0.copy()
         if self._bound is None:
             raise InputError(
                 f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: "
@@ -92,15 +103,20 @@ class CompanionRun:
         if self._t[k] == t:
             return self._u[k], self._v[k]
         w = (t - self._t[k]) / (self._t[k + 1] - self._t[k])
-        return (1.0 - w) * self._u[k] + w * self._u[k + 1], (1.0 - w) * self._v[k] + w * self._v[
-            k + 1
-        ]
+        u = (1.0 - w) * self._u[k] + w * self._u[k + 1]
+        v = (1.0 - w) * self._v[k] + w * self._v[k + 1]
+        return u, v
 
 
 def linear_problem(M: Any, C: Any | None, K: Any, load: Load, dimension: int) -> ContactProblem:
-    """Return M u'' + C u' + K u = f, at rest.
+    """Return the problem M u'' + C u' + K u = f without contact, from rest.
 
-    The matrices are sparse; there is no contact, and a node has ``dimension`` unknowns.
+    Args:
+        M: mass, sparse.
+        C: damping, sparse; None for none.
+        K: stiffness, sparse.
+        load: f.
+        dimension: number of unknowns of a node.
     """
     nowhere = np.zeros((M.shape[0] // dimension, dimension))  # nobody asks a companion for points
     system = system_from_arrays(M, C, K, coordinates=nowhere, load=load)

@@ -1,7 +1,4 @@
-"""Say how soil softens and damps as it is sheared.
-
-There are curves of G/Gmax and of the damping ratio over the shear strain.
-"""
+"""Say how soil softens and damps as it is sheared: G/Gmax and damping ratio over shear strain."""
 
 import math
 import tomllib
@@ -26,14 +23,20 @@ _TABLES = tomllib.loads(files(__package__).joinpath("curves.toml").read_text(enc
 
 @dataclass(frozen=True)
 class SoilCurves:
-    """Hold G/Gmax and the damping ratio at shear strains.
+    """Hold G/Gmax and the damping ratio at some shear strains.
 
-    Between them there are straight lines over the logarithm of the strain.
+    Between these strains there are straight lines over the logarithm of the strain. Smaller strains
+    than the first have its values. Larger strains than the last are outside: ``equivalent_linear``
+    and ``strain_compatible`` refuse to end there.
 
-    strain: rising, as numbers, not per cent (1e-3 is 0.1 %); reduction: G/Gmax, from at least 0.95
-    falling, above zero; damping: ratios below 1/2. Smaller strains than the first have its values;
-    larger ones than the last are outside: ``equivalent_linear`` and ``strain_compatible`` refuse to
-    end there. InputError for other tables.
+    Attributes:
+        strain: (n,) rising, as numbers and not in per cent: 1e-3 is 0.1 %.
+        reduction: (n,) G/Gmax, falling from at least 0.95, above zero.
+        damping: (n,) ratios below 1/2.
+        name: of the curves in messages.
+
+    Raises:
+        InputError: other tables.
     """
 
     strain: Annotated[Sequence[float], RATIO]
@@ -43,10 +46,8 @@ class SoilCurves:
 
     def __post_init__(self) -> None:
         strain = array("SoilCurves", "strain", self.strain, (None,))
-        reduction, damping = (
-            array("SoilCurves", name, getattr(self, name), strain.shape)
-            for name in ("reduction", "damping")
-        )
+        reduction = array("SoilCurves", "reduction", self.reduction, strain.shape)
+        damping = array("SoilCurves", "damping", self.damping, strain.shape)
         if len(strain) < 2 or strain[0] <= 0.0 or np.any(np.diff(strain) <= 0.0):
             raise InputError(
                 f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more "
@@ -67,8 +68,9 @@ class SoilCurves:
                 f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from "
                 "0 to less than 1/2, not per cent"
             )
-        for name, values in (("strain", strain), ("reduction", reduction), ("damping", damping)):
-            object.__setattr__(self, name, tuple(values.tolist()))
+        object.__setattr__(self, "strain", tuple(strain.tolist()))
+        object.__setattr__(self, "reduction", tuple(reduction.tolist()))
+        object.__setattr__(self, "damping", tuple(damping.tolist()))
 
     @classmethod
     @checked
@@ -84,41 +86,43 @@ class SoilCurves:
 
     @classmethod
     def seed_idriss(cls, bound: str = "mean") -> "SoilCurves":
-        """Return the curves of sands, Seed and Idriss (1970).
+        """Return the curves of sands, Seed and Idriss (1970), for strains up to 1 %.
 
-        They are as pystrata 0.5.4 has read them from the figures. They are "mean", or "upper"
-        modulus with lower damping, which SHAKE91 goes by. Strains up to 1 %.
+        They are as pystrata 0.5.4 has read them from the figures. ``bound`` is "mean", or "upper"
+        for the upper curve of the modulus with the lower curve of damping, which SHAKE91 takes.
         """
-        known = _TABLES["seed_idriss"]
-        check_word("bound of seed_idriss", bound, tuple(known))
-        return cls(
-            _TABLES["strain"],
-            known[bound]["reduction"],
-            known[bound]["damping"],
-            f"Seed-Idriss {bound}",
-        )
+        bounds = _TABLES["seed_idriss"]
+        check_word("bound of seed_idriss", bound, tuple(bounds))
+        table = bounds[bound]
+        name = f"Seed-Idriss {bound}"
+        return cls(_TABLES["strain"], table["reduction"], table["damping"], name)
 
     @classmethod
     @checked
     def vucetic_dobry(
         cls, plasticity: Annotated[float, NotNegative, "the plasticity index [%]"]
     ) -> "SoilCurves":
-        """Return the curves of a plasticity index from 0 to 200 [%].
+        """Return the curves of a plasticity index from 0 to 200 [%], for strains up to 1 %.
 
-        They are those of Vucetic and Dobry (1991), read likewise. They are published for 0, 15, 30,
-        50, 100 and 200, with straight lines over the index between. Strains up to 1 %.
+        They are those of Vucetic and Dobry (1991), as pystrata 0.5.4 has read them. They are
+        published for 0, 15, 30, 50, 100 and 200; between these there are straight lines over the
+        index.
         """
         index = float(plasticity)
-        known = _TABLES["vucetic_dobry"]
-        if index > known["plasticity"][-1]:
+        table = _TABLES["vucetic_dobry"]
+        published = table["plasticity"]
+        if index > published[-1]:
             raise InputError(
                 f"SoilCurves.vucetic_dobry: the plasticity index is {index:g} %, and the curves "
-                f"end at {known['plasticity'][-1]} %: give SoilCurves of your own"
+                f"end at {published[-1]} %: give SoilCurves of your own"
             )
-        reduction, damping = (
-            [float(np.interp(index, known["plasticity"], one)) for one in np.transpose(known[name])]
-            for name in ("reduction", "damping")
-        )
+
+        def at_index(rows: list[list[float]]) -> list[float]:
+            """Return the values at the index, of a row for each published one."""
+            return [float(np.interp(index, published, column)) for column in np.transpose(rows)]
+
+        reduction = at_index(table["reduction"])
+        damping = at_index(table["damping"])
         return cls(_TABLES["strain"], reduction, damping, f"Vucetic-Dobry PI {index:g}")
 
     @classmethod
@@ -132,55 +136,63 @@ class SoilCurves:
         frequency: Annotated[float, Positive, Unit("Hz")] = 1.0,
         cycles: Annotated[float, Positive] = 10.0,
     ) -> "SoilCurves":
-        """Return the curves of Darendeli (2001).
+        """Return the curves of Darendeli (2001), for strains up to 1 %.
 
-        With p = mean_stress / 1 atm, PI in % and strains in % up to 1:
+        With p = mean_stress / 1 atm, PI in % and strains s in %:
 
             G/Gmax = 1 / (1 + (s/s_r)^0.919),    s_r = (0.0352 + 0.001 PI ocr^0.3246) p^0.3483
             xi = (0.6329 - 0.00566 ln N) (G/Gmax)^0.1 D_Masing + xi_min
             xi_min = (0.8005 + 0.0129 PI ocr^-0.1069) p^-0.2889 (1 + 0.2919 ln f)
 
-        with his D_Masing. mean_stress: effective; frequency: f; cycles: N.
+        with his D_Masing, a cubic polynomial in that of the hyperbola with exponent 1.
+
+        Args:
+            mean_stress: effective mean stress [Pa].
+            plasticity: index PI [%].
+            ocr: overconsolidation ratio.
+            frequency: f of the loading [Hz].
+            cycles: number N of cycles.
         """
-        p, index = float(mean_stress) / ATMOSPHERE, float(plasticity)
-        f, n = float(frequency), float(cycles)
-        s, a = np.logspace(-4.0, 0.0, 41), 0.919
+        p = float(mean_stress) / ATMOSPHERE
+        index = float(plasticity)
+        f = float(frequency)
+        n = float(cycles)
+        s = np.logspace(-4.0, 0.0, 41)
+        a = 0.919  # the exponent of the modulus
         s_r = (0.0352 + 0.001 * index * ocr**0.3246) * p**0.3483
+
+        # Damping by Masing's rules for the exponent 1, in %, and from it for the exponent a.
         hyperbola = 4.0 * (s - s_r * np.log1p(s / s_r)) * (s + s_r) / s**2 - 2.0
-        masing = np.polyval(
-            [
-                -0.0005 * a**2 + 0.0002 * a + 0.0003,
-                0.0805 * a**2 - 0.071 * a - 0.0095,
-                -1.1143 * a**2 + 1.8618 * a + 0.2523,
-                0.0,
-            ],
-            100.0 / np.pi * hyperbola,
-        )
+        coefficients = [
+            -0.0005 * a**2 + 0.0002 * a + 0.0003,
+            0.0805 * a**2 - 0.071 * a - 0.0095,
+            -1.1143 * a**2 + 1.8618 * a + 0.2523,
+            0.0,
+        ]
+        masing = np.polyval(coefficients, 100.0 / np.pi * hyperbola)
         least = (0.8005 + 0.0129 * index * ocr**-0.1069) * p**-0.2889 * (1.0 + 0.2919 * np.log(f))
-        reduction = 1.0 / (1.0 + (s / s_r) ** a)
-        damping = (0.6329 - 0.00566 * np.log(n)) * reduction**0.1 * masing + least
-        rows: Any = (s / 100.0, reduction, damping / 100.0)
-        return cls(rows[0], rows[1], rows[2], f"Darendeli PI {index:g}, {mean_stress:g} Pa")
+        reduction: Any = 1.0 / (1.0 + (s / s_r) ** a)
+        damping: Any = (0.6329 - 0.00566 * np.log(n)) * reduction**0.1 * masing + least
+        strain: Any = s / 100.0
+        name = f"Darendeli PI {index:g}, {mean_stress:g} Pa"
+        return cls(strain, reduction, damping / 100.0, name)
 
     def beyond(self, strain: float, place: str) -> str:
-        """Return the sentence about an effective strain beyond the largest of the curves.
+        """Return the sentence about an effective strain beyond the curves, or "" where it is not.
 
-        It is empty where it is not beyond.
+        ``place`` says where the strain is.
         """
+        last = self.strain[-1]
+        if strain <= last:
+            return ""
         return (
-            ""
-            if strain <= self.strain[-1]
-            else (
-                f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and "
-                f"'{self.name}' ends at {100.0 * self.strain[-1]:.3g} %; give a weaker motion, or "
-                "curves that go further"
-            )
+            f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and "
+            f"'{self.name}' ends at {100.0 * last:.3g} %; give a weaker motion, or "
+            "curves that go further"
         )
 
     def at(self, strain: Array) -> tuple[Array, Array]:
-        """Return (G/Gmax, damping ratio) at these shear strains.
-
-        Beyond the last strain there are its values.
-        """
-        place, known = np.log(np.maximum(strain, self.strain[0])), np.log(self.strain)
+        """Return (G/Gmax, damping ratio) at shear strains; beyond the last one, its values."""
+        place = np.log(np.maximum(strain, self.strain[0]))
+        known = np.log(self.strain)
         return np.interp(place, known, self.reduction), np.interp(place, known, self.damping)

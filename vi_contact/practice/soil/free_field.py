@@ -1,6 +1,4 @@
-"""Continue level ground behind a body's sides.
-
-There are dashpots on the difference to the free field, and its stress.
+"""Continue level ground behind a body's sides, by dashpots and the stress of the free field.
 
 On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and stress of the
 ground far away,
@@ -8,10 +6,10 @@ ground far away,
     traction = sigma_ff·n - D (v - v_ff),    D v = rho c_P v_n n + rho c_S v_t
 
 (FLAC and PLAXIS free-field boundaries; OpenSees ASDAbsorbingBoundary2D). Without a structure v =
-v_ff and the side is not there: exact here to round-off, as the column has the heights and materials
-of the side's own elements and is marched with the run's scheme. Waves that a structure sends out
-leave through the dashpots. No static load is held: for a gravity stage put the sides on rollers,
-then ``release`` them.
+v_ff, and it is as if there were no side. Here this is exact to round-off, since the column has the
+heights and the materials of the side's own elements and is marched with the run's scheme. Waves
+that a structure sends out leave through the dashpots. No static load is held: for a gravity stage
+put the sides on rollers, then ``release`` them.
 """
 
 from collections.abc import Sequence
@@ -41,18 +39,20 @@ Base = Excitation | Sequence[Excitation] | BaseMotion | CompliantBase
 class FreeField(Dashpots):
     """Describe one vertical side of a body in the plane, its lowest node at the base.
 
-    ``base``: the run's excitations (rigid base, frame of the ground), its ``BaseMotion``
-    (prescribed base) or its ``CompliantBase``. The column behind the side is marched with the
-    scheme and the time steps of the run, from t = 0.
+    The column behind the side is marched with the scheme and the time steps of the run, from t = 0.
+
+    Attributes:
+        base: the run's excitations (rigid base, frame of the ground), its ``BaseMotion``
+            (prescribed base) or its ``CompliantBase``.
     """
 
     base: Base = field(repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for one in getattr(self.ground, "excitations", ()):
-            remedy = "give the excitations of the run, its BaseMotion or its CompliantBase"
-            provides("FreeField", "base", one, EXCITATION, remedy)
+        remedy = "give the excitations of the run, its BaseMotion or its CompliantBase"
+        for excitation in getattr(self.ground, "excitations", ()):
+            provides("FreeField", "base", excitation, EXCITATION, remedy)
 
     @property
     def ground(self) -> CompliantBase | GroundFrame:
@@ -62,17 +62,20 @@ class FreeField(Dashpots):
         """
         if isinstance(self.base, BaseMotion | CompliantBase):
             return self.base
-        return GroundFrame(tuple(self.base) if isinstance(self.base, Sequence) else (self.base,))
+        if isinstance(self.base, Sequence):
+            return GroundFrame(tuple(self.base))
+        return GroundFrame((self.base,))
 
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
-        """Return the stress of the free field on the side.
+        """Return the stress of the free field on the side, D v_ff, and the run of its column.
 
-        With it come D v_ff, and the column that both are taken from.
+        Args:
+            matrix: the dashpots D of the side.
+            forms: of the body, with its materials.
         """
         side = FreeFieldSide(matrix, self, forms)
-        return BoundaryLoads(
-            (side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ()))
-        )
+        companions = (side.run, *getattr(self.base, "companions", ()))
+        return BoundaryLoads((side.elastic,), (side.viscous,), companions)
 
     @property
     def expects(self) -> str:
@@ -85,13 +88,30 @@ class FreeField(Dashpots):
 class FreeFieldSide:
     """March the column beside one side, and give the forces it puts on the body.
 
-    InputError for a body in space, a side not vertical, a lowest node free on a rigid base or held
-    on a compliant one.
+    Attributes:
+        space: of the body.
+        given: the side, as the user describes it.
+        run: the run of the column.
+        column: its elements.
+
+    Raises:
+        InputError: a body in space; a side that is not vertical; a lowest node that is free on a
+            rigid base, or held on a compliant one.
     """
 
     def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:
-        self.space, self.given, self._ground = absorber.space, given, given.ground
-        self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
+        """Make the column.
+
+        Args:
+            absorber: the dashpots of the side.
+            given: the side.
+            forms: of the body, with its materials.
+        """
+        name = given.facets.name
+        self.space = absorber.space
+        self.given = given
+        self._ground = given.ground
+        self.run = CompanionRun(f"FreeField on '{name}'", self._problem)
         if self.space.dimension != 2:
             raise InputError(
                 "FreeField is for plane bodies: tie the sides of this one, or give them dashpots"
@@ -101,13 +121,14 @@ class FreeFieldSide:
         self._section: Section = forms.section
         self._dashpots = PetscMatrix(absorber.mat)
         self.column, self._sign = _column(self.space, forms, self.given)
-        blocks = self.space.facet_blocks(self.given.facets.indices)
-        self._rows = np.abs(self.space.points[blocks, 1][:, None] - self.column.heights).argmin(
-            axis=1
-        )
-        self._blocks = blocks
-        held = total(self.space.comm, self.space.held[blocks[self._rows == 0]].sum())
-        name, compliant = given.facets.name, self._ground.lets_waves_in
+
+        # Nodes of the side on this rank, and the node of the column at the height of each.
+        self._blocks = self.space.facet_blocks(self.given.facets.indices)
+        heights = self.space.points[self._blocks, 1]
+        self._rows = np.abs(heights[:, None] - self.column.heights).argmin(axis=1)
+        lowest = self._blocks[self._rows == 0]
+        held = total(self.space.comm, self.space.held[lowest].sum())
+        compliant = self._ground.lets_waves_in
         if not compliant and held < 2:
             raise InputError(
                 f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the "
@@ -121,7 +142,8 @@ class FreeFieldSide:
 
     def _problem(self) -> ContactProblem:
         """Return the column on its base."""
-        ground, column = self._ground, self.column
+        ground = self._ground
+        column = self.column
         if isinstance(ground, CompliantBase):
             normal, shear = impedances(
                 ground, self._section, column.lame[0], column.shear[0], column.rho[0]
@@ -131,7 +153,9 @@ class FreeFieldSide:
 
     def motion(self, t: float) -> tuple[Array, Array]:
         """Return (u_ff, v_ff) at the heights of the column, (n+1, 2), in the frame of the run."""
-        u, v = (x.reshape(-1, 2) for x in self.run.at(t))
+        u_flat, v_flat = self.run.at(t)
+        u = u_flat.reshape(-1, 2)
+        v = v_flat.reshape(-1, 2)
         if isinstance(self._ground, CompliantBase):
             return u, v
         u_base, v_base, _ = self._ground.at(t)
@@ -140,18 +164,19 @@ class FreeFieldSide:
 
     def elastic(self, t: float) -> Array:
         """Return Pᵀ times the nodal forces of sigma_ff·n."""
-        return self._nodal(self.column.stress(self.motion(t)[0]))
+        u, _ = self.motion(t)
+        return self._nodal(self.column.stress(u))
 
     def viscous(self, t: float) -> Array:
-        """Return Pᵀ D v_ff, and the nodal forces of the damping stresses."""
-        v = self.motion(t)[1]
+        """Return Pᵀ times D v_ff and the nodal forces of the damping stresses, added up."""
+        _, v = self.motion(t)
         far = np.zeros((len(self.space.nodes), 2))
         far[self._blocks] = v[self._rows]
         damping = self.column.beta[:, None] * self.column.stress(v)
         return self.space.pull(self._dashpots @ far.ravel()) + self._nodal(damping)
 
     def _nodal(self, stress: Array) -> Array:
-        """Pᵀ of ∫ sigma·n phi_i over the side, sigma (n, 2) constant on every element."""
+        """Return Pᵀ times ∫ sigma·n phi_i over the side; sigma (n, 2) is constant on an element."""
         halves = 0.5 * self._sign * np.diff(self.column.heights)[:, None] * stress
         at_nodes = np.zeros((len(self.column.heights), 2))
         at_nodes[:-1] += halves
@@ -162,52 +187,57 @@ class FreeFieldSide:
 
 
 def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
-    """Return the column beside the side.
+    """Return the column beside the side, the same on every rank, and the sign of its normal.
 
-    It is the same on every rank. With it comes the sign of the side's outward normal.
+    The sign is that of the x component of the side's outward normal.
     """
-    mesh, name = space.mesh, given.facets.name
-    owned = given.facets.indices[given.facets.indices < mesh.topology.index_map(1).size_local]
+    mesh = space.mesh
+    name = given.facets.name
+    facets = given.facets.indices
+    owned = facets[facets < mesh.topology.index_map(1).size_local]
+
+    # A row for each facet of the side: its ends, the materials of its cell, where this cell is.
     mesh.topology.create_connectivity(1, 2)
-    cells = np.array(
-        [mesh.topology.connectivity(1, 2).links(facet)[0] for facet in owned], dtype=np.int64
-    )
+    cells_at = mesh.topology.connectivity(1, 2)
+    cells = np.array([cells_at.links(facet)[0] for facet in owned], dtype=np.int64)
     ends = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, owned)][:, :, :2]
-    middles = np.array(
-        [mesh.geometry.x[compat.geometry_dofmap(mesh)[cell], 0].mean() for cell in cells]
-    )
+    nodes_of_cells = compat.geometry_dofmap(mesh)
+    middles = np.array([mesh.geometry.x[nodes_of_cells[cell], 0].mean() for cell in cells])
     _refuse_unlike(forms, name)
     values = [forms.cellwise(key)[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
-    low, high = ends[:, :, 1].min(axis=1), ends[:, :, 1].max(axis=1)
-    mine = np.column_stack([low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]).reshape(
-        -1, 10
-    )
-    rows = np.concatenate(space.comm.bcast(space.comm.gather(mine)))
+    low = ends[:, :, 1].min(axis=1)
+    high = ends[:, :, 1].max(axis=1)
+    columns = [low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]
+    own_rows = np.column_stack(columns).reshape(-1, len(columns))
+
+    # The rows of all ranks, upwards.
+    rows = np.concatenate(space.comm.bcast(space.comm.gather(own_rows)))
     rows = rows[np.argsort(rows[:, 0])]
+    low, high, lame, shear, rho, alpha_rho, beta, *x_of_ends, middle = rows.T
     if np.isnan(rows).any():
         raise InputError(
             f"free-field side '{name}' stands beside orthotropic cells, and its soil column is "
             "isotropic: put a LinearElastic there, or Dashpots(…, material=)"
         )
-    x, close = rows[:, 7:9], 1e-9 * space.size
-    if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):
+    tolerance = 1e-9 * space.size
+    if np.ptp(x_of_ends) > tolerance or np.any(np.abs(low[1:] - high[:-1]) > tolerance):
         raise InputError(
             f"free-field side '{name}' is not one vertical line of facets: give a straight side of "
             "the body"
         )
-    lame, shear, rho, alpha_rho, beta = rows[:, 2:7].T
-    column = SoilColumn(np.append(rows[:, 0], rows[-1, 1]), lame, shear, rho, alpha_rho / rho, beta)
-    return column, 1.0 if x[0, 0] > rows[0, 9] else -1.0
+    column = SoilColumn(np.append(low, high[-1]), lame, shear, rho, alpha_rho / rho, beta)
+    is_right_of_body = x_of_ends[0][0] > middle[0]
+    return column, 1.0 if is_right_of_body else -1.0
 
 
 def _refuse_unlike(forms: Any, name: str) -> None:
     """Raise InputError where the column could not be what the body is beside it."""
-    if forms.viscous or not forms.fields:
-        what = (
-            "of Rayleigh damping only, not KelvinVoigt"
-            if forms.fields
-            else "of materials, and forms=… have none"
-        )
-        raise InputError(
-            f"free-field side '{name}': its column is {what}: put Dashpots(…, material=) there"
-        )
+    if not forms.fields:
+        limit = "of materials, and forms=… have none"
+    elif forms.viscous:
+        limit = "of Rayleigh damping only, not KelvinVoigt"
+    else:
+        return
+    raise InputError(
+        f"free-field side '{name}': its column is {limit}: put Dashpots(…, material=) there"
+    )

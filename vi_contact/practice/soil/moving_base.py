@@ -1,6 +1,4 @@
-"""Integrate the motion (u, v, a) of a base that an acceleration shakes.
-
-The time scheme is that of the run.
+"""Integrate the motion (u, v, a) of a base that an acceleration shakes, by the run's own scheme.
 
 A run in the frame of the ground, -M r a_g (``ContactProblem(excitation=...)``), and one whose base
 is moved (``fem.Prescribed``) are the same problem in two frames, u = u_relative + r u_g. They are
@@ -44,18 +42,13 @@ class GroundFrame:
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Return (0, 0, a_g) at time t, each (2,)."""
-        return (
-            np.zeros(2),
-            np.zeros(2),
-            np.sum([excitation(t) for excitation in self.excitations], axis=0),
-        )
+        acceleration = np.sum([excitation(t) for excitation in self.excitations], axis=0)
+        return np.zeros(2), np.zeros(2), acceleration
 
 
 @dataclass(frozen=True)
 class BaseMotion(GroundFrame):
-    """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground.
-
-    It starts from rest at t = 0.
+    """Hold the motion of the ground from rest at t = 0, in m, m/s and m/s².
 
     ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d),
     as ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors.
@@ -65,7 +58,9 @@ class BaseMotion(GroundFrame):
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Return (u_g, v_g, a_g) at time t, each (d,)."""
-        return *self.path.at(t), super().at(t)[2]
+        u, v = self.path.at(t)
+        _, _, a = super().at(t)
+        return u, v, a
 
     @property
     def companions(self) -> tuple[CompanionRun, ...]:
@@ -74,65 +69,71 @@ class BaseMotion(GroundFrame):
 
     def displacement(self, points: Array, t: float) -> Array:
         """Return u_g at every point."""
-        return np.tile(self.at(t)[0], (len(points), 1))
+        u, _, _ = self.at(t)
+        return np.tile(u, (len(points), 1))
 
     def velocity(self, points: Array, t: float) -> Array:
         """Return v_g at every point."""
-        return np.tile(self.at(t)[1], (len(points), 1))
+        _, v, _ = self.at(t)
+        return np.tile(v, (len(points), 1))
 
     def acceleration(self, points: Array, t: float) -> Array:
         """Return a_g at every point."""
-        return np.tile(self.at(t)[2], (len(points), 1))
+        _, _, a = self.at(t)
+        return np.tile(a, (len(points), 1))
 
     def carrying(self, surface: ContactSurface, system: SemiDiscreteSystem) -> ContactSurface:
         """Return the contact surface of ``system`` on an obstacle that moves with the ground.
 
         Between two deformable bodies nothing changes: both are moved by the ground.
         """
+        # What the conditions see of a rigid motion of the ground, along each axis. Where both sides
+        # deform, it is relative to the other side: see SemiDiscreteSystem.in_relative.
         rigid = np.array([surface.in_frames(r) for r in system.influence.T])
-        # relative to the other side: see SemiDiscreteSystem.in_relative
         if surface.coupling is not None:
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
         normal = np.array([surface.normal_values(r) for r in rigid])
         tangential = np.array([surface.tangential_values(r) for r in rigid])
+
+        def ground(t: float) -> Array:
+            """Return the displacement of the ground (d,) [m]."""
+            u, _, _ = self.at(t)
+            return u
+
         moved = surface.moving(
-            lambda t: -self.at(t)[0] @ normal,
-            lambda t: np.tensordot(self.at(t)[0], tangential, axes=1),
+            lambda t: -ground(t) @ normal,
+            lambda t: np.tensordot(ground(t), tangential, axes=1),
         )
-        watched = tuple(one.carried(lambda t: self.at(t)[0]) for one in surface.watched)
+        watched = tuple(nodes.carried(ground) for nodes in surface.watched)
         return replace(moved, companions=(*surface.companions, self.path), watched=watched)
 
 
 def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
-    """Return the ground motion that the run's scheme makes of an acceleration.
-
-    It has the run's time steps.
+    """Return the ground motion that the run's scheme and time steps make of an acceleration.
 
     Systems and surfaces that it moves hand it to the run, which binds it (``CompanionRun.bind``).
     What the acceleration leaves behind (a final velocity, a drift) is in it: correct the baseline
-    of a record first (``baseline_corrected``). InputError for no excitation, or excitations of
-    different dimensions.
+    of a record first (``baseline_corrected``).
+
+    Raises:
+        InputError: no excitation, or excitations of different dimensions.
     """
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
-    for one in excitations:
-        provides(
-            "base_motion",
-            "excitation",
-            one,
-            EXCITATION,
-            "give Harmonic(…), GroundMotion(record) or another",
-        )
-    sizes = {len(one.direction) for one in excitations}
+    remedy = "give Harmonic(…), GroundMotion(record) or another"
+    for each in excitations:
+        provides("base_motion", "excitation", each, EXCITATION, remedy)
+    sizes = {len(each.direction) for each in excitations}
     if len(sizes) != 1:
         raise InputError(
             "base_motion needs one or more excitations with directions of the same number of "
             "components"
         )
     d = sizes.pop()
-    forces = tuple(
-        (np.asarray(one.direction, dtype=float), one.acceleration) for one in excitations
-    )
-    problem = linear_problem(
-        sp.identity(d), None, sp.csr_matrix((d, d)), Load(np.zeros(d), forces), d
-    )
+
+    # A free unit mass under the force a_g.
+    forces = []
+    for each in excitations:
+        forces.append((np.asarray(each.direction, dtype=float), each.acceleration))
+    load = Load(np.zeros(d), tuple(forces))
+    problem = linear_problem(sp.identity(d), None, sp.csr_matrix((d, d)), load, d)
     return BaseMotion(excitations, CompanionRun("base_motion", lambda: problem))

@@ -27,9 +27,15 @@ from .companion import linear_problem
 
 @dataclass(frozen=True)
 class SoilColumn:
-    """Describe elements between ``heights`` (n+1,) [m].
+    """Describe a column of n elements.
 
-    Of each element there are lame, shear [Pa], rho [kg/m³], alpha [1/s] and beta [s], (n,).
+    Attributes:
+        heights: (n+1,) of the nodes, upwards [m].
+        lame: (n,) Lamé's first constant of the elements [Pa].
+        shear: (n,) their shear modulus [Pa].
+        rho: (n,) their density [kg/m³].
+        alpha: (n,) their damping proportional to mass [1/s].
+        beta: (n,) their damping proportional to stiffness [s].
     """
 
     heights: Array
@@ -50,18 +56,23 @@ class SoilColumn:
 
     def matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
         """Return (M, C, K) of all nodes; unknown 2 i + c is component c of node i."""
-        rho, length, alpha, beta = (
-            x[:, None, None] for x in (self.rho, np.diff(self.heights), self.alpha, self.beta)
-        )
-        moduli = np.tile(np.column_stack([self.shear, self.lame + 2.0 * self.shear]), 2)[:, None, :]
+        length = np.diff(self.heights)[:, None, None]
+        rho = self.rho[:, None, None]
+        alpha = self.alpha[:, None, None]
+        beta = self.beta[:, None, None]
+
+        # Element matrices (n, 4, 4): the modulus of x is G, that of y lambda + 2 G.
+        moduli_of_node = np.column_stack([self.shear, self.lame + 2.0 * self.shear])
+        moduli = np.tile(moduli_of_node, 2)[:, None, :]
         m = rho * length / 6.0 * np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(2))
         k = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2)) * moduli / length
-        return self._sum(m), self._sum(alpha * m + beta * k), self._sum(k)
+        return self._assemble(m), self._assemble(alpha * m + beta * k), self._assemble(k)
 
-    def _sum(self, blocks: Array) -> sp.csr_matrix:
-        """Element matrices (n, 4, 4) in their places."""
+    def _assemble(self, blocks: Array) -> sp.csr_matrix:
+        """Add up element matrices (n, 4, 4) in their places."""
         places = 2 * np.arange(len(blocks))[:, None] + np.arange(4)
-        rows, columns = np.repeat(places, 4, axis=1).ravel(), np.tile(places, (1, 4)).ravel()
+        rows = np.repeat(places, 4, axis=1).ravel()
+        columns = np.tile(places, (1, 4)).ravel()
         size = 2 * len(self.heights)
         return sp.csr_matrix((blocks.ravel(), (rows, columns)), shape=(size, size))
 
@@ -70,48 +81,52 @@ class SoilColumn:
         acceleration: Callable[[float], Array],
         velocity: Callable[[float], Array] | None = None,
     ) -> ContactProblem:
-        """Return the system of nodes 1 to n, node 0 held.
+        """Return the system of nodes 1 to n in the frame of its base, node 0 held.
 
-        It is in the frame of a base with this acceleration (2,).
-
-        velocity: of the base, where mass damping acts on absolute velocities; None where it acts on
-        relative ones.
+        Args:
+            acceleration: of the base, (2,) at time t [m/s²].
+            velocity: of the base, (2,) at time t [m/s], where mass damping acts on absolute
+                velocities; None where it acts on relative ones.
         """
         M, C, K = self.matrices()
         rigid = np.tile(np.eye(2), (len(self.heights), 1))
-        inertia, drag = -(M @ rigid)[2:], -(C @ rigid)[2:]
+        inertia = -(M @ rigid)[2:]
+        drag = -(C @ rigid)[2:]
 
-        def load(t: float) -> Array:
-            return np.asarray(
-                inertia @ acceleration(t) + (0.0 if velocity is None else drag @ velocity(t))
-            )
+        def force(t: float) -> Array:
+            """Return the inertia of the moving frame, and the drag on absolute velocities."""
+            of_drag = 0.0 if velocity is None else drag @ velocity(t)
+            return np.asarray(inertia @ acceleration(t) + of_drag)
 
-        return linear_problem(
-            M[2:, 2:], C[2:, 2:], K[2:, 2:], Load(np.zeros(len(inertia)), general=(load,)), 2
-        )
+        load = Load(np.zeros(len(inertia)), general=(force,))
+        return linear_problem(M[2:, 2:], C[2:, 2:], K[2:, 2:], load, 2)
 
     def on_dashpots(
         self, shear: float, normal: float, upgoing: Callable[[float], Array]
     ) -> ContactProblem:
-        """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m].
+        """Return the system of all nodes, node 0 on dashpots.
 
-        ``upgoing`` is (2,) [m/s].
+        Args:
+            shear: impedance of the horizontal dashpot [Pa s/m].
+            normal: impedance of the vertical dashpot [Pa s/m].
+            upgoing: velocity of the upgoing wave, (2,) at time t [m/s].
         """
         M, C, K = self.matrices()
         impedance = np.array([shear, normal])
         foot = sp.csr_matrix((impedance, ([0, 1], [0, 1])), shape=C.shape)
 
-        def load(t: float) -> Array:
-            force = np.zeros(C.shape[0])
-            force[:2] = 2.0 * impedance * upgoing(t)
-            return force
+        def force(t: float) -> Array:
+            """Return twice the upgoing wave's stress on node 0, nothing on the others."""
+            values = np.zeros(C.shape[0])
+            values[:2] = 2.0 * impedance * upgoing(t)
+            return values
 
-        return linear_problem(M, C + foot, K, Load(np.zeros(C.shape[0]), general=(load,)), 2)
+        return linear_problem(M, C + foot, K, Load(np.zeros(C.shape[0]), general=(force,)), 2)
 
     def stress(self, u: Array) -> Array:
-        """Return (sigma_xx, sigma_xy) [Pa] of every element.
+        """Return (sigma_xx, sigma_xy) of every element, (n, 2) [Pa].
 
-        It is (n, 2), of nodal displacements (n+1, 2).
+        ``u`` are the displacements of the nodes, (n+1, 2) [m].
         """
         strain = np.diff(u, axis=0) / np.diff(self.heights)[:, None]
         return np.column_stack([self.lame * strain[:, 1], self.shear * strain[:, 0]])

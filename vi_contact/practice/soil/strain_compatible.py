@@ -1,7 +1,4 @@
-"""Make the soil of a model strain-compatible.
-
-It is run again with the stiffness and damping that its strains ask for.
-"""
+"""Make the soil of a model strain-compatible: run it with what its strains ask for, until it is."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,7 +20,7 @@ from ...fem.mesh.tagged_mesh import Cells
 from ...laws.materials import LinearElastic
 from ...run.recorders import LargestStrain
 from .curves import SoilCurves
-from .equivalent_linear import iterated
+from .equivalent_linear import iterate
 
 T = TypeVar("T")
 OWNER = "strain_compatible"
@@ -31,10 +28,13 @@ OWNER = "strain_compatible"
 
 @dataclass(frozen=True)
 class StrainCompatible(Generic[T]):
-    """Hold what ``strain_compatible`` found.
+    """Hold the last run of ``strain_compatible``.
 
-    That is what the last ``run`` returned; the ``material`` it had, E and xi among it as Functions
-    of DG0; its effective ``strain``, likewise; ``changes``: the largest one after every run.
+    Attributes:
+        solution: what the run returned.
+        material: of the run; E and xi among it are Functions of DG0.
+        strain: the effective strain, a Function of DG0.
+        changes: the largest change of G or xi after every run.
     """
 
     solution: T
@@ -64,8 +64,8 @@ def strain_compatible(
         material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the
             middle.
         curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their material.
-        run: run(material, strain): assemble the body of this material with
-            ``damping=DampingRatio(…)``, march with ``strain`` among the recorders, and return
+        run: a function run(material, strain) that assembles the body of this material with
+            ``damping=DampingRatio(…)``, marches with ``strain`` among the recorders, and returns
             anything. All else is yours: contact, gravity first, free fields.
         ratio: of the effective to the largest strain.
         tolerance: of the largest relative change of G or xi in a cell.
@@ -73,63 +73,76 @@ def strain_compatible(
 
     Poisson's ratio is kept.
 
+    Returns:
+        What the last run returned, with its material and its strain.
+
     Raises:
-        InputError: cells named twice, Orthotropic ones, an effective strain that ends beyond its
-            curves, with place.
+        InputError: cells named twice; Orthotropic cells; an effective strain that ends beyond its
+            curves, with its place.
         ViContactError: no end after so many runs.
     """
     comm = MpiComm(mesh.comm)
-    pairs = [
-        (cells_of(OWNER, "the cells of curves", cells, mesh).indices, one) for cells, one in curves
-    ]
-    named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
-    refuse(
-        [
-            f"{OWNER}: some cells have two curves: give one"
-            if len(np.unique(named)) < len(named)
-            else ""
-        ],
-        comm,
-    )
+    pairs = []
+    for group, own_curves in curves:
+        indices = cells_of(OWNER, "the cells of curves", group, mesh).indices
+        pairs.append((indices, own_curves))
+    named = _cells_with_curves(pairs)
+    doubled = len(np.unique(named)) < len(named)
+    refuse([f"{OWNER}: some cells have two curves: give one" if doubled else ""], comm)
     _refuse_lost_ratios(material, pairs, comm)
     space = compat.cell_space(mesh)
-    place, (E, nu, rho, xi) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
-    refuse(
-        [f"{OWNER}: Orthotropic has several G: give a LinearElastic" if np.isnan(E).any() else ""],
-        comm,
-    )
+    place = compat.cell_blocks(space)[:, 0]
+    E, nu, rho, xi = cell_constants(space, material)
+    orthotropic = np.isnan(E).any()
+    fault = f"{OWNER}: Orthotropic has several G: give a LinearElastic"
+    refuse([fault if orthotropic else ""], comm)
 
     def field(values: Array) -> Any:
-        found = compat.function(space)
-        found.x.array[place[: len(values)]] = values  # of cells that this rank owns, or of all
-        found.x.scatter_forward()
-        return found
+        """Return the values of cells, those that this rank owns or all, as a Function."""
+        function = compat.function(space)
+        function.x.array[place[: len(values)]] = values
+        function.x.scatter_forward()
+        return function
 
-    def softened(strain: Array) -> Array:
+    def soften(strain: Array) -> Array:
+        """Return E over that of small strains, and xi (2, cells), at effective strains."""
         values = np.stack([np.ones_like(xi), xi])
-        for cells, one in pairs:
-            values[:, cells] = one.at(strain[cells])
+        for cells, own_curves in pairs:
+            values[:, cells] = own_curves.at(strain[cells])
         return values
 
-    def once(values: Array) -> tuple[tuple[T, Heterogeneous, Any], Array]:
-        body, strain = (
-            Heterogeneous(field(E * values[0]), field(nu), field(rho), field(values[1])),
-            LargestStrain(),
-        )
+    def run_once(values: Array) -> tuple[tuple[T, Heterogeneous, Any], Array]:
+        """Run with these values; return the run, and the values that its strains ask for."""
+        reduction, damping = values
+        body = Heterogeneous(field(E * reduction), field(nu), field(rho), field(damping))
+        strain = LargestStrain()
         solution = run(body, strain)
         if not hasattr(strain, "values"):
             raise InputError(
                 f"{OWNER}: run has not recorded its strain: give simulate record=(strain, …)"
             )
         effective = field(ratio * strain.values)
-        return (solution, body, effective), softened(effective.x.array[place])
+        return (solution, body, effective), soften(effective.x.array[place])
 
-    found, _, changes = iterated(OWNER, once, softened(np.zeros(len(place))), tolerance, most, comm)
-    strain = found[-1].x.array[place]
+    start = soften(np.zeros(len(place)))
+    last, _, changes = iterate(OWNER, run_once, start, tolerance, most, comm)
+    solution, body, effective = last
+
+    # Of every pair the cell of largest strain has to lie within its curves.
+    strain = effective.x.array[place]
     middles = mesh.geometry.x[compat.geometry_dofmap(mesh)].mean(axis=1)[:, : mesh.geometry.dim]
-    worst = [(one, cells[strain[cells].argmax()]) for cells, one in pairs if len(cells)]
-    refuse([one.beyond(strain[cell], f"at {at(middles[cell])}") for one, cell in worst], comm)
-    return StrainCompatible(*found, changes)
+    faults = []
+    for cells, own_curves in pairs:
+        if len(cells):
+            worst = cells[strain[cells].argmax()]
+            faults.append(own_curves.beyond(strain[worst], f"at {at(middles[worst])}"))
+    refuse(faults, comm)
+    return StrainCompatible(solution, body, effective, changes)
+
+
+def _cells_with_curves(pairs: Sequence[tuple[Any, SoilCurves]]) -> Any:
+    """Return the numbers of all cells of the pairs on this rank, as often as they are named."""
+    return np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
 
 
 def _refuse_lost_ratios(
@@ -141,11 +154,12 @@ def _refuse_lost_ratios(
     """
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio
-    named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
-    for cells, one in material:
-        outside = len(np.setdiff1d(cells.indices, named))
-        if not largest(comm, outside) and isinstance(one, LinearElastic) and one.xi:
+    named = _cells_with_curves(pairs)
+    for cells, own_material in material:
+        outside = largest(comm, len(np.setdiff1d(cells.indices, named)))
+        if not outside and isinstance(own_material, LinearElastic) and own_material.xi:
             raise InputError(
-                f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, "
-                "and the curves of its cells give another one; leave xi out there"
+                f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = "
+                f"{own_material.xi:g}, and the curves of its cells give another one; leave xi out "
+                "there"
             )

@@ -21,26 +21,36 @@ from ..ground_motion.record import Record
 
 
 class UpgoingVelocity:
-    """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation.
+    """Give v_up(t), a share of the velocity of an excitation that is at rest before t = 0.
 
-    The excitation is at rest before t = 0.
+    It is exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s +
+    (a_{k+1} - a_k) s²/(2 dt).
 
-    Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} -
-    a_k) s²/(2 dt).
+    Attributes:
+        excitation: whose velocity it is.
+        dt: step of the integration [s].
+        share: of the velocity.
     """
 
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
+        """Note what is integrated.
+
+        Args:
+            excitation: gives an acceleration [m/s²] along a direction.
+            dt: step of the integration [s].
+            share: of the velocity.
+        """
         number("UpgoingVelocity", "dt", dt, positive=True, unit="s")
         number("UpgoingVelocity", "share", share)
-        provides(
-            "UpgoingVelocity",
-            "excitation",
-            excitation,
-            ("acceleration", "direction"),
-            "give GroundMotion(…)",
-        )
-        self.excitation, self.dt, self.share = excitation, dt, share
-        self._a, self._v = [excitation.acceleration(0.0)], [0.0]
+        needed = ("acceleration", "direction")
+        provides("UpgoingVelocity", "excitation", excitation, needed, "give GroundMotion(…)")
+        self.excitation = excitation
+        self.dt = dt
+        self.share = share
+
+        # Acceleration and velocity at the multiples of dt that somebody has asked for so far.
+        self._a = [excitation.acceleration(0.0)]
+        self._v = [0.0]
 
     def __call__(self, t: float) -> Array:
         """Return v_up (d,) [m/s] at time t [s]."""
@@ -61,39 +71,45 @@ def upgoing(
     dt: Annotated[float | None, Unit("s")] = None,
     outcrop: bool = True,
 ) -> Callable[[float], Array]:
-    """Return the upgoing velocity of a motion: half its velocity.
+    """Return the upgoing velocity of a motion: half the velocity of an outcrop.
 
-    It is all of it when ``outcrop`` is False (already upgoing).
+    A record keeps its drift: correct its baseline first (``baseline_corrected``).
 
-    motion: a record, along ``direction``, or an excitation, which has its own, or several, which
-    act together (the components of an earthquake). dt: step of the integration [s], of the record
-    when None. A record keeps its drift: correct its baseline first (``baseline_corrected``).
-    InputError for an excitation other than a record without dt, a dt that is not positive, none at
-    all, records in a list, or directions of different numbers of components.
+    Args:
+        motion: a record; an excitation; or several excitations that act together, such as the
+            components of an earthquake.
+        direction: of a record. Excitations have their own.
+        dt: step of the integration [s]; None for that of the record.
+        outcrop: whether the motion is that of an outcrop. False is for one that is upgoing already,
+            whose whole velocity is returned.
+
+    Returns:
+        A function of the time [s] that returns the velocity (d,) [m/s].
+
+    Raises:
+        InputError: an excitation other than a record without dt; a dt that is not positive; no
+            excitation; records in a list; directions of different numbers of components.
     """
     flag("upgoing", "outcrop", outcrop)
     if isinstance(motion, Sequence) and not isinstance(motion, str):
-        if any(isinstance(one, Record) for one in motion):
+        if any(isinstance(each, Record) for each in motion):
             raise InputError(
                 "upgoing: a record in a list has no direction; give GroundMotion(record, "
                 "direction=...) for each"
             )
-        waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
+        waves = [upgoing(each, direction=direction, dt=dt, outcrop=outcrop) for each in motion]
         if len({len(wave(0.0)) for wave in waves}) != 1:
             raise InputError(
                 "upgoing needs one or more excitations with directions of the same number of "
                 "components"
             )
         return lambda t: np.asarray(np.sum([wave(t) for wave in waves], axis=0))
-    if not isinstance(motion, Record):
-        provides(
-            "upgoing",
-            "motion",
-            motion,
-            EXCITATION,
-            "give a Record or an excitation, or a list of excitations",
-        )
-    excitation = GroundMotion(motion, direction=direction) if isinstance(motion, Record) else motion
+    if isinstance(motion, Record):
+        excitation: Excitation = GroundMotion(motion, direction=direction)
+    else:
+        remedy = "give a Record or an excitation, or a list of excitations"
+        provides("upgoing", "motion", motion, EXCITATION, remedy)
+        excitation = motion
     if dt is None and isinstance(excitation, GroundMotion):
         dt = excitation.record.dt
     unit = f"seconds, the step with which {type(excitation).__name__} is to be integrated"

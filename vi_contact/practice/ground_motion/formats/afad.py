@@ -1,7 +1,4 @@
-"""Read text files of AFAD (Türkiye).
-
-They have "KEY : value" lines, then three columns N-S, E-W, U-D in gal.
-"""
+"""Read text files of AFAD (Türkiye): "KEY : value" lines, then columns N-S, E-W, U-D in gal."""
 
 from ....core.errors import InputError
 from ..record import Record
@@ -11,10 +8,7 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the title of the national network stands in the header, or its columns.
-
-    With the columns their count has to stand there.
-    """
+    """Tell whether the header has the title of the national network, or its columns and step."""
     head = [line.strip().upper() for line in text.heads[:60]]
     titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)
     columns = any(tuple(line.split()) == COMPONENTS for line in head)
@@ -26,20 +20,22 @@ def read(text: TextFile) -> Record:
 
     Nothing is subtracted.
     """
-    channel = text.chosen(COMPONENTS)
-    start = next(
-        (k + 1 for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None
+    channel = text.choose(COMPONENTS)
+    columns_line = next(
+        (k for k, line in enumerate(text.heads) if line.split() == list(COMPONENTS)), None
     )
-    if start is None:
+    if columns_line is None:
         raise InputError(
             f"{text.path}: no line 'N-S E-W U-D' announces the columns; get the complete file"
         )
-    notes = [" ".join(line.split()) for line in text.heads[: start - 1]]
-    parts = ((index, note.partition(":")) for index, note in enumerate(notes))
-    header = {
-        key.strip().upper(): (index, value.strip()) for index, (key, colon, value) in parts if colon
-    }
-    data = text.filled(start)
+    notes = [" ".join(line.split()) for line in text.heads[:columns_line]]
+    header = {}
+    for index, note in enumerate(notes):
+        key, colon, value = note.partition(":")
+        if colon:
+            header[key.strip().upper()] = (index, value.strip())
+
+    data = text.find_filled(columns_line + 1)
     samples = []
     text.refuse_misaligned(data)
     for index, row in zip(data, text.rows(data), strict=True):
@@ -49,12 +45,11 @@ def read(text: TextFile) -> Record:
                 "again"
             )
         samples.append(row[channel])
-    text.refuse_other_count(
-        text.entry(header, "NUMBER OF DATA")[0],
-        text.entry_number(header, "NUMBER OF DATA"),
-        len(samples),
-    )
-    station, date = (header.get(key, (0, ""))[1] for key in ("STATION ID", "EARTHQUAKE DATE"))
+    count_line, _ = text.entry(header, "NUMBER OF DATA")
+    count = text.entry_number(header, "NUMBER OF DATA")
+    text.refuse_other_count(count_line, count, len(samples))
+    _, station = header.get("STATION ID", (0, ""))
+    _, date = header.get("EARTHQUAKE DATE", (0, ""))
     step = text.entry_number(header, "SAMPLING INTERVAL (SEC)")
     return text.record(
         samples,

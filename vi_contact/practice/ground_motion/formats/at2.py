@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from ....core.errors import InputError
 from ..record import Record, canonical_units, known_units
-from .statements import agreed, refuse_other_motion, stated_counts, stated_steps
+from .statements import Statement, agree, find_counts, find_steps, refuse_other_motion
 from .text import NUMBER, TextFile
 
 HEADER_LINES = 8  # NPTS and DT are looked for in this many first lines
@@ -28,10 +28,13 @@ _UNITS = re.compile(r"\bunits?\s*+(?:of|are|is|in|[=:])\s*+(\([^()]*+\)|[^\s,;]+
 def begin_data(text: TextFile) -> int | None:
     """Return the index of the first line of numbers after `*** Begin data ***`.
 
-    NPTS and DT are skipped; None stands for no such line.
+    Lines with NPTS and DT are skipped. Without such a line the answer is None.
     """
-    start = next((k + 1 for k, line in enumerate(text.heads) if _BEGIN.search(line)), None)
-    while start is not None and start < len(text.lines) and _states(text.heads[start]):
+    begin = next((k for k, line in enumerate(text.heads) if _BEGIN.search(line)), None)
+    if begin is None:
+        return None
+    start = begin + 1
+    while start < len(text.lines) and _states(text.heads[start]):
         start += 1
     return start
 
@@ -49,15 +52,21 @@ def recognises(text: TextFile) -> bool:
     """
     start = begin_data(text)
     if start is not None:
-        rows = list(text.rows(text.filled(start)))
-        pairs = all(len(row) == 2 for row in rows)
-        return not (pairs and all(after[0] > before[0] >= 0.0 for before, after in pairwise(rows)))
-    header = [line for line in text.heads[:HEADER_LINES] if not line.startswith("#")]
+        rows = list(text.rows(text.find_filled(start)))
+        in_pairs = all(len(row) == 2 for row in rows)
+        has_times = in_pairs and all(
+            after[0] > before[0] >= 0.0 for before, after in pairwise(rows)
+        )
+        return not has_times
+    head = text.heads[:HEADER_LINES]
+    header = [line for line in head if not line.startswith("#")]
     if not any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header):
         return False
-    last = max(k for k, line in enumerate(text.heads[:HEADER_LINES]) if _states(line))
+
+    # Where a heading of columns follows, the file is one of columns.
+    last = max(k for k, line in enumerate(head) if _states(line))
     after = next((line.strip() for line in text.heads[last + 1 :] if line.strip()), "")
-    return not after[:1].isalpha()  # a heading of columns follows
+    return not after[:1].isalpha()
 
 
 def read(text: TextFile) -> Record:
@@ -66,19 +75,17 @@ def read(text: TextFile) -> Record:
     Units and dt are needed only where the file does not state them.
     """
     npts, stated_dt, start = _header(text)
-    told = [index for index in range(start) if text.heads[index].strip()]
-    # the title of another file
-    told = [index for index in told if not (text.heads[0].startswith(OURS) and index == 1)]
-    header = [
-        " ".join(text.heads[index].split()) for index in range(start) if text.heads[index].strip()
-    ]
-    line, units = _stated_units(text, told)
+    filled_lines = [index for index in range(start) if text.heads[index].strip()]
+    believed = [index for index in filled_lines if not _is_title_of_ours(text, index)]
+    header = [" ".join(text.heads[index].split()) for index in filled_lines]
+    line, units = _find_units(text, believed)
     if line is not None and units is not None:
         canonical_units(text.at(line), units)
-    refuse_other_motion(text, told)
+    refuse_other_motion(text, believed)
     values, lines = text.series(start)
     if npts is not None:
-        text.refuse_other_count(int(npts[0]), npts[1], len(values))
+        count_line, count = npts
+        text.refuse_other_count(count_line, count, len(values))
     title = next((line for line in header if not line.upper().startswith("PEER")), "")
     return text.record(
         values,
@@ -94,31 +101,45 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | None]:
-    """Return the line that states the units, and the units.
+def _is_title_of_ours(text: TextFile, index: int) -> bool:
+    """Tell whether a line is the title of a file that ``write_at2`` wrote.
 
-    It raises InputError where two lines state different ones.
+    It may be that of another file, and say what is true of that one only.
     """
-    found = [(index, match[1]) for index in told for match in _UNITS.finditer(text.heads[index])]
-    for index, units in found[1:]:
-        if known_units(units) is not None and known_units(units) != known_units(found[0][1]):
+    return index == 1 and text.heads[0].startswith(OURS)
+
+
+def _find_units(text: TextFile, indices: list[int]) -> tuple[int | None, str | None]:
+    """Return the line that states the units, and the units, or None and None.
+
+    Raises InputError where two lines state different ones.
+    """
+    statements = []
+    for index in indices:
+        for match in _UNITS.finditer(text.heads[index]):
+            statements.append((index, match[1]))
+    if not statements:
+        return None, None
+    first_line, first_units = statements[0]
+    for index, units in statements[1:]:
+        if known_units(units) is not None and known_units(units) != known_units(first_units):
             raise InputError(
-                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} "
-                f"states them as {found[0][1]}; correct the file, or get it again"
+                f"{text.at(index)}: the header states units as {units}, but line {first_line + 1} "
+                f"states them as {first_units}; correct the file, or get it again"
             )
-    return found[0] if found else (None, None)
+    return first_line, first_units
 
 
-def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float] | None, int]:
-    """Return the line of NPTS and NPTS, and that of DT and DT.
-
-    They are None where they are not stated. With them comes the index of the first data line.
-    """
-    counts: list[tuple[int, float]] = []
-    steps: list[tuple[int, float]] = []
-    begin, last = begin_data(text), 0
+def _header(text: TextFile) -> tuple[Statement | None, Statement | None, int]:
+    """Return NPTS and DT, each with its line or None, and the index of the first data line."""
+    counts: list[Statement] = []
+    steps: list[Statement] = []
+    begin = begin_data(text)
+    last = 0  # the last line that states one of both
     for index, line in enumerate(text.heads[: HEADER_LINES if begin is None else begin]):
-        both, count, step = _VALUES_FIRST.search(line), _NPTS.search(line), _DT.search(line)
+        both = _VALUES_FIRST.search(line)
+        count = _NPTS.search(line)
+        step = _DT.search(line)
         if begin is None and counts and (both or count):
             raise InputError(f"{text.at(index)}: NPTS is stated a second time; give one record")
         if both:
@@ -128,20 +149,19 @@ def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float]
             counts.append((index, text.number(index, count[1])))
         if step:
             steps.append((index, text.number(index, step[1])))
-        last = index if both or count or step else last
+        if both or count or step:
+            last = index
     start = last + 1 if begin is None else begin
-    prose = [
-        index
-        for index in range(start)
-        if not _states(text.heads[index]) and not (text.heads[0].startswith(OURS) and index == 1)
-    ]
-    # a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one, says the same
-    # as NPTS and DT
-    sentences = stated_steps(text, prose)
+
+    # A sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one, says the same
+    # as NPTS and DT.
+    prose = []
+    for index in range(start):
+        if not _states(text.heads[index]) and not _is_title_of_ours(text, index):
+            prose.append(index)
+    sentences = find_steps(text, prose)
     if len({value for _, value in sentences}) == 1:
         steps += sentences
-    return (
-        agreed(text, "the number of samples", [*counts, *stated_counts(text, prose)]),
-        agreed(text, "the time step", steps),
-        start,
-    )
+    counts += find_counts(text, prose)
+    count_statement = agree(text, "the number of samples", counts)
+    return count_statement, agree(text, "the time step", steps), start

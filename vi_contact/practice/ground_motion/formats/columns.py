@@ -24,16 +24,16 @@ from .at2 import begin_data
 from .headings import Column, column_heading
 from .statements import (
     TIME_UNITS,
-    agreed,
-    agreed_units,
+    agree,
+    agree_on_units,
+    find_counts,
+    find_steps,
+    find_units,
+    find_unknown_units,
     refuse_other_motion,
-    stated_counts,
-    stated_steps,
-    stated_units,
-    unknown_units,
 )
 from .text import NUMBER, SAME_STEP, TextFile
-from .times import interpolated, rises_evenly, time_step
+from .times import interpolate, rises_evenly, time_step
 
 LONGEST_TIME_STEP = (
     0.5  # s; times that count up by more, in a unit that nobody states, may be in ms or be numbers
@@ -99,7 +99,7 @@ def _parts(text: TextFile) -> tuple[list[int], list[int]]:
     start = begin_data(text) or 0
     header = list(range(start))
     lines: list[int] = []
-    for index in text.filled(start):
+    for index in text.find_filled(start):
         line = text.heads[index].strip()
         if line.startswith("#"):
             if not lines:
@@ -143,7 +143,7 @@ def _header(
         found.units = (ours, canonical_units(text.at(ours), match[1]))
         found.step = (ours, text.number(ours, match[2]))
         return header, lines, rows, found
-    counts, steps = stated_counts(text, header), stated_steps(text, header)
+    counts, steps = find_counts(text, header), find_steps(text, header)
     if len(rows) > 2 and (first := _count_and_step(rows)) is not None:
         # the two lines of eqsig: a label, then number of samples and time step; or the number alone
         counts, steps = (
@@ -156,13 +156,13 @@ def _header(
     found.columns = column_heading(text, header, width)
     told = [index for index in header if not found.columns or index != found.columns[0].line]
     found.count, found.step = (
-        agreed(text, "the number of samples", counts),
-        agreed(text, "the time step", steps),
+        agree(text, "the number of samples", counts),
+        agree(text, "the time step", steps),
     )
     if found.columns is None or not any(one.kind == "acceleration" for one in found.columns):
         refuse_other_motion(text, told)
-    found.units = agreed_units(text, stated_units(text, told))
-    strange = unknown_units(text, told) if found.units is None else None
+    found.units = agree_on_units(text, find_units(text, told))
+    strange = find_unknown_units(text, told) if found.units is None else None
     if strange is not None and not any(one.unit for one in found.columns or ()):
         canonical_units(text.at(strange[0]), strange[1])
     return header, lines, rows, found
@@ -323,7 +323,7 @@ def _series(
             "#"
         )
     if text.channel is not None:
-        text.chosen(["acceleration"])
+        text.choose(["acceleration"])
     if found.count is not None:
         text.refuse_other_count(found.count[0], found.count[1], len(values))
     return _record(
@@ -363,11 +363,11 @@ def _component(
         )
     if found.count is not None:
         text.refuse_other_count(found.count[0], found.count[1], table.shape[0])
-    place = places[text.chosen([columns[k].name for k in places])]
+    place = places[text.choose([columns[k].name for k in places])]
     column = columns[place]
     if column.unit is not None:
         known = canonical_units(text.at(column.line), column.unit)
-        found.units = agreed_units(
+        found.units = agree_on_units(
             text, [*([found.units] if found.units else []), (column.line, known)]
         )
     samples = table[:, place]
@@ -439,7 +439,7 @@ def _timed(
     seconds = times if factor == 1.0 else times * factor
     step, rounding, uneven = time_step(text, lines, seconds, decimals=decimals, unit=factor)
     if uneven:
-        samples = interpolated(seconds, samples, step)
+        samples = interpolate(seconds, samples, step)
         found.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
     elif told is not None and abs(step - told) <= rounding * told:
         step = told if rounding > SAME_STEP else step

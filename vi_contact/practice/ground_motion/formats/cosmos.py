@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from ....core.errors import InputError
 from ..record import Record, known_units
-from .statements import agreed
+from .statements import agree
 from .text import NUMBER, TextFile
 
 STEP = 33  # place of the time step among the real header values of COSMOS, from 0
@@ -109,7 +109,7 @@ def read(text: TextFile) -> Record:
             "of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts "
             "are not read, write columns of time and acceleration"
         )
-    block = blocks[text.chosen([_component(text, block) for block in blocks])]
+    block = blocks[text.choose([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):
         raise InputError(
@@ -210,7 +210,7 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
                 f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
                 f"{index + 1} holds {fields} of them instead of {wanted:g}; get the complete file"
             )
-        row = text.fixed(index, block.width)
+        row = text.cut_fields(index, block.width)
         if unknown in row:
             raise InputError(
                 f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record"
@@ -246,9 +246,9 @@ def _step(text: TextFile, block: Block) -> float | None:
         if form := _FORMAT.search(text.heads[index]):
             rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))
             width = max(int(text.number(index, form[2])), 1)
-            values = [value for row in rows for value in text.fixed(row, width)]
+            values = [value for row in rows for value in text.cut_fields(row, width)]
             return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
-    stated = agreed(text, "the time step", found)
+    stated = agree(text, "the time step", found)
     return stated[1] if stated else None
 
 

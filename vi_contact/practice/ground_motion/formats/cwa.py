@@ -1,6 +1,6 @@
-"""Read files of the Central Weather Administration of Taiwan.
+"""Read files of the Central Weather Administration of Taiwan: "#Key: value" lines, then columns.
 
-There are "#Key: value" lines, then time and columns.
+The first column is the time.
 """
 
 import math
@@ -21,7 +21,8 @@ _DIRECTION = re.compile(r"^([^()]*+)\(([+-])\)$")
 def recognises(text: TextFile) -> bool:
     """Tell whether two of the three entries are there that say what the columns are."""
     header = _header(text)
-    return sum(key in header for key in ("SAMPLERATE(HZ)", "AMPLITUDEUNIT", "DATASEQUENCE")) >= 2
+    keys = ("SAMPLERATE(HZ)", "AMPLITUDEUNIT", "DATASEQUENCE")
+    return sum(key in header for key in keys) >= 2
 
 
 def read(text: TextFile) -> Record:
@@ -38,28 +39,38 @@ def read(text: TextFile) -> Record:
             "the file again"
         )
     form_line, form = text.entry(header, "DATA")
-    if not (match := _FORMAT.match(form)) or int(match[1]) != len(names) + 1:
+    fields = _FORMAT.match(form)
+    if fields is None or int(fields[1]) != len(names) + 1:
         raise InputError(
             f"{text.at(form_line)}: the format {form!r} is not one of {len(names) + 1} columns, as "
             "'4F10.3' is; get the file again"
         )
-    signs = [_DIRECTION.match(name) for name in names]
-    plain = [match[1] if match else name for match, name in zip(signs, names, strict=True)]
-    place = text.chosen(plain)
-    lines = [index for index in text.filled(form_line + 1) if not text.lines[index].startswith("#")]
+
+    # Names such as "U(+)" say which way is positive.
+    plain_names = []
+    points_down = []
+    for name in names:
+        direction = _DIRECTION.match(name)
+        plain_names.append(direction[1] if direction else name)
+        points_down.append(direction is not None and direction[2] == "-")
+    place = text.choose(plain_names)
+
+    data = text.find_filled(form_line + 1)
+    lines = [index for index in data if not text.lines[index].startswith("#")]
     rows = []
     for index in lines:
-        row = text.fixed(index, int(match[2]))
+        row = text.cut_fields(index, int(fields[2]))
         if len(row) != len(names) + 1:
             raise InputError(
                 f"{text.at(index)}: {len(row)} values instead of {len(names) + 1}; a value is "
                 "missing or too many, get the complete file"
             )
         rows.append(row)
-    rate_line, rate = (
-        text.entry(header, "SAMPLERATE(HZ)")[0],
-        text.entry_number(header, "SAMPLERATE(HZ)"),
-    )
+
+    # Rate, duration, number of samples and times have to agree.
+    rate_line, _ = text.entry(header, "SAMPLERATE(HZ)")
+    rate = text.entry_number(header, "SAMPLERATE(HZ)")
+    seconds_line, _ = text.entry(header, "RECORDLENGTH(SEC)")
     seconds = text.entry_number(header, "RECORDLENGTH(SEC)")
     if rate <= 0.0 or len(rows) < 2:
         raise InputError(
@@ -68,11 +79,11 @@ def read(text: TextFile) -> Record:
         )
     if not abs(len(rows) - seconds * rate) <= 0.5:
         raise InputError(
-            f"{text.at(text.entry(header, 'RECORDLENGTH(SEC)')[0])}: {seconds:g} s at {rate:g} Hz "
+            f"{text.at(seconds_line)}: {seconds:g} s at {rate:g} Hz "
             f"are announced but {len(rows)} samples follow; get the complete file"
         )
     table = np.array(rows)
-    step, rounding, uneven = time_step(text, lines, table[:, 0], decimals=int(match[3]))
+    step, rounding, uneven = time_step(text, lines, table[:, 0], decimals=int(fields[3]))
     if uneven or not math.isclose(step, 1.0 / rate, rel_tol=max(rounding, SAME_STEP)):
         raise InputError(
             f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} "
@@ -80,11 +91,11 @@ def read(text: TextFile) -> Record:
         )
     units_line, units = text.entry(header, "AMPLITUDEUNIT")
     unit = _UNIT.match(units)
-    station = header.get("STATIONCODE", (0, ""))[1]
-    origin = next(
-        (content for key, (_, content) in header.items() if key.startswith("ORIGIN TIME")), ""
-    )
-    down = signs[place] is not None and signs[place][2] == "-"  # type: ignore[index]
+    _, station = header.get("STATIONCODE", (0, ""))
+    origins = [content for key, (_, content) in header.items() if key.startswith("ORIGIN TIME")]
+    origin = origins[0] if origins else ""
+    other_way = ", positive the other way" if points_down[place] else ""
+    filled_lines = [index for index, content in header.values() if content]
     return text.record(
         table[:, place + 1],
         units=unit[0] if unit else units,
@@ -94,19 +105,17 @@ def read(text: TextFile) -> Record:
         format="CWA",
         title=f"{origin} {station}".strip(),
         station=station,
-        component=plain[place] + (", positive the other way" if down else ""),
-        notes=tuple(
-            text.heads[index].lstrip("# ").strip() for index, content in header.values() if content
-        ),
+        component=plain_names[place] + other_way,
+        notes=tuple(text.heads[index].lstrip("# ").strip() for index in filled_lines),
         dt_from=f"header, line {rate_line + 1}",
     )
 
 
 def _header(text: TextFile) -> dict[str, tuple[int, str]]:
     """Return the line and the value of every key of "#Key: value"; of two alike the first."""
-    found: dict[str, tuple[int, str]] = {}
+    entries: dict[str, tuple[int, str]] = {}
     for index, line in enumerate(text.heads[:60]):
         key, colon, value = line.partition(":")
         if line.startswith("#") and colon:
-            found.setdefault(key.lstrip("# ").strip().upper(), (index, value.strip()))
-    return found
+            entries.setdefault(key.lstrip("# ").strip().upper(), (index, value.strip()))
+    return entries

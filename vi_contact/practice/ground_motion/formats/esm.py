@@ -1,9 +1,7 @@
-"""Read files of the Engineering Strong-Motion database.
+"""Read files of the Engineering Strong-Motion database, ESM and ITACA, and alike of AFAD.
 
-They are those of ESM and ITACA, and alike of AFAD: 64 lines "KEY: value", then samples.
-
-One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record
-on.
+They have 64 lines "KEY: value", then a sample a line. Read DATA_LICENSE and DATA_CITATION, kept in
+the notes, before passing a record on.
 """
 
 import re
@@ -17,15 +15,12 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether line 1 is an entry "KEY: value" of such a file.
-
-    One of the first 100 lines has to be NDATA or SAMPLING_INTERVAL_S.
-    """
-    keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
+    """Tell whether line 1 is an entry "KEY: value", and one of the first 100 is of such a file."""
     entries = [_entry(line) for line in text.heads[:100]]
-    return entries[0] is not None and any(
-        entry is not None and entry[0] in keys for entry in entries
-    )
+    if entries[0] is None:
+        return False
+    keys = {entry[0] for entry in entries if entry is not None}
+    return not keys.isdisjoint(("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA"))
 
 
 def read(text: TextFile) -> Record:
@@ -39,29 +34,22 @@ def read(text: TextFile) -> Record:
             "(.ACC.ASC)"
         )
     values, lines = text.series(len(entries))
-    text.refuse_other_count(
-        text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values)
-    )
+    count_line, _ = text.entry(header, "NDATA")
+    text.refuse_other_count(count_line, text.entry_number(header, "NDATA"), len(values))
     line, units = text.entry(header, "UNITS")
     value = {key: content for key, (_, content) in header.items()}
     station = ".".join(filter(None, (value.get("NETWORK"), value.get("STATION_CODE"))))
-    title = " ".join(
-        filter(
-            None,
-            (
-                value.get("EVENT_NAME"),
-                value.get("EVENT_DATE_YYYYMMDD"),
-                value.get("EVENT_TIME_HHMMSS"),
-                station,
-                value.get("STREAM"),
-            ),
-        )
+    title_parts = (
+        value.get("EVENT_NAME"),
+        value.get("EVENT_DATE_YYYYMMDD"),
+        value.get("EVENT_TIME_HHMMSS"),
+        station,
+        value.get("STREAM"),
     )
-    notes = tuple(
-        f"{key}: {content}"
-        for key, content in value.items()
-        if content and not key.startswith("USER")
-    )
+    notes = []
+    for key, content in value.items():
+        if content and not key.startswith("USER"):
+            notes.append(f"{key}: {content}")
     return text.record(
         values,
         units=units,
@@ -69,14 +57,14 @@ def read(text: TextFile) -> Record:
         lines=lines,
         dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
         format="ESM",
-        title=title,
-        notes=notes,
+        title=" ".join(filter(None, title_parts)),
+        notes=tuple(notes),
         station=station,
         component=value.get("STREAM", ""),
     )
 
 
 def _entry(line: str) -> tuple[str, str] | None:
-    """Return the key and value of a line "KEY: value", None for any other line."""
+    """Return the key and the value of a line "KEY: value", or None for any other line."""
     key, colon, value = (part.strip() for part in line.partition(":"))
     return (key, value) if colon and _KEY.fullmatch(key) else None

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from ....core.errors import InputError
 from ..record import Record
-from .statements import agreed
+from .statements import agree
 from .text import NUMBER, TextFile
 
 TEXT_LINES, INTEGER_LINES, REAL_LINES, PER_LINE, WIDTH = 16, 4, 6, 10, 8
@@ -76,7 +76,7 @@ def read(text: TextFile) -> Record:
     ``channel`` is 1 for the first of the file, or its name such as "S16W".
     """
     parts = list(_parts(text))
-    part = parts[text.chosen([part.name for part in parts])]
+    part = parts[text.choose([part.name for part in parts])]
     values, lines = _samples(text, part)
     header = range(part.start, part.start + TEXT_LINES)
     count = _first(text, header, _POINTS, "Number of points")
@@ -157,7 +157,7 @@ def _fields(text: TextFile, start: int, lines: int) -> list[float]:
     """Return the values of lines of ten fields."""
     values: list[float] = []
     for index in range(start, start + lines):
-        row = text.fixed(index, WIDTH) if index < len(text.lines) else []
+        row = text.cut_fields(index, WIDTH) if index < len(text.lines) else []
         if len(row) != PER_LINE:
             raise InputError(
                 f"{text.path}, line {index + 1}: {len(row)} header values instead of {PER_LINE}; "
@@ -172,7 +172,7 @@ def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
     values: list[float] = []
     lines: list[int] = []
     for index in range(part.data, part.data + -(-part.counts[0] // PER_LINE)):
-        row, wanted = text.fixed(index, WIDTH), min(PER_LINE, part.counts[0] - len(values))
+        row, wanted = text.cut_fields(index, WIDTH), min(PER_LINE, part.counts[0] - len(values))
         if len(row) != wanted:
             raise InputError(
                 f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is "
@@ -204,7 +204,7 @@ def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: flo
     printed = text.number(index, word)
     if printed > 0.0:
         half_digit = 0.5 * 10.0 ** -len(word.partition(".")[2])
-        agreed(
+        agree(
             text,
             "the time step",
             [step, (index, printed)],

@@ -46,9 +46,12 @@ _COUNTS = {"count", "counts", "digit", "digits", "v", "mv", "volt", "volts", "ra
 class Column:
     """Describe a column.
 
-    It has its name, its kind ("time", "acceleration", "velocity", "displacement", "counts",
-    "number", or "" where the heading does not tell), and its unit, or None; ``line`` is the index
-    of the heading.
+    Attributes:
+        name: in the heading.
+        kind: "time", "acceleration", "velocity", "displacement", "counts", "number", or "" where
+            the heading does not tell.
+        unit: in the heading, or None.
+        line: index of the heading.
     """
 
     name: str
@@ -60,33 +63,42 @@ class Column:
 def column_heading(text: TextFile, header: Sequence[int], width: int) -> list[Column] | None:
     """Return the columns that the last line of the header names.
 
-    It is None where that is no heading of `width` columns.
+    It is None where that is no heading of so many columns.
+
+    Args:
+        text: the file.
+        header: indices of the lines of the header.
+        width: number of columns.
     """
     lines = [index for index in header if text.heads[index].strip(_MARKS + "-=+_")]
     if width < 2 or not lines:
         return None
-    found = _cells(text.heads[lines[-1]], width)
-    if found is None:
+    last = lines[-1]
+    cells = _cells(text.heads[last], width)
+    if cells is None:
         return None
-    units = [_kind_of_unit(cell.strip("()[] ")) for cell in found]
-    if (
-        len(lines) > 1
-        and all(units)
-        and (names := _cells(text.heads[lines[-2]], width)) is not None
-    ):
-        return [
-            _column(f"{name} [{cell.strip('()[] ')}]", lines[-1])
-            for name, cell in zip(names, found, strict=True)
-        ]
-    columns = [_column(cell, lines[-1]) for cell in found]
-    # beside "t" small letters are quantities, and "V" is vertical
-    if any(one.name == "t" for one in columns):
+
+    # A line of units alone: the names stand above it.
+    units = [cell.strip("()[] ") for cell in cells]
+    if len(lines) > 1 and all(_kind_of_unit(unit) for unit in units):
+        names = _cells(text.heads[lines[-2]], width)
+        if names is not None:
+            named = zip(names, units, strict=True)
+            return [_column(f"{name} [{unit}]", last) for name, unit in named]
+    columns = [_column(cell, last) for cell in cells]
+
+    # Beside "t" small letters are quantities, and "V" is vertical.
+    if any(column.name == "t" for column in columns):
         letters = {"v": "velocity", "d": "displacement"}
-        columns = [replace(one, kind=one.kind or letters.get(one.name, "")) for one in columns]
-    known = [bool(one.kind) or _COMPONENT.match(one.name) is not None for one in columns]
-    # a word for each column: may be a title
-    sentence = len(text.heads[lines[-1]].strip(_MARKS).split()) == width
-    return columns if all(known) or any(known) and not sentence else None
+        for k, column in enumerate(columns):
+            columns[k] = replace(column, kind=column.kind or letters.get(column.name, ""))
+
+    # A word for each column may be a title: it is a heading if all words are known.
+    known = [bool(column.kind or _COMPONENT.match(column.name)) for column in columns]
+    may_be_title = len(text.heads[last].strip(_MARKS).split()) == width
+    if all(known) or (any(known) and not may_be_title):
+        return columns
+    return None
 
 
 def _cells(line: str, width: int) -> list[str] | None:
@@ -94,36 +106,38 @@ def _cells(line: str, width: int) -> list[str] | None:
     line = line.strip().strip(_MARKS).rstrip(",;")
     for split in _SPLITS:
         cells = [cell.strip("'\" ") for cell in split.split(line)]
-        if (
-            len(cells) == width
-            and all(cells)
-            and any(re.match(r"[^\W\d_]", cell.lstrip("([")) for cell in cells)
-        ):
+        has_words = any(re.match(r"[^\W\d_]", cell.lstrip("([")) for cell in cells)
+        if len(cells) == width and all(cells) and has_words:
             return cells
     return None
 
 
 def _column(cell: str, line: int) -> Column:
-    """Return what one cell says."""
-    if match := _UNIT_BEHIND.search(cell):
-        name, unit = cell[: match.start()].rstrip(" _"), match[1].strip()
-    else:
-        word = _UNIT_WORD.match(cell)
-        name, unit = (
-            (word[1], word[2]) if word and word[1] and _kind_of_unit(word[2]) else (cell, None)
-        )
+    """Return what one cell says: its name, its unit, and the kind that both tell."""
+    name, unit = _split_cell(cell)
     by_unit = _kind_of_unit(unit) if unit else ""
     by_name = next((kind for kind, pattern in _KINDS if pattern.search(name.strip(" .:"))), "")
     if by_name == "time" and by_unit not in ("time", ""):
         by_name = ""
     if by_name == "acceleration" and unit:
-        # a unit of something else is refused with its place
+        # A unit of something else is refused later, with its place.
         return Column(name.strip(), "acceleration", unit, line)
     return Column(name.strip(), by_unit or by_name, unit or None, line)
 
 
+def _split_cell(cell: str) -> tuple[str, str | None]:
+    """Return the name and the unit of a cell such as "Acc [g]" or "acc in g", or None for it."""
+    brackets = _UNIT_BEHIND.search(cell)
+    if brackets:
+        return cell[: brackets.start()].rstrip(" _"), brackets[1].strip()
+    word = _UNIT_WORD.match(cell)
+    if word and word[1] and _kind_of_unit(word[2]):
+        return word[1], word[2]
+    return cell, None
+
+
 def _kind_of_unit(unit: str) -> str:
-    """Return the kind of motion that a unit measures, "" where it is unknown."""
+    """Return the kind of motion that a unit measures, or "" where it is unknown."""
     if known_units(unit) is not None:
         return "acceleration"
     word = "".join(unit.lower().split()).replace("sec", "s")

@@ -1,6 +1,6 @@
-"""Read NIED K-NET and KiK-net files.
+"""Read NIED K-NET and KiK-net files, of one component each.
 
-There are 17 header lines, then integer counts, eight a row, one component a file.
+They have 17 header lines, then integer counts, eight a row.
 
 Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's
 offset, so their mean is removed, as the agency does before it prints "Max. Acc.". NIED forbids
@@ -34,7 +34,9 @@ _FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)
 
 def recognises(text: TextFile) -> bool:
     """Tell whether five of the entries of a header, in any line, are there."""
-    return sum(any(line.startswith(key) for line in text.heads[:30]) for key in KEYS) >= 5
+    head = text.heads[:30]
+    present = [key for key in KEYS if any(line.startswith(key) for line in head)]
+    return len(present) >= 5
 
 
 def read(text: TextFile) -> Record:
@@ -42,12 +44,11 @@ def read(text: TextFile) -> Record:
 
     Units and dt are only checked.
     """
-    header = {
-        key: index
-        for key in KEYS
-        for index in range(len(text.lines))
-        if text.heads[index].startswith(key)
-    }
+    header = {}
+    for key in KEYS:
+        for index, line in enumerate(text.heads):
+            if line.startswith(key):
+                header[key] = index
     missing = [key for key in KEYS if key not in header]
     if missing:
         raise InputError(
@@ -62,10 +63,14 @@ def read(text: TextFile) -> Record:
             f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are "
             f"announced but {len(counts)} samples follow; get the complete file"
         )
-    lines = tuple(" ".join(line.split()) for line in text.heads[: header["Memo."]])
-    time, station, direction = (text.heads[header[key]][len(key) :].strip() for key in KEYS[:3])
+    notes = [" ".join(line.split()) for line in text.heads[: header["Memo."]]]
+    mean = np.mean(counts)
+    notes.append(f"mean of {scale * mean:.6g} {name} removed")
+    time = _value(text, header["Origin Time"], "Origin Time")
+    station = _value(text, header["Station Code"], "Station Code")
+    direction = _value(text, header["Dir."], "Dir.")
     return text.record(
-        np.array(counts) - np.mean(counts),
+        np.array(counts) - mean,
         units=name,
         line=header["Scale Factor"],
         scale=scale,
@@ -74,8 +79,13 @@ def read(text: TextFile) -> Record:
         station=station,
         component=direction,
         title=f"{time}, {station} {direction}",
-        notes=(*lines, f"mean of {scale * np.mean(counts):.6g} {name} removed"),
+        notes=tuple(notes),
     )
+
+
+def _value(text: TextFile, index: int, key: str) -> str:
+    """Return what follows a key on its line."""
+    return text.heads[index][len(key) :].strip()
 
 
 def _scale(text: TextFile, index: int) -> tuple[float, str]:
@@ -86,14 +96,13 @@ def _scale(text: TextFile, index: int) -> tuple[float, str]:
             f"{text.at(index)}: the scale factor is not like '3920(gal)/6182761'; get the file "
             "again"
         )
-    return text.number(index, match[1]) / text.number(index, match[3]), canonical_units(
-        text.at(index), match[2]
-    )
+    size = text.number(index, match[1]) / text.number(index, match[3])
+    return size, canonical_units(text.at(index), match[2])
 
 
 def _number(text: TextFile, index: int, key: str) -> float:
     """Return the positive number after a key, "Hz" allowed."""
-    match = _FREQUENCY.match(text.heads[index][len(key) :].strip())
+    match = _FREQUENCY.match(_value(text, index, key))
     if match is None or text.number(index, match[1]) <= 0.0:
         raise InputError(f"{text.at(index)}: {key!r} has no positive number; get the file again")
     return text.number(index, match[1])

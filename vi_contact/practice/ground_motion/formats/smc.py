@@ -92,7 +92,7 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
     """Cut `lines` lines from `start` into `per_line` columns of `width` characters."""
     values: list[float] = []
     for index in range(start, start + lines):
-        row = text.fixed(index, width) if index < len(text.lines) else []
+        row = text.cut_fields(index, width) if index < len(text.lines) else []
         if len(row) != per_line:
             raise InputError(
                 f"{text.at(index)}: {len(row)} header values instead of {per_line}; get the file "
@@ -106,7 +106,7 @@ def _samples(text: TextFile, start: int, count: float) -> tuple[list[float], lis
     """Return the samples in cm/s², and the index of the line of each."""
     values: list[float] = []
     lines = list(range(start, len(text.lines)))
-    rows = [text.fixed(index, SAMPLE_WIDTH) for index in lines]
+    rows = [text.cut_fields(index, SAMPLE_WIDTH) for index in lines]
     while rows and not rows[-1]:
         del lines[-1], rows[-1]
     for index, row in zip(lines, rows, strict=True):

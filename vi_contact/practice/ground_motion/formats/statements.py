@@ -1,7 +1,4 @@
-"""Find what the lines of a header say in words.
-
-They say units, time step, number of samples and kind of motion.
-"""
+"""Find what the lines of a header say in words: units, step, number of samples, kind of motion."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -76,7 +73,7 @@ _SERIES = re.compile(r"\b(?:histor(?:y|ies)|series|units?|data|record|trace|time
 # a lone "g" is a unit only behind these
 _BEFORE_G = re.compile(r"(?:\b(?:of|in|are|is|and)|[:=(\[,])\s*+$", re.IGNORECASE)
 
-Found = tuple[int, float]  # index of a line, and what it says
+Statement = tuple[int, float]  # index of a line, and the number that it states
 TIME_UNITS = {
     "s": 1.0,
     "sec": 1.0,
@@ -93,123 +90,136 @@ TIME_UNITS = {
 }
 
 
-def stated_steps(text: TextFile, indices: Iterable[int]) -> list[Found]:
+def find_steps(text: TextFile, indices: Iterable[int]) -> list[Statement]:
     """Return the lines that state a time step, or a sampling rate, and the step [s]."""
-    found: list[Found] = []
+    steps: list[Statement] = []
     for index in indices:
         line = text.heads[index]
         for match in _STEP.finditer(line):
-            unit = TIME_UNITS.get((match["unit"] or match["behind"] or "s").lower(), 1.0)
-            found.append((index, unit * text.number(index, match["step"])))
+            unit_name = match["unit"] or match["behind"] or "s"
+            unit = TIME_UNITS.get(unit_name.lower(), 1.0)
+            steps.append((index, unit * text.number(index, match["step"])))
         for match in _RATE.finditer(line):
             rate = text.number(index, match[1])
-            found += [(index, 1.0 / rate)] if rate > 0.0 else []
-        if not found or found[-1][0] != index:
-            found += [
-                (index, text.number(index, match[1]))
-                for pattern in _PROSE
-                for match in pattern.finditer(line)
-            ]
-    return found
+            if rate > 0.0:
+                steps.append((index, 1.0 / rate))
+
+        # Whole sentences are read where no entry states the step.
+        if steps and steps[-1][0] == index:
+            continue
+        for pattern in _PROSE:
+            for match in pattern.finditer(line):
+                steps.append((index, text.number(index, match[1])))
+    return steps
 
 
-def stated_counts(text: TextFile, indices: Iterable[int]) -> list[Found]:
+def find_counts(text: TextFile, indices: Iterable[int]) -> list[Statement]:
     """Return the lines that state a number of samples, and that number."""
-    return [
-        (index, text.number(index, match[1]))
-        for index in indices
-        for pattern in (_COUNT, _COUNT_FIRST)
-        for match in pattern.finditer(text.heads[index])
-    ]
+    counts = []
+    for index in indices:
+        for pattern in (_COUNT, _COUNT_FIRST):
+            for match in pattern.finditer(text.heads[index]):
+                counts.append((index, text.number(index, match[1])))
+    return counts
 
 
-def stated_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
+def find_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
     """Return the lines that state units of acceleration, and the units, as keys of UNITS.
 
     Lines about peaks and filters are left out: a peak may be given in other units than the
     samples.
     """
-    found: list[tuple[int, str]] = []
+    statements: list[tuple[int, str]] = []
     for index in indices:
         line = text.heads[index]
         if _MEASURE.search(line) or not _STATES_UNIT.search(line):
             continue
-        said = {
-            known
-            for match in _UNIT.finditer(line)
-            if (known := known_units(match[0])) is not None
-            and (known != "g" or _BEFORE_G.search(line[: match.start()]))
-        }
-        if "gal" in said:  # "gal (cm/s/s)" is one unit with its explanation
-            said -= {"cm/s2"}
-        found += [(index, one) for one in sorted(said)]
-    return found
+        units = set()
+        for match in _UNIT.finditer(line):
+            known = known_units(match[0])
+            if known == "g" and not _BEFORE_G.search(line[: match.start()]):
+                continue
+            if known is not None:
+                units.add(known)
+        if "gal" in units:  # "gal (cm/s/s)" is one unit with its explanation
+            units.discard("cm/s2")
+        statements += [(index, unit) for unit in sorted(units)]
+    return statements
 
 
-def agreed(
-    text: TextFile, what: str, found: Sequence[Found], *, rounding: float = 1e-6
-) -> Found | None:
-    """Return the first of several statements.
+def agree(
+    text: TextFile, what: str, statements: Sequence[Statement], *, rounding: float = 1e-6
+) -> Statement | None:
+    """Return the first of several statements, or None where there is none.
 
-    It is None where there is none; it raises InputError where they contradict.
+    Args:
+        text: the file.
+        what: is stated, for messages.
+        statements: lines and numbers.
+        rounding: relative difference that counts as none.
+
+    Raises:
+        InputError: statements that contradict each other.
     """
-    for index, value in found[1:]:
-        if abs(value - found[0][1]) > rounding * abs(found[0][1]):
+    if not statements:
+        return None
+    first_line, first = statements[0]
+    for index, value in statements[1:]:
+        if abs(value - first) > rounding * abs(first):
             raise InputError(
                 f"{text.at(index)}: the header states {what} as {value:g}, but line "
-                f"{found[0][0] + 1} states it as {found[0][1]:g}; correct the file, or get it again"
+                f"{first_line + 1} states it as {first:g}; correct the file, or get it again"
             )
-    return found[0] if found else None
+    return first_line, first
 
 
-def agreed_units(text: TextFile, found: Sequence[tuple[int, str]]) -> tuple[int, str] | None:
-    """Return the units that all statements share.
+def agree_on_units(text: TextFile, statements: Sequence[tuple[int, str]]) -> tuple[int, str] | None:
+    """Return the first line that states the units, and the units, or None where none does.
 
-    They are None where there are none; it raises InputError where they contradict.
+    Raises InputError where statements contradict each other.
     """
-    for index, units in found[1:]:
-        if UNITS[units] != UNITS[found[0][1]]:
+    if not statements:
+        return None
+    first_line, first = statements[0]
+    for index, units in statements[1:]:
+        if UNITS[units] != UNITS[first]:
             raise InputError(
-                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} "
-                f"states them as {found[0][1]}; correct the file, or get it again"
+                f"{text.at(index)}: the header states units as {units}, but line {first_line + 1} "
+                f"states them as {first}; correct the file, or get it again"
             )
-    return found[0] if found else None
+    return first_line, first
 
 
-def unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | None:
-    """Return the line that says "units of X" or "units: X", and X.
-
-    It does so where X is no unit of acceleration.
-    """
+def find_unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str] | None:
+    """Return the line that says "units of X" or "units: X" of an unknown X, and X."""
     for index in indices:
-        if match := _UNITS_OF.search(text.heads[index]):
-            word = match[1].strip("()[] .:=")
-            if (
-                known_units(word) is None
-                and word.lower() not in TIME_UNITS
-                and re.search(r"[/\^]|^counts?$|^[a-z]$", word, re.I)
-            ):
-                return index, match[1]
+        match = _UNITS_OF.search(text.heads[index])
+        if match is None:
+            continue
+        word = match[1].strip("()[] .:=")
+        looks_like_unit = re.search(r"[/\^]|^counts?$|^[a-z]$", word, re.I)
+        if known_units(word) is None and word.lower() not in TIME_UNITS and looks_like_unit:
+            return index, match[1]
     return None
 
 
 def refuse_other_motion(text: TextFile, indices: Sequence[int]) -> None:
-    """Raise InputError where a header says that samples are velocities.
+    """Raise InputError where a header says that samples are velocities, displacements or counts.
 
-    It does the same for displacements and for counts.
-
-    The line that speaks of a history, a series, data or units decides; without one, any word of
+    The lines that speak of a history, a series, data or units decide; without one, any word of
     motion does, and acceleration wins.
     """
-    said: dict[bool, list[tuple[int, str]]] = {True: [], False: []}
+    about_series: list[tuple[int, str]] = []
+    about_motion: list[tuple[int, str]] = []
     for index in indices:
         line = _NO_MOTION.sub("", text.heads[index])
         kinds = {match.lastgroup or "" for match in _MOTION.finditer(line)}
         if not kinds or _MEASURE.search(line):
             continue
         kind = "acceleration" if "acceleration" in kinds else sorted(kinds)[-1]
-        said[bool(_SERIES.search(line))].append((index, kind))
-    deciding = said[True] or said[False]
+        statements = about_series if _SERIES.search(line) else about_motion
+        statements.append((index, kind))
+    deciding = about_series or about_motion
     if deciding and all(kind != "acceleration" for _, kind in deciding):
         index, kind = deciding[0]
         raise InputError(f"{text.at(index)}: the header says {kind}; get the file of accelerations")

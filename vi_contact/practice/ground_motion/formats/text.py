@@ -141,7 +141,7 @@ class TextFile:
             **told,
         )
 
-    def chosen(self, components: Sequence[str]) -> int:
+    def choose(self, components: Sequence[str]) -> int:
         """Return which component the caller chose, from 0.
 
         It raises InputError, which lists them, where none or another one is chosen.
@@ -179,7 +179,7 @@ class TextFile:
                 "the complete file"
             )
 
-    def filled(self, start: int) -> Sequence[int]:
+    def find_filled(self, start: int) -> Sequence[int]:
         """Return the indices of the lines from `start` on that are not blank.
 
         They go up to a line '*** End data ***'.
@@ -202,7 +202,7 @@ class TextFile:
         Raises InputError where a row but the last has another length than the first, or the last
         one is longer: a value was lost there, and those after it would be read too early.
         """
-        lines = self.filled(start)
+        lines = self.find_filled(start)
         rows = list(self.rows(lines))
         self.refuse_uneven_rows(lines, rows)
         self.refuse_misaligned(lines)
@@ -313,7 +313,7 @@ class TextFile:
             else max((found for found, _ in styles), default=None)
         )
 
-    def fixed(self, index: int, width: int, offset: int = 0) -> list[float]:
+    def cut_fields(self, index: int, width: int, offset: int = 0) -> list[float]:
         """Return the values on lines[index] in columns of `width` characters.
 
         They begin at `offset`, and may touch.

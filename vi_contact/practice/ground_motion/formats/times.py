@@ -1,7 +1,4 @@
-"""Find the time step of a column of times.
-
-They are printed with few decimals or were held in single precision.
-"""
+"""Find the time step of times that are printed with few decimals, or held in single precision."""
 
 import math
 from collections.abc import Sequence
@@ -13,23 +10,19 @@ from ....core.checks import counted, number
 from ....core.errors import InputError
 from .text import SAME_STEP, TextFile
 
-COARSE = (
-    0.2  # part of a step that rounding may take: above it a row that was lost could hide behind it
-)
+# Part of a step that rounding may take: above it a row that was lost could hide behind it.
+COARSE = 0.2
 
 
 def rises_evenly(times: Array, *, decimals: int | None = None) -> bool:
-    """Tell whether numbers, three or more, count up by one step.
-
-    The rounding of their digits is left out of account.
-    """
+    """Tell whether numbers, three or more, count up by one step, but for their rounding."""
     if times.size < 3 or not np.all(np.diff(times) > 0.0):
         return False
     steps = np.diff(times)
     usual = float(np.median(steps))
-    return bool(np.all(np.abs(steps - usual) <= SAME_STEP * usual)) or _is_rounded(
-        times, _rounding(times, decimals)
-    )
+    if np.all(np.abs(steps - usual) <= SAME_STEP * usual):
+        return True
+    return _is_rounded(times, _rounding(times, decimals))
 
 
 def time_step(
@@ -42,13 +35,19 @@ def time_step(
 ) -> tuple[float, float, bool]:
     """Return the step of times, its relative error, and whether they are uneven.
 
-    The error is the one that the rounding of the times leaves.
+    The error is the one that the rounding of the times leaves. Uneven times are allowed only where
+    the caller wants to interpolate; the step is then the one to interpolate to: resample_dt, or the
+    nearest whole part of it that is not longer than the usual step, so that reading does not alias.
 
-    times and the step are in s. lines: index of the line of each. decimals: of the times as they
-    are printed in their unit [s]. Uneven times are allowed only where the caller wants to
-    interpolate; the step is then the one to interpolate to: resample_dt, or the nearest whole part
-    of it that is not longer than the usual step, so that reading does not alias. Raises InputError
-    for times that do not rise, and for uneven ones nobody asked for.
+    Args:
+        text: the file.
+        lines: index of the line of each time.
+        times: (n,) [s].
+        decimals: of the times as they are printed; None where they have exponents.
+        unit: in which they are printed [s].
+
+    Raises:
+        InputError: times that do not rise; uneven times that nobody wants to interpolate.
     """
     steps = np.diff(times)
     usual = float(np.median(steps))
@@ -78,54 +77,55 @@ def time_step(
     return step, SAME_STEP, True
 
 
-def interpolated(times: Array, samples: Array, step: float) -> Array:
-    """Return the samples on even times from the first one on.
+def interpolate(times: Array, samples: Array, step: float) -> Array:
+    """Return the samples on even times, read off straight lines.
 
-    They are read off straight lines; the last one is kept.
+    Args:
+        times: (n,), that rise [s].
+        samples: (n,), at these times.
+        step: of the even times, from the first one on [s]. The last time is kept.
     """
     last = (times[-1] - times[0]) / step
     rounding = 2.0 * float(_rounding(times, None)) / step
     count = int(last * (1.0 + 1e-12) + min(rounding, COARSE) + 1.0)
-    found: Array = np.interp(times[0] + step * np.arange(count), times, samples)
-    return found
+    even_times = times[0] + step * np.arange(count)
+    return np.asarray(np.interp(even_times, times, samples))
 
 
 def _rounding(times: Array, decimals: int | None) -> float:
-    """Return the largest error of times that are printed to `decimals`.
-
-    It is also that of times that were held in single precision.
-    """
-    # held in single precision, and computed in it: a start and a multiple of the step, each rounded
-    # once
+    """Return the largest error of times that are printed to `decimals` or had single precision."""
+    # In single precision they were computed too: a start and a multiple of the step, each rounded
+    # once.
     single = float(np.spacing(np.float32(np.max(np.abs(times)))))
-    return max(single, 0.0 if decimals is None else 0.5 * 10.0**-decimals)
+    printed = 0.0 if decimals is None else 0.5 * 10.0**-decimals
+    return max(single, printed)
 
 
 def _is_rounded(times: Array, rounding: float) -> bool:
-    """Tell whether times are even but for their rounding.
-
-    The rounding is too small to hide a row that was lost.
+    """Tell whether times are even but for a rounding that is too small to hide a lost row.
 
     A lost row moves the times at least a quarter of a step from any straight line.
     """
     if times.size < 3:
         return False
-    line = np.polynomial.Polynomial.fit(np.arange(times.size), times, 1)
-    away = float(np.max(np.abs(times - line(np.arange(times.size)))))
+    number = np.arange(times.size)
+    line = np.polynomial.Polynomial.fit(number, times, 1)
+    away = float(np.max(np.abs(times - line(number))))
     step = (times[-1] - times[0]) / (times.size - 1)
     return 2.0 * rounding <= COARSE * step and away <= 2.0 * rounding
 
 
 def _roundest_step(times: Array, rounding: float) -> tuple[float, float]:
-    """Return the step with the fewest digits, or the whole sampling rate, and its error.
+    """Return the roundest step that the rounded times allow, and its relative error.
 
-    It is one that the rounded times allow.
+    It is the one with the fewest digits, or the whole sampling rate.
     """
     mean = float(times[-1] - times[0]) / (times.size - 1)
     error = 2.0 * rounding / (times.size - 1)
     rate = round(1.0 / mean)
-    tried = [float(f"{mean:.{digits}e}") for digits in (0, 1)]
-    tried += [1.0 / rate] if rate > 0 else []
-    tried += [float(f"{mean:.{digits}e}") for digits in range(2, 16)]
-    step = next((one for one in tried if abs(one - mean) <= error), mean)
+    candidates = [float(f"{mean:.{digits}e}") for digits in (0, 1)]
+    if rate > 0:
+        candidates.append(1.0 / rate)
+    candidates += [float(f"{mean:.{digits}e}") for digits in range(2, 16)]
+    step = next((candidate for candidate in candidates if abs(candidate - mean) <= error), mean)
     return step, max(SAME_STEP, 2.0 * error / mean)

@@ -7,7 +7,7 @@ import re
 
 from ....core.errors import InputError
 from ..record import Record
-from .statements import agreed
+from .statements import agree
 from .text import TextFile
 
 _FORMAT = re.compile(r"^(\d++)F(\d++)\.(\d++)$", re.IGNORECASE)
@@ -52,12 +52,12 @@ def read(text: TextFile) -> Record:
             f"{text.at(form_line)}: the data have {channels} columns and the header names "
             f"{len(names)} directions; get the file again"
         )
-    place = text.chosen(names)
+    place = text.choose(names)
     data = _first_row(text, start)
     values: list[float] = []
-    lines = text.filled(data)
+    lines = text.find_filled(data)
     for index in lines:
-        row = text.fixed(index, width)
+        row = text.cut_fields(index, width)
         if len(row) != channels:
             raise InputError(
                 f"{text.at(index)}: {len(row)} values instead of {channels}, one of each channel; "
@@ -127,7 +127,7 @@ def _step(
     rate_line, rates = _entry(text, header, "VEL. DE MUESTREO, C1")
     rate = _of(text, rate_line, rates, place)
     found += [(rate_line, 1.0 / rate)] if rate > 0.0 else []
-    agreed(text, "the time step", found, rounding=1e-3)
+    agree(text, "the time step", found, rounding=1e-3)
     seconds_line, seconds = _entry(text, header, "DURACION DEL REGISTRO (S), C1")
     duration = _of(text, seconds_line, seconds, place)
     if not abs(duration - count * found[0][1]) <= 1.01 * found[0][1] + 0.01:

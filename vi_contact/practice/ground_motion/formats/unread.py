@@ -1,6 +1,7 @@
 """Name the formats that are known but not read, each in a sentence of its own."""
 
 import re
+from itertools import chain
 
 from ....core.errors import InputError
 from .text import TextFile
@@ -40,18 +41,15 @@ _SAC = (
 
 
 def refuse_unread(text: TextFile) -> None:
-    """Raise InputError where the first line is that of a format that is not read.
-
-    It is the first line of numbers or words.
-    """
+    """Raise InputError where the first line that is not blank is of a format that is not read."""
     index = next((k for k, line in enumerate(text.heads) if line.strip()), 0)
     for pattern, sentence in _KNOWN:
         if pattern.search(text.heads[index]):
             raise InputError(f"{text.at(index)}: {sentence}")
-    words = {word for line in text.heads[:14] for word in line.split()}
-    if (
-        words & {"-12345.00", "-12345.0", "-12345"}
-        and len(text.heads) > 30
-        and all(len(line.split()) == 5 for line in text.heads[:14])
-    ):
+
+    # Alphanumeric SAC: 14 lines of five reals, among them marks of what is not defined.
+    rows = [line.split() for line in text.heads[:14]]
+    words = set(chain.from_iterable(rows))
+    undefined = words & {"-12345.00", "-12345.0", "-12345"}
+    if undefined and len(text.heads) > 30 and all(len(row) == 5 for row in rows):
         raise InputError(f"{text.at(index)}: {_SAC}")

@@ -20,7 +20,7 @@ from ....core.errors import InputError
 from ..record import Record
 from .cosmos import begins_blocks
 from .text import NUMBER, TextFile
-from .times import interpolated, time_step
+from .times import interpolate, time_step
 
 INTEGER_LINES, REAL_LINES = 7, 7
 PAIR_WIDTH, PAIR_DECIMALS, SINGLE_WIDTH = 7, 3, 13
@@ -73,7 +73,7 @@ def read(text: TextFile) -> Record:
     Where times are uneven, as digitisers of films gave them, resample_dt is needed.
     """
     parts = _parts(text)
-    part = parts[text.chosen([part.name for part in parts])]
+    part = parts[text.choose([part.name for part in parts])]
     line, count, seconds = _announced(text, part)
     units_line, units = next(
         ((k, match[1]) for k in part.header if (match := _UNITS.search(text.heads[k]))), (0, "")
@@ -106,7 +106,7 @@ def read(text: TextFile) -> Record:
                 "s; get the complete file"
             )
         if uneven:
-            samples, sample_lines = interpolated(times, samples, step), []
+            samples, sample_lines = interpolate(times, samples, step), []
             notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
         step = float(f"{step:.12g}")
         if text.dt is not None and not uneven and abs(text.dt - step) <= rounding * step:
@@ -214,9 +214,9 @@ def _fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float
     offset = len(text.lines[rows[0]].rstrip()) % width
     for index in rows:
         row = (
-            text.fixed(index, width, offset)
+            text.cut_fields(index, width, offset)
             if text.lines[index][:offset].strip() == ""
-            else text.fixed(index, width)
+            else text.cut_fields(index, width)
         )
         last = index == rows[-1]
         if len(row) != FIELDS and not (last and 0 < len(row) < FIELDS):

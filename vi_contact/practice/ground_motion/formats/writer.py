@@ -1,4 +1,4 @@
-"""Record files for other programs: two columns, PEER AT2, OpenSees path series."""
+"""Write record files for other programs: two columns, PEER AT2, OpenSees path series."""
 
 import os
 
@@ -14,9 +14,12 @@ DIGITS = 9
 
 @checked
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Write time [s] and acceleration in `units`.
+    """Write time and acceleration after comment lines "#" with title, units, step and notes.
 
-    They stand after comment lines "#" with title, units, time step and notes.
+    Args:
+        record: the motion.
+        path: of the file.
+        units: of the accelerations, a key of UNITS; times are in s.
     """
     samples, name = _samples(record, units)
     comments = [
@@ -24,13 +27,20 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
         f"time [s], acceleration [{name}], dt = {record.dt:.10g} s",
         *record.notes,
     ]
+    header = [" ".join(["#", *comment.split()]) for comment in comments if comment]
     rows = [f"{time:.10g} {sample}" for time, sample in zip(record.times, samples, strict=True)]
-    _write(path, [" ".join(["#", *comment.split()]) for comment in comments if comment] + rows)
+    _write(path, header + rows)
 
 
 @checked
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
-    """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
+    """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row.
+
+    Args:
+        record: the motion.
+        path: of the file.
+        units: of the accelerations, a key of UNITS.
+    """
     samples, name = _samples(record, units)
     header = [
         "PEER AT2 format, written by vi_contact",
@@ -38,28 +48,33 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
         f"ACCELERATION TIME SERIES IN UNITS OF {name.upper()}",
         f"NPTS= {record.acceleration.size}, DT= {record.dt:.10g} SEC",
     ]
-    rows = [
-        "".join(f"{sample:>18}" for sample in samples[k : k + 5]) for k in range(0, len(samples), 5)
-    ]
+    cells = [f"{sample:>18}" for sample in samples]
+    rows = ["".join(cells[k : k + 5]) for k in range(0, len(cells), 5)]
     _write(path, header + rows)
 
 
 @checked
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
-    """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads.
+    """Write one value a line, for `timeSeries Path -filePath` of OpenSees, which needs -dt.
 
-    It needs -dt and units.
+    Args:
+        record: the motion.
+        path: of the file.
+        units: of the accelerations, a key of UNITS.
     """
-    _write(path, _samples(record, units)[0])
+    samples, _ = _samples(record, units)
+    _write(path, samples)
 
 
 def _samples(record: Record, units: str) -> tuple[list[str], str]:
     """Return the accelerations in `units` as text, and the key of UNITS."""
     name = canonical_units("output units", units)
-    return [f"{value:.{DIGITS - 1}e}" for value in record.acceleration / UNITS[name]], name
+    values = record.acceleration / UNITS[name]
+    return [f"{value:.{DIGITS - 1}e}" for value in values], name
 
 
 def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
+    """Write the lines, or raise InputError where the system does not let us."""
     try:
         write_output(path, ("\n".join(lines) + "\n").encode("utf-8"))
     except OSError as error:
