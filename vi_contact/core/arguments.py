@@ -241,44 +241,52 @@ def words(kind: Any) -> str:
 
 
 def _is_union(kind: Any) -> bool:
+    """Return whether a type is a union of types."""
     return typing.get_origin(kind) in (typing.Union, types.UnionType)
 
 
 def _is_path(kind: Any) -> bool:
+    """Return whether a type is one of paths."""
     return kind is Path or kind is os.PathLike or typing.get_origin(kind) is os.PathLike
 
 
 def _fits_path(value: Any) -> bool:
+    """Return whether a value is a path or a text that can be one."""
     if not isinstance(value, str | os.PathLike):
         return False
     return bool(os.fspath(value)) and "\0" not in os.fsdecode(value)
 
 
 def _is_number(value: Any) -> bool:
+    """Return whether a value is one real number; truth values are none."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     return isinstance(value, Real) and not isinstance(value, bool | np.bool_)
 
 
 def _is_whole(value: Any) -> bool:
+    """Return whether a value is one whole number; 3.0 is one."""
     if not _is_number(value):
         return False
     return isinstance(value, Integral) or real(value) == np.rint(real(value))
 
 
 def _are_numbers(value: Any) -> bool:
+    """Return whether a value is a number, or numbers in lists or arrays of equal lengths."""
     if isinstance(value, str | bytes) or shape_of(value) == (-1,):
         return False
     return np.asarray(value).dtype.kind in "iufb"
 
 
 def _is_sequence(value: Any) -> bool:
+    """Return whether a value is a list, a tuple or an array, but no text."""
     if isinstance(value, np.ndarray):
         return value.ndim > 0
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
+    """Return whether a value is a list of members of these types."""
     if not _is_sequence(value):
         return False
     if inside[-1] is Ellipsis:
@@ -287,10 +295,12 @@ def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
 
 
 def _fits_sequence(value: Any, inside: tuple[Any, ...]) -> bool:
+    """Return whether a value is a list of members of the one type inside."""
     return _is_sequence(value) and all(fits(member, inside[0]) for member in value)
 
 
 def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
+    """Return whether a value is a mapping of these types of keys and values."""
     if not isinstance(value, Mapping):
         return False
     return all(fits(key, inside[0]) and fits(value[key], inside[1]) for key in value)

@@ -227,7 +227,7 @@ def _plain(value: Any) -> Any:
 def _replace_when_complete(path: Path, safe: bool = True) -> Iterator[Any]:
     """Open an unbuffered file beside ``path`` that takes its place at the end.
 
-    It is pushed onto the medium before where it must be ``safe`` even if the power fails.
+    A ``safe`` one is pushed onto the medium before, so that it survives a failure of the power.
 
     Raises:
         OSError: names ``path``.

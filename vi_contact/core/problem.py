@@ -171,11 +171,13 @@ class ContactProblem:
 
     def ground_acceleration(self, t: float) -> Array:
         """Return the vector a_g(t) (d,) [m/s²], the sum of all excitations."""
-        total = np.zeros(self.system.influence.shape[1])
+        # Lists of two or three numbers take less time than arrays.
+        total = [0.0] * self.system.influence.shape[1]
         for excitation in self.excitations:
             a = float(history_value(excitation.acceleration, t))
-            total += a * np.array(excitation.direction, dtype=float)
-        return total
+            for i, component in enumerate(excitation.direction):
+                total[i] += a * component
+        return np.array(total)
 
 
 def with_values(

@@ -162,7 +162,8 @@ def check_balance(name: str, problem: ContactProblem) -> None:
 
 def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     """Raise InputError for unknowns without mass beside contact nodes with mass."""
-    layer, surface = problem.equations.massless, problem.surface
+    layer = problem.equations.massless
+    surface = problem.surface
     if layer is not None and surface.some(~layer[surface.owned]):
         raise InputError(
             "rows of M are zero while contact nodes have mass: condense these unknowns out of K "
