@@ -255,9 +255,14 @@ def curves_down(progress: Progress, layers: OptionLayers) -> bool:
 
 
 def give_up(problem: Problem, progress: Progress, sentence: str) -> StepFailure:
-    """Write the best values into u, and return the error with this sentence. Collective.
+    """Write the best values into u, and return the error. Collective.
 
     Where conditions were never met, these are the first guess.
+
+    Args:
+        problem: with u.
+        progress: of the method that failed.
+        sentence: of the error; what u holds is added.
     """
     if progress.best.left:
         problem.put_back()

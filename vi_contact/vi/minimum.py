@@ -18,8 +18,10 @@ from .model import Model
 from .newton import Progress, begin
 
 ACCEPTED = 1e-4  # the part of the promised decrease that a step must bring
-POOR, GOOD = 0.25, 0.75  # parts of it below which the radius shrinks and above which it grows
-SHRINK, GROW = 0.25, 4.0  # by which it does
+POOR = 0.25  # the part of it below which the radius shrinks
+GOOD = 0.75  # the part of it above which the radius grows
+SHRINK = 0.25  # by which it shrinks
+GROW = 4.0  # by which it grows
 AT_EDGE = 0.9  # of the radius: a longer step has used the region
 FIRST_RADIUS = 1e3  # steps of Jacobi's method: the first radius
 DIGITS = 1e-8  # of the energy: a smaller decrease is taken from forces, as energies cancel

@@ -230,7 +230,13 @@ def take_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | 
 def take_linear_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
     """Go towards the answer of the linear problem between the bounds. Collective.
 
-    Arguments and result are those of ``take_step``.
+    Args:
+        progress: gets the reason where it fails.
+        point: where the step begins.
+        steps: solves linear problems.
+
+    Returns:
+        The share of the change of held unknowns that is then left; None where it fails.
     """
     start = np.clip(point.x, point.lower, point.upper)
     try:
@@ -249,7 +255,13 @@ def take_linear_step(progress: Progress, point: Judged, steps: LinearSteps) -> f
 def take_reduced_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
     """Take a reduced step. Collective.
 
-    Arguments and result are those of ``take_step``.
+    Args:
+        progress: gets the reason where it fails.
+        point: where the step begins.
+        steps: solves linear problems.
+
+    Returns:
+        The share of the change of held unknowns that is then left; None where it fails.
     """
     progress.failure = NO_STEP
     try:
