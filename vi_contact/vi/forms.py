@@ -1,7 +1,4 @@
-"""Read a user's forms, conditions and bounds; evaluate F and its Jacobian.
-
-They are evaluated on the unknowns that nothing clamps.
-"""
+"""Read a user's forms, conditions and bounds; evaluate F and its Jacobian on free unknowns."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -30,19 +27,33 @@ def refused(sentence: str) -> InputError:
 
 
 def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
-    """Return (F, J), of a form F(u; v) or of (a, L); InputError for others."""
+    """Return F and its Jacobian.
+
+    Args:
+        form: F(u; v), or (a, L).
+        u: the Function to solve for.
+        J: the Jacobian; None for the derivative of F.
+
+    Raises:
+        InputError: the form is neither, or not on the space of u.
+    """
     if isinstance(form, ufl.Form) and len(form.arguments()) == 2:
         form = ufl.system(form)
     if isinstance(form, ufl.Form):
-        if not contains(checked("F", form, 1, u), u):
+        check_form("F", form, 1, u)
+        if not contains(form, u):
             raise refused(
                 "F does not depend on u: write it with the Function that is solved for, or give "
                 "(a, L)"
             )
-        return form, checked("J", ufl.derivative(form, u) if J is None else J, 2, u)
+        jacobian = ufl.derivative(form, u) if J is None else J
+        check_form("J", jacobian, 2, u)
+        return form, jacobian
     if not isinstance(form, tuple | list) or len(form) != 2 or J is not None:
         raise refused(f"the form is {shown(form)}, J {shown(J)}; {FORMS}, whose Jacobian is a")
-    a, L = checked("a", form[0], 2, u), checked("L", form[1], 1, u)
+    a, L = form
+    check_form("a", a, 2, u)
+    check_form("L", L, 1, u)
     if contains(a, u) or contains(L, u):
         raise refused(
             "a or L contains u itself, so that the problem is not linear in it: give F(u; v)"
@@ -72,23 +83,30 @@ def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
     return F, ufl.derivative(F, u)
 
 
-def checked(name: str, form: Any, rank: int, u: Any) -> Any:
-    """Return a form that has so many arguments, on the space of u; else InputError."""
+def check_form(name: str, form: Any, rank: int, u: Any) -> None:
+    """Raise InputError unless a form has so many arguments, on the space of u.
+
+    Args:
+        name: of the form, for messages.
+        form: of UFL.
+        rank: number of arguments.
+        u: the Function to solve for.
+    """
     if not isinstance(form, ufl.Form) or len(form.arguments()) != rank:
         what = (
             f"a form of rank {len(form.arguments())}" if isinstance(form, ufl.Form) else shown(form)
         )
         raise refused(f"{name} is {what}, and a {KINDS[rank]} is needed; {FORMS}")
-    if any(one.ufl_function_space() != u.ufl_function_space() for one in form.arguments()):
+    space = u.ufl_function_space()
+    if any(argument.ufl_function_space() != space for argument in form.arguments()):
         raise refused(
             f"the test or trial function of {name} is on another space: make it of u.function_space"
         )
-    return form
 
 
 def contains(form: Any, u: Any) -> bool:
     """Say whether a form depends on u."""
-    return any(one is u for one in form.coefficients())
+    return any(coefficient is u for coefficient in form.coefficients())
 
 
 class Problem:
@@ -103,14 +121,30 @@ class Problem:
         constant: whether J is the same at every u, so that the problem is linear.
         given: the values of u before the first step (of a part of the change, see ``aim``), those
             of ghosts too.
+        free: (n,) which owned unknowns no condition holds.
+        owned: their number.
+        size: of the field; known after ``bounds``.
     """
 
     def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:
+        """Check and compile the forms. Collective.
+
+        Args:
+            form: F(u; v), or (a, L); None with an energy.
+            u: the Function to solve for.
+            bcs: Dirichlet conditions.
+            J: the Jacobian; None for the derivative of F.
+            energy: the functional of u; None with a form.
+
+        Raises:
+            InputError: forms or conditions do not fit u.
+        """
         if energy is None:
             F, J = split(form, u, J)
         else:
             F, J = derivatives(energy, u)
-        self.u, space = u, u.function_space
+        space = u.function_space
+        self.u = u
         self.comm = MpiComm(kept(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
@@ -118,16 +152,23 @@ class Problem:
                 "bcs is wrong: give a list of dirichletbc objects on the space of u or its "
                 "components"
             )
-        self.given = self._first = np.array(u.x.array)
-        self._held, self._values = np.zeros(len(self.given), dtype=bool), np.zeros(len(self.given))
+
+        # Values of the first guess, and those that conditions prescribe.
+        self._first = np.array(u.x.array)
+        self.given = self._first
+        self._held = np.zeros(len(self.given), dtype=bool)
+        self._values = np.zeros(len(self.given))
         for bc in bcs:
             held, values = compat.bc_values(bc, len(self._values))
-            self._held[held], self._values[held] = True, values
+            self._held[held] = True
+            self._values[held] = values
         self._prescribed = self._values
         self.free: Mask = ~self._held[: self.owned]
-        for one in (F, J):
-            refuse_not_linear("vi.solve: F or J", one)
-        self._F, self._J = compat.compile_form(F), compat.compile_form(J)
+
+        refuse_not_linear("vi.solve: F or J", F)
+        refuse_not_linear("vi.solve: F or J", J)
+        self._F = compat.compile_form(F)
+        self._J = compat.compile_form(J)
         self._energy = None if energy is None else compat.compile_form(energy)
         self.constant = not contains(expand_derivatives(J), u)
         self._jacobian: PetscMatrix | None = None
@@ -139,16 +180,16 @@ class Problem:
 
     @property
     def change(self) -> Array:
-        """Return the prescribed values less those of the first guess.
+        """Return the prescribed values less those of the first guess, of ghosts too.
 
-        It is 0 at free unknowns; ghosts are there too.
+        They are zero at free unknowns.
         """
         return np.where(self._held, self._values - self.given, 0.0)
 
     def put(self, x: Array, left: float = 0.0) -> None:
-        """Write the free unknowns into u, and the held ones.
+        """Write the free unknowns (n,) into u, and the held ones. Collective.
 
-        The held ones lack the share ``left`` of their change. Collective.
+        The held ones lack the share ``left`` of their change.
         """
         values = self.u.x.array
         values[self._held] = self._values[self._held]
@@ -170,12 +211,13 @@ class Problem:
         return not largest(self.comm, not here)
 
     def places(self) -> Array:
-        """Return (n, 4) where the free unknowns are.
+        """Return (n, 4) where the free unknowns are. Collective.
 
-        These are coordinates as shares of the body's box, and the component as a share of their
-        number. Collective.
+        The columns are coordinates as shares of the body's box, and the component as a share of
+        their number.
         """
-        space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
+        space = self.u.function_space
+        width = space.dofmap.index_map_bs
         x = space.tabulate_dof_coordinates()[: self.owned // width]
         low = -self.comm.max(-np.min(x, axis=0, initial=np.inf))
         high = self.comm.max(np.max(x, axis=0, initial=-np.inf))
@@ -184,18 +226,15 @@ class Problem:
         return np.column_stack([shares, component])[self.free]
 
     def put_back(self) -> None:
-        """Write the first guess into u, as if nothing had been done.
-
-        The held values are those that it had.
-        """
-        self.u.x.array[:] = self.given = self._first
+        """Write the first guess into u, with the values that held unknowns had in it."""
+        self.u.x.array[:] = self._first
+        self.given = self._first
         self._values = self._prescribed
 
     def aim(self, share: float) -> None:
-        """Take the present u for the first guess.
+        """Take the present u for the first guess, and prescribe a part of the change.
 
-        Prescribed values are then those that are so far on the way from the values of the very
-        first guess.
+        Prescribed values are then those of this share of the way from the very first guess.
         """
         self.given = np.array(self.u.x.array)
         way = self._prescribed - self._first
@@ -210,18 +249,19 @@ class Problem:
 
     def energy(self) -> float:
         """Return the energy at u, infinity where it is no number. Collective."""
-        found = total(self.comm, compat.assemble_scalar(self._energy))
-        return found if np.isfinite(found) else np.inf
+        energy = total(self.comm, compat.assemble_scalar(self._energy))
+        return energy if np.isfinite(energy) else np.inf
 
     def jacobian(self) -> PetscMatrix:
         """Return J at u on the free unknowns; what it returned before is freed. Collective."""
-        return self.linearised(0.0)[0]
+        J, _ = self.linearise(0.0)
+        return J
 
-    def linearised(self, left: float) -> tuple[PetscMatrix, Array]:
-        """Return (J at u on the free unknowns, what F of these will gain).
+    def linearise(self, left: float) -> tuple[PetscMatrix, Array]:
+        """Return J at u on the free unknowns, and what F of these will gain (n,). Collective.
 
         F gains it, to first order, by the share ``left`` of the change of the held ones. The J that
-        it returned before is freed. Collective.
+        it returned before is freed.
         """
         gain = np.zeros(np.count_nonzero(self.free))
         if self._jacobian is None or left or not self.constant:
@@ -237,10 +277,10 @@ class Problem:
 
     def spread(self, values: Array) -> Any:
         """Return values of the free unknowns as a Function, zero elsewhere. Collective."""
-        made = compat.function(self.u.function_space)
-        made.x.array[: self.owned][self.free] = values
-        made.x.scatter_forward()
-        return made
+        function = compat.function(self.u.function_space)
+        function.x.array[: self.owned][self.free] = values
+        function.x.scatter_forward()
+        return function
 
     def close(self) -> None:
         """Free the Jacobian; collective."""
@@ -249,19 +289,19 @@ class Problem:
         self._jacobian = None
 
     def bounds(self, lower: Any, upper: Any) -> tuple[Array, Array]:
-        """Return (lower, upper) of the free unknowns.
-
-        What contradicts raises InputError on all ranks.
+        """Return (lower, upper) of the free unknowns. Collective.
 
         What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is
         beyond a bound stays as it is, and where lower is above upper the unknown is held at
         lower.
+
+        Raises:
+            InputError: on all ranks, where bounds contradict each other or the conditions.
         """
-        low, high = self._bound("lower", lower, -np.inf), self._bound("upper", upper, np.inf)
-        u, space = (
-            np.where(self._held, self._values, self.given)[: self.owned],
-            self.u.function_space,
-        )
+        low = self._bound("lower", lower, -np.inf)
+        high = self._bound("upper", upper, np.inf)
+        u = np.where(self._held, self._values, self.given)[: self.owned]
+        space = self.u.function_space
         self.size = size_of_field(np.nan_to_num(u, nan=np.inf), low, high, self.comm)
         off = OFF * self.size
         defects = (
@@ -281,13 +321,13 @@ class Problem:
             ),
         )
 
-        def said(i: int, words: str) -> str:
+        def describe(i: int, words: str) -> str:
             node, component = divmod(i, space.dofmap.index_map_bs)
             where = f"component {component} at {at(space.tabulate_dof_coordinates()[node])}"
             return f"vi.solve: {where}, where u is {u[i]:g} in [{low[i]:g}, {high[i]:g}]: {words}"
 
         refuse(
-            (said(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)),
+            (describe(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)),
             self.comm,
         )
         return low[self.free], np.maximum(low, high)[self.free]
@@ -302,8 +342,15 @@ class Problem:
         return largest(self.comm, most) > OFF * self.size
 
     def _bound(self, name: str, given: Any, none: float) -> Array:
-        """Return a bound at the owned unknowns."""
-        space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
+        """Return a bound at the owned unknowns.
+
+        Args:
+            name: of the bound, for messages.
+            given: what the user gave: a Function, a Constant, numbers or None.
+            none: the number that stands for None.
+        """
+        space = self.u.function_space
+        width = space.dofmap.index_map_bs
         if isinstance(given, compat.fem.Function) and given.function_space == space:
             return np.array(given.x.array[: self.owned])
         given = given.value if isinstance(given, compat.fem.Constant) else given
@@ -319,9 +366,9 @@ class Problem:
             ) from None
 
 
-def given_alike(bound: Any) -> Any:
-    """Return what of a bound all ranks give alike.
+def common_part(bound: Any) -> Any:
+    """Return what of a bound all ranks must give alike: numbers, and the value of a Constant.
 
-    These are numbers and the value of a Constant; of a Function it is the kind.
+    A Function is compared by its kind alone.
     """
     return bound.value if isinstance(bound, compat.fem.Constant) else bound

@@ -22,12 +22,12 @@ from ..fem.body.form_checks import refuse_complex
 from ..fem.mesh.communicators import MpiComm, kept
 from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
-from .forms import Problem, given_alike, refused
+from .forms import Problem, common_part, refused
 from .judged import Judged
 from .linear_steps import is_symmetric
 from .minimum import minimise
 from .model import Model
-from .newton import Ended, solve_in_parts
+from .newton import Progress, solve_in_parts
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +40,8 @@ HILL = (
     "the Jacobian of F is not positive at the answer: if F is the derivative of an energy, this u "
     "is no minimum of it, and energy= in the place of F finds one"
 )
-NEWTON_STEPS, DESCENT_STEPS = 50, 500  # at most, unless told otherwise
+NEWTON_STEPS = 50  # of a form, at most, unless the user gives a number
+DESCENT_STEPS = 500  # of an energy
 
 
 @dataclass(frozen=True)
@@ -131,8 +132,8 @@ def solve(
     refuse_unknowns(u)
     refuse_choices(form, energy, J, method)
     choices = {
-        "lower": given_alike(lower),
-        "upper": given_alike(upper),
+        "lower": common_part(lower),
+        "upper": common_part(upper),
         "J": J is None,
         "energy": energy is None,
         "method": method,
@@ -154,20 +155,20 @@ def solve(
     try:
         if energy is None:
             methods = () if method is None else (method,)
-            ended = solve_in_parts(problem, low, high, settings, methods, limit)
-            if ended.failure or ended.doubted:
-                is_hill = curves_down(ended, layers)
+            progress = solve_in_parts(problem, low, high, settings, methods, limit)
+            if progress.failure or progress.doubted:
+                is_hill = curves_down(progress, layers)
         else:
-            ended = minimise(problem, low, high, tolerance, limit, layers)
+            progress = minimise(problem, low, high, tolerance, limit, layers)
     finally:
         problem.close()
 
-    best = ended.best
+    best = progress.best
     steps = "Newton steps" if energy is None else "steps downhill"
-    reason = f"the certificate is {best.certificate.worst:.1e} after {ended.steps} {steps}"
-    if ended.failure:
-        cause = NEGATIVE if is_hill else ended.failure
-        raise failed(problem, ended, f"vi.solve: {reason}, above {tolerance:g}: {cause}")
+    reason = f"the certificate is {best.certificate.worst:.1e} after {progress.steps} {steps}"
+    if progress.failure:
+        cause = NEGATIVE if is_hill else progress.failure
+        raise give_up(problem, progress, f"vi.solve: {reason}, above {tolerance:g}: {cause}")
     problem.put(best.x)
     if is_hill:
         reason += f", {HILL}"
@@ -183,9 +184,9 @@ def solve(
         lambda_upper=lambda_upper,
         active=(on_lower, on_upper),
         certificate=best.certificate,
-        iterations=ended.steps,
-        inner=ended.inner,
-        method=ended.method,
+        iterations=progress.steps,
+        inner=progress.inner,
+        method=progress.method,
         reason=reason,
         seconds={"setup": ready - start, "solve": time.process_time() - ready},
     )
@@ -202,9 +203,13 @@ def refuse_unknowns(u: Any) -> None:
 
 
 def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
-    """Raise InputError unless there is a form or an energy, and not both.
+    """Raise InputError unless there is a form or an energy, and what belongs to it.
 
-    What an energy has no use for is refused too.
+    Args:
+        form: F(u; v), or (a, L).
+        energy: the functional of u.
+        J: the Jacobian, of a form only.
+        method: for linear steps, of a form only.
     """
     if form is None and energy is None:
         raise refused(
@@ -225,21 +230,21 @@ def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
 
 
 def preconditioner(ranks: int) -> Mapping[str, object | None]:
-    """Return the options that come before the user's, for the conjugate gradients of an energy."""
+    """Return the options that come before the user's, for conjugate gradients on so many ranks."""
     return {"pc_type": "icc"} if ranks == 1 else {"pc_type": "bjacobi", "sub_pc_type": "icc"}
 
 
-def curves_down(ended: Ended, layers: OptionLayers) -> bool:
+def curves_down(progress: Progress, layers: OptionLayers) -> bool:
     """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u.
 
     Collective.
     """
-    best = ended.best
+    best = progress.best
     problem = best.problem
     if best.broken or problem.constant:
         return False
     problem.put(best.x, best.left)
-    # its Jacobian, which later points have replaced
+    # The Jacobian there, which later points have replaced.
     point = Judged(problem, best.lower, best.upper, best.left)
     if not is_symmetric(point.A, problem.comm):
         return False
@@ -249,13 +254,18 @@ def curves_down(ended: Ended, layers: OptionLayers) -> bool:
     return negative
 
 
-def failed(problem: Problem, ended: Ended, sentence: str) -> StepFailure:
-    """Write the best values into u and return the error. Collective.
+def give_up(problem: Problem, progress: Progress, sentence: str) -> StepFailure:
+    """Write the best values into u, and return the error. Collective.
 
-    It is the first guess where conditions were never met.
+    Where conditions were never met, these are the first guess.
+
+    Args:
+        problem: with u.
+        progress: of the method that failed.
+        sentence: of the error; what u holds is added.
     """
-    if ended.best.left:
+    if progress.best.left:
         problem.put_back()
         return StepFailure(f"{sentence} (u holds the first guess)")
-    problem.put(ended.best.x)
+    problem.put(progress.best.x)
     return StepFailure(f"{sentence} (u holds the best iterate)")

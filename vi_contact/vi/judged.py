@@ -35,15 +35,28 @@ class Judged:
     """
 
     def __init__(self, problem: Problem, lower: Array, upper: Array, left: float = 0.0) -> None:
-        self.problem, self.lower, self.upper, self.left = problem, lower, upper, left
-        self.x, residual = problem.x, problem.residual()
-        self.A, self.gain = problem.linearised(left)
+        """Judge the present u. Collective.
+
+        Args:
+            problem: the problem, with u.
+            lower: (n,) bounds of the free unknowns from below.
+            upper: (n,) from above.
+            left: share of the change of held unknowns that is still to come.
+        """
+        self.problem = problem
+        self.lower = lower
+        self.upper = upper
+        self.left = left
+        self.x = problem.x
+        residual = problem.residual()
+        self.A, self.gain = problem.linearise(left)
         self.F = residual + self.gain if left else residual
 
         # The linear problem, and the largest sizes on any rank of what it is made of.
-        Ax, diagonal = self.A @ self.x, np.abs(self.A.diagonal())
+        Ax = self.A @ self.x
+        diagonal = np.abs(self.A.diagonal())
         self.b = Ax - self.F
-        local = [max_abs(one) for one in (self.x, self.b, Ax, self.F, diagonal)]
+        local = [max_abs(array) for array in (self.x, self.b, Ax, self.F, diagonal)]
         sizes = problem.comm.max(np.nan_to_num(local, nan=np.inf, posinf=np.inf))
         self.broken = not np.all(np.isfinite(sizes))
         x_max, b_max, Ax_max, F_max, most = sizes.tolist()
@@ -54,38 +67,50 @@ class Judged:
 
         # A bound acts where the multiplier, in units of forces, exceeds the distance, in units of
         # u.
-        below, above = self.x - lower, upper - self.x
+        below = self.x - lower
+        above = upper - self.x
         with np.errstate(invalid="ignore"):  # a broken point may have no size
-            at_lower, at_upper = below * r_ref < self.F * x_ref, above * r_ref < -self.F * x_ref
-        self.push = np.where(at_lower, self.F, 0.0), np.where(at_upper, -self.F, 0.0)
+            at_lower = below * r_ref < self.F * x_ref
+            at_upper = above * r_ref < -self.F * x_ref
+        push_up = np.where(at_lower, self.F, 0.0)
+        push_down = np.where(at_upper, -self.F, 0.0)
+        self.push = push_up, push_down
 
         # The certificate: forces that no bound carries; distances below zero; multipliers below
         # zero; distances from bounds that act.
-        balance = max_abs(self.F - self.push[0] + self.push[1])
+        balance = max_abs(self.F - push_up + push_down)
+        behind = max(lowest(below), lowest(above))
+        wrong = max(lowest(push_up), lowest(push_down))
         away = max(max_abs(below[at_lower]), max_abs(above[at_upper]))
-        behind, wrong = (max(map(lowest, pair)) for pair in ((below, above), self.push))
         carried = max(b_max, Ax_max, ROUNDING * most * x_max, most * least) or 1.0
         scale = np.array([carried, x_ref, r_ref, x_ref])
         worst = problem.comm.max(np.array([balance, behind, wrong, away])) / scale
-        known = not self.broken and not left
-        self.certificate = Certificate(*(worst.tolist() if known else [np.inf] * len(worst)))
+        if self.broken or left:
+            worst = np.full(len(worst), np.inf)
+        self.certificate = Certificate(*worst.tolist())
 
     def natural(self, x: Array, F: Array) -> float:
-        """Return the size sum J_ii r² of the natural residual r.
+        """Return the size sum J_ii r² of the natural residual r. Collective.
 
-        r = x - mid(lower, x - F / J_ii, upper); J_ii are those of this u.
+        r = x - mid(lower, x - F / J_ii, upper), with the J_ii of this u, is zero at the answer
+        only. The size is infinite where F is not a number.
 
-        It is zero at the answer only. Infinite where F is not a number. Collective.
+        Args:
+            x: (n,) another x,
+            F: (n,) and F there.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             r = x - np.clip(x - F / self.diagonal, self.lower, self.upper)
-            found = total(self.problem.comm, self.diagonal @ r**2)
-        return found if np.isfinite(found) else np.inf
+            size = total(self.problem.comm, self.diagonal @ r**2)
+        return size if np.isfinite(size) else np.inf
 
     def put(self, x: Array, left: float) -> Array:
-        """Write another x into u, and the held unknowns but for ``left``; return the F there.
+        """Write another x into u, and return the F there. Collective.
 
-        F comes with what it will gain by the rest of their change. Collective.
+        Args:
+            x: (n,).
+            left: share of the change of held unknowns that is then still to come. F comes with what
+                it will gain by that.
         """
         self.problem.put(x, left)
         F = self.problem.residual()

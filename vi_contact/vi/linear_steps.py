@@ -29,14 +29,26 @@ def is_symmetric(A: PetscMatrix, comm: MpiComm) -> bool:
 class LinearSteps:
     """Solve the linear problems of one call of ``vi.solve`` one after another.
 
-    ``given``: the methods to try; those that suit A if there are none. A method that failed is
-    tried last from then on: the tangents of one problem are alike.
+    A method that failed is tried last from then on: the tangents of one problem are alike.
+
+    Attributes:
+        failed: names of methods that have failed.
+        helps: whether no problem so far was given up by all methods.
     """
 
     def __init__(self, settings: Volume, given: Sequence[Method], comm: MpiComm) -> None:
-        self.settings, self.given, self.comm = settings, given, comm
+        """Begin.
+
+        Args:
+            settings: options of PETSc, and the tolerance.
+            given: the methods to try; those that suit A if there are none.
+            comm: of the mesh.
+        """
+        self.settings = settings
+        self.given = given
+        self.comm = comm
         self.failed: set[str] = set()
-        self.helps = True  # whether no problem so far was given up by all methods
+        self.helps = True
 
     def methods(self, symmetric: bool) -> list[Method]:
         """Return the methods to try, in this order; InputError for one that does not suit A."""
@@ -53,30 +65,46 @@ class LinearSteps:
     def solve(
         self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array
     ) -> tuple[Array, int, str]:
-        """Return (x, iterations, name of the method) of the first method that finds x.
+        """Return the answer of the first method that finds it. Collective.
 
-        Every unknown is the one of a contact condition. Collective.
+        Args:
+            A: the matrix.
+            b: (n,).
+            lower: (n,) bounds from below.
+            upper: (n,) bounds from above.
+            start: (n,) where to begin.
+
+        Returns:
+            x (n,), the iterations, and the name of the method.
 
         Raises:
-            StepFailure: no method finds x; it tells what all said.
+            StepFailure: no method finds x; the error tells what each one said.
         """
-        numbers, comm = np.arange(A.rows), self.comm
+        comm = self.comm
         symmetric = is_symmetric(A, comm)
         methods = self.methods(symmetric)
 
         # A start from nothing: along b as far as energy and bounds say, which tells the solvers the
         # size of x.
-        bAb, bb, some = (total(comm, one) for one in (b @ (A @ b), b @ b, np.any(start)))
-        if bAb > 0.0 and not some:
+        bAb = total(comm, b @ (A @ b))
+        bb = total(comm, b @ b)
+        has_start = total(comm, np.any(start)) > 0.0
+        if bAb > 0.0 and not has_start:
             start = np.clip(bb / bAb * b, lower, upper)
 
         # The problem as a step of a body whose every unknown is in contact, with obstacles on both
         # sides.
-        zero, none = np.zeros(A.rows), np.zeros(A.rows, dtype=bool)
+        zero = np.zeros(A.rows)
+        none = np.zeros(A.rows, dtype=bool)
         surface = replace(
-            empty_surface(comm, 1), owned=numbers, gap0=zero, compliance=zero, bilateral=none
+            empty_surface(comm, 1),
+            owned=np.arange(A.rows),
+            gap0=zero,
+            compliance=zero,
+            bilateral=none,
         )
-        matrix = EffectiveMatrix(A, (PetscAlgebra if symmetric else UnsymmetricAlgebra)(comm.mpi))
+        algebra = PetscAlgebra(comm.mpi) if symmetric else UnsymmetricAlgebra(comm.mpi)
+        matrix = EffectiveMatrix(A, algebra)
         step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
 
         failures: list[str] = []
@@ -85,8 +113,8 @@ class LinearSteps:
             if failures:
                 solver.excuse_options()  # they were for the method before
             try:
-                found = solver.solve(step)
-                return np.clip(found.x, lower, upper), found.iterations, type(method).__name__
+                result = solver.solve(step)
+                return np.clip(result.x, lower, upper), result.iterations, type(method).__name__
             except StepFailure as failure:
                 failures.append(str(failure))
                 self.failed.add(type(method).__name__)
@@ -109,7 +137,11 @@ def reduced_step(point: Judged) -> Array:
     set step of M. Hintermüller, K. Ito and K. Kunisch, 2003, The primal-dual active set strategy as
     a semismooth Newton method. Collective.
     """
-    x, F, comm = point.x, point.F, point.problem.comm
+    x = point.x
+    F = point.F
+    comm = point.problem.comm
+
+    # Unknowns that a bound holds go to it, and the others are solved for.
     aim = x - F / point.diagonal
     held = (aim <= point.lower) | (aim >= point.upper)
     step = np.where(held, np.clip(aim, point.lower, point.upper) - x, 0.0)

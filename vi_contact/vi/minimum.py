@@ -15,10 +15,14 @@ from ..solvers.volume.options import OptionLayers
 from .forms import Problem
 from .judged import Judged
 from .model import Model
-from .newton import Ended, begin
+from .newton import Progress, begin
 
 ACCEPTED = 1e-4  # the part of the promised decrease that a step must bring
-POOR, GOOD = 0.25, 0.75  # parts of it below which the radius shrinks and above which it grows
+POOR = 0.25  # the part of it below which the radius shrinks
+GOOD = 0.75  # the part of it above which the radius grows
+SHRINK = 0.25  # by which it shrinks
+GROW = 4.0  # by which it grows
+AT_EDGE = 0.9  # of the radius: a longer step has used the region
 FIRST_RADIUS = 1e3  # steps of Jacobi's method: the first radius
 DIGITS = 1e-8  # of the energy: a smaller decrease is taken from forces, as energies cancel
 UNBOUNDED = 1e30  # times the first radius: no answer is so far away
@@ -34,135 +38,176 @@ NO_DESCENT = (
 
 def minimise(
     problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
-) -> Ended:
-    """Return where the descent ends: at a point that is found, or with a failure.
+) -> Progress:
+    """Go down to a local minimum between the bounds. Collective.
 
-    Such a point has a certificate below the tolerance, and no direction of negative curvature is
-    found there. ``layers``: options of the preconditioner. Collective.
+    Args:
+        problem: the energy, and u where to begin.
+        lower: (n,) bounds of the free unknowns from below.
+        upper: (n,) from above.
+        tolerance: the largest residual of the certificate.
+        limit: number of steps, at most.
+        layers: options of the preconditioner.
+
+    Returns:
+        Where it ends: at a point whose certificate is below the tolerance, and where no direction
+        of negative curvature is found; or with a failure.
     """
-    found = Ended(begin(problem, lower, upper), method="trust region")
-    while found.best.left and not found.failure:
-        carry_conditions(found, layers)
-    if not found.failure:
-        descend(found, tolerance, limit, layers)
-    return found
+    progress = Progress(begin(problem, lower, upper), method="trust region")
+    while progress.best.left and not progress.failure:
+        carry_conditions(progress, layers)
+    if not progress.failure:
+        descend(progress, tolerance, limit, layers)
+    return progress
 
 
-def carry_conditions(found: Ended, layers: OptionLayers) -> None:
-    """Take one step that carries Dirichlet conditions and bounds into the body.
+def carry_conditions(progress: Progress, layers: OptionLayers) -> None:
+    """Take one step that carries Dirichlet conditions and bounds into the body. Collective.
 
     It goes as far as the energy is a number.
     """
-    point = found.best
+    point = progress.best
     problem = point.problem
     model = Model(point, layers)
-    step, its = model.minimise(np.inf)
+    step, iterations = model.minimise(np.inf)
     model.close()
     length = 1.0
     while length > SHORTEST:
-        problem.put(point.x + length * step, point.left * (1.0 - length))
+        left = point.left * (1.0 - length)
+        problem.put(point.x + length * step, left)
         if np.isfinite(problem.energy()):
             # All the way the bounds hold exactly; on the way the point may still be outside.
             if length == 1.0:
                 problem.put(np.clip(problem.x, point.lower, point.upper))
-            next_point = Judged(problem, point.lower, point.upper, point.left * (1.0 - length))
+            next_point = Judged(problem, point.lower, point.upper, left)
             if not next_point.broken:
-                found.best, found.inner, found.steps = (
-                    next_point,
-                    found.inner + its,
-                    found.steps + 1,
-                )
+                progress.advance(next_point)
+                progress.inner += iterations
                 return
         length *= 0.5
-    found.failure = (
+    progress.failure = (
         "Dirichlet conditions or bounds lead where the energy is not a number: take a smaller "
         "load step"
     )
 
 
 @np.errstate(over="ignore", invalid="ignore")  # energies that have no minimum
-def descend(found: Ended, tolerance: float, limit: int, layers: OptionLayers) -> None:
-    """Go down from the best point until it is a local minimum. Collective."""
-    point = found.best
+def descend(progress: Progress, tolerance: float, limit: int, layers: OptionLayers) -> None:
+    """Go down from the best point until it is a local minimum. Collective.
+
+    Args:
+        progress: where the descent is; it gets the new best points, or a failure.
+        tolerance: the largest residual of the certificate.
+        limit: number of steps, at most.
+        layers: options of the preconditioner.
+    """
+    point = progress.best
     energy = point.problem.energy()
     if point.broken or not np.isfinite(energy):
-        found.failure = NOT_A_NUMBER
+        progress.failure = NOT_A_NUMBER
     else:
-        _follow(found, energy, tolerance, limit, layers)
+        _follow(progress, energy, tolerance, limit, layers)
 
 
 def _follow(
-    found: Ended, energy: float, tolerance: float, limit: int, layers: OptionLayers
+    progress: Progress, energy: float, tolerance: float, limit: int, layers: OptionLayers
 ) -> None:
-    """Take steps with a trust region from the best point, whose energy is given. Collective."""
-    point = found.best
+    """Take steps with a trust region from the best point. Collective.
+
+    Args:
+        progress: where the descent is.
+        energy: of its best point.
+        tolerance: the largest residual of the certificate.
+        limit: number of steps, at most.
+        layers: options of the preconditioner.
+    """
+    point = progress.best
     problem = point.problem
     model = Model(point, layers)
-    radius = first = FIRST_RADIUS * model.jacobi_step()
+    first = FIRST_RADIUS * model.jacobi_step()
+    radius = first
     # the length of a step along negative curvature, as a share of the first one that is tried
-    shrunk = 1.0
+    share = 1.0
     while True:
-        done = point.certificate.worst <= tolerance
-        if done:
-            # First-order conditions hold. A maximum or a saddle is left along a direction of
-            # negative curvature.
-            step, its = model.downward(shrunk)
-            found.inner += its
-            if step is None:
-                break
-            radius = first = model.length(step)
-        else:
-            step, its = model.minimise(radius)
-            found.inner += its
-        if found.steps >= limit or radius > UNBOUNDED * first:
-            found.failure = TOO_FEW if found.steps >= limit else NO_DESCENT
+        # A step: where first-order conditions hold, a maximum or a saddle is left along a direction
+        # of negative curvature; elsewhere to the minimum of the model within the region.
+        is_stationary = point.certificate.worst <= tolerance
+        step, iterations = model.downward(share) if is_stationary else model.minimise(radius)
+        progress.inner += iterations
+        if step is None:
+            break
+        if is_stationary:
+            first = model.length(step)
+            radius = first
+        if progress.steps >= limit or radius > UNBOUNDED * first:
+            progress.failure = TOO_FEW if progress.steps >= limit else NO_DESCENT
             break
         length = model.length(step)
         trial, ratio = _try_step(model, point, step, energy)
         radius = _trust(radius, length, ratio)
 
+        # A step that brings enough is taken, unless nothing can be judged where it leads.
         if ratio > ACCEPTED:
             next_point = Judged(problem, point.lower, point.upper)
             if not next_point.broken:
                 model.close()
-                point, energy = next_point, trial
+                point = next_point
+                energy = trial
                 model = Model(point, layers)
-                found.best, found.steps, shrunk = point, found.steps + 1, 1.0
+                progress.advance(point)
+                share = 1.0
                 continue
             # Judging the broken point has replaced the Jacobian of this one: judge it again.
             model.close()
             problem.put(point.x)
             point = Judged(problem, point.lower, point.upper)
-            model, radius = Model(point, layers), 0.25 * length
-        if done:
-            # Too far in this direction: shorter, until what is promised is rounding of the energy.
-            shrunk *= 0.25
-            if shrunk <= SHORTEST:
+            model = Model(point, layers)
+            radius = SHRINK * length
+
+        # Too far: shorter, until what is promised is rounding of the energy.
+        if is_stationary:
+            share *= SHRINK
+            if share <= SHORTEST:
                 break
         elif radius <= SHORTEST * first:
-            found.failure = NO_DESCENT
+            progress.failure = NO_DESCENT
             break
     model.close()
 
 
 def _try_step(model: Model, point: Judged, step: Array, energy: float) -> tuple[float, float]:
-    """Write the point after a step into u.
+    """Write the point after a step into u. Collective.
+
+    Args:
+        model: the quadratic model.
+        point: where it was made.
+        step: (n,).
+        energy: of the point.
 
     Returns:
         The energy there, and what was gained over what the model promises; -inf where it promises
         nothing.
     """
-    problem, promised = point.problem, -model.value(step)
+    problem = point.problem
+    promised = -model.value(step)
     problem.put(np.clip(point.x + step, point.lower, point.upper))
     trial = problem.energy()
     gained = energy - trial
+    # Differences of energies lose digits that the work of the forces has.
     if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
         gained = -0.5 * problem.dot(point.F + problem.residual(), step)
     return trial, gained / promised if promised > 0.0 else -np.inf
 
 
 def _trust(radius: float, length: float, ratio: float) -> float:
-    """Return the next radius: smaller after a poor step, larger after a good one at the edge."""
+    """Return the next radius: smaller after a poor step, larger after a good one at the edge.
+
+    Args:
+        radius: the present one.
+        length: of the step.
+        ratio: what it gained over what was promised.
+    """
     if ratio < POOR:
-        return 0.25 * length
-    return 4.0 * radius if ratio > GOOD and length > 0.9 * radius else radius
+        return SHRINK * length
+    is_at_edge = length > AT_EDGE * radius
+    return GROW * radius if ratio > GOOD and is_at_edge else radius

@@ -7,7 +7,7 @@ From there conjugate gradients run on the unknowns that are off their bounds, so
 round may bring others onto them.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -26,25 +26,41 @@ PROBED = 1e-8  # reduction of the residual of the search for negative curvature
 PART = 0.02  # of the energy, by which the first step along negative curvature changes it
 EVEN = 1e-9  # of the energy: two sides of a hill that differ by less are equal
 MOST = 2000  # conjugate gradient iterations of a round
+CAUCHY_HALVINGS = 60  # of a Cauchy step
+SEARCH_HALVINGS = 30  # of a projected search
+FLAT = 1e-12  # of the curvature of the diagonal: a curvature that rounding may bring about
 
 
 class Model:
-    """Hold the quadratic model about a judged point; ``close`` frees its preconditioners."""
+    """Hold the quadratic model about a judged point; ``close`` frees its preconditioners.
+
+    Attributes:
+        point, problem: the judged point, and its problem.
+        x, F, J, diagonal: those of the point, of free unknowns.
+        low, high: bounds of steps s.
+    """
 
     def __init__(self, point: Judged, layers: OptionLayers) -> None:
-        self.point, self.layers, self.problem = point, layers, point.problem
-        self.x, self.F, self.J, self.diagonal = point.x, point.F, point.A, point.diagonal
+        """Make the model of a point; ``layers`` are options of the preconditioner."""
+        self.point = point
+        self.layers = layers
+        self.problem = point.problem
+        self.x = point.x
+        self.F = point.F
+        self.J = point.A
+        self.diagonal = point.diagonal
         # Where x lies outside the bounds, a step of zero length does too, and the first one leads
         # between them.
-        self.low, self.high = point.lower - self.x, point.upper - self.x
-        self._kept: tuple[Mask, PetscMatrix, Preconditioner] | None = None
+        self.low = point.lower - self.x
+        self.high = point.upper - self.x
+        self._block: Block | None = None
 
     def close(self) -> None:
         """Free what the model made. Collective."""
-        if self._kept is not None:
-            self._kept[1].mat.destroy()
-            self._kept[2].close()
-        self._kept = None
+        if self._block is not None:
+            self._block.matrix.mat.destroy()
+            self._block.precondition.close()
+        self._block = None
 
     def value(self, s: Array) -> float:
         """Return q(s). Collective."""
@@ -59,16 +75,16 @@ class Model:
 
         Collective.
         """
-        return self.length(self._projected(-self.F / self.diagonal))
+        return self.length(self._clip(-self.F / self.diagonal))
 
     def minimise(self, radius: float) -> tuple[Array, int]:
-        """Return (s, iterations of conjugate gradients).
+        """Return a step s, and the iterations of conjugate gradients that it took. Collective.
 
-        q(s) is well below that of the Cauchy step. Collective.
+        q(s) is well below that of the Cauchy step, and |s| is not above the radius.
         """
         s = self._cauchy(radius)
         residual = self.F + self.J @ s
-        first = self._free_size(residual, self._off_bounds(self._projected(0.0 * s)))
+        first = self._free_size(residual, self._off_bounds(self._clip(0.0 * s)))
         count = 0
         for _ in range(ROUNDS):
             free = self._off_bounds(s)
@@ -76,33 +92,39 @@ class Model:
             if size <= SMALLEST * first or not self.problem.count(free):
                 break
             # Superlinear convergence: the closer to the minimum, the more exact the step.
-            aim = min(
-                FORCING,
-                max(SMALLEST, self.point.certificate.worst if not self.point.left else FORCING),
-            )
-            w, its, ended = self._conjugate_gradients(free, s, residual, radius, aim)
-            count += its
-            s_next = self._search(s, w, residual)
-            if s_next is None:
+            aim = FORCING
+            if not self.point.left:
+                aim = min(FORCING, max(SMALLEST, self.point.certificate.worst))
+            w, iterations, early = self._conjugate_gradients(free, s, residual, radius, aim)
+            count += iterations
+            next_s = self._search(s, w, residual)
+            if next_s is None:
                 break
-            s = s_next
+            s = next_s
             residual = self.F + self.J @ s
-            same = np.array_equal(self._off_bounds(s), free)
-            if ended or self.problem.all(same):
+            is_same = np.array_equal(self._off_bounds(s), free)
+            if early or self.problem.all(is_same):
                 break  # the edge of the region is reached, or no further bound
         return s, count
 
     def downward(self, share: float) -> tuple[Array | None, int]:
-        """Return (s, iterations), a step along a direction of negative curvature.
+        """Find a step along a direction of negative curvature. Collective.
 
         The direction is on the unknowns that no bound holds, and the step on the side where the
-        energy is lower. s is None where conjugate gradients find no such direction. Its length is
-        this share of one that, by the curvature, changes the energy by a part of its size.
-        Collective.
+        energy is lower.
+
+        Args:
+            share: of the length by which, as the curvature says, the energy changes by a part of
+                its size.
+
+        Returns:
+            The step s, None where conjugate gradients find no such direction, and their iterations.
         """
-        direction, its = self._negative()
+        direction, iterations = self._negative_direction()
         if direction is None:
-            return None, its
+            return None, iterations
+
+        # The length.
         self.problem.put(self.x)
         energy = abs(self.problem.energy())
         curvature = -self.problem.dot(direction, self.J @ direction)
@@ -111,28 +133,30 @@ class Model:
         if length == 0.0:
             length = self.length(np.full_like(self.x, self.problem.size or 1.0))
         s = direction * (share * length / self.length(direction))
-        sides = [self._projected(one) for one in (s, -s)]
+
+        # The side. Of two that differ by rounding the first is taken, whatever the number of ranks.
+        sides = [self._clip(s), self._clip(-s)]
         energies = []
-        for one in sides:
-            self.problem.put(self.x + one)
+        for side in sides:
+            self.problem.put(self.x + side)
             energies.append(self.problem.energy())
-        # Of two sides that differ by rounding the first is taken, whatever the number of ranks.
-        second = energies[0] > energies[1] + EVEN * abs(energies[1])
-        return sides[1] if second else sides[0], its
+        is_second_lower = energies[0] > energies[1] + EVEN * abs(energies[1])
+        return sides[1] if is_second_lower else sides[0], iterations
 
     def curves_down(self) -> bool:
         """Say whether a direction of negative curvature is found. Collective.
 
         It is sought on the unknowns that no bound holds.
         """
-        return self._negative()[0] is not None
+        direction, _ = self._negative_direction()
+        return direction is not None
 
-    def _projected(self, s: Array) -> Array:
+    def _clip(self, s: Array) -> Array:
         """Return the nearest step that ends between the bounds."""
         return np.clip(s, self.low, self.high)
 
     def _off_bounds(self, s: Array) -> Mask:
-        """Where x + s is between its bounds and not on one."""
+        """Return where x + s is between its bounds and not on one."""
         return np.asarray((s > self.low) & (s < self.high))
 
     def _free_size(self, residual: Array, free: Mask) -> float:
@@ -141,21 +165,19 @@ class Model:
         return float(np.sqrt(self.problem.dot(r, r / self.diagonal[free])))
 
     def _cauchy(self, radius: float) -> Array:
-        """Return a step along the projected direction of steepest descent.
+        """Return a step along the projected direction of steepest descent, within the radius.
 
-        It brings a part of what the slope promises.
+        It is so short, by halvings, that it brings a part of what the slope promises.
         """
-        start = self._projected(np.zeros_like(self.x))  # zero, unless x lies outside the bounds
+        start = self._clip(np.zeros_like(self.x))  # zero, unless x lies outside the bounds
         direction = -(self.F + self.J @ start) / self.diagonal
         base = self.value(start)
         alpha = 1.0
-        for _ in range(60):
-            s = self._projected(start + alpha * direction)
+        for _ in range(CAUCHY_HALVINGS):
+            s = self._clip(start + alpha * direction)
             slope = -self.problem.dot(s - start, self.diagonal * direction)
-            if (
-                self.length(s) <= max(radius, self.length(start))
-                and self.value(s) - base <= DESCENT * slope
-            ):
+            is_near = self.length(s) <= max(radius, self.length(start))
+            if is_near and self.value(s) - base <= DESCENT * slope:
                 return s
             alpha *= 0.5
         return start
@@ -163,50 +185,81 @@ class Model:
     def _search(self, s: Array, w: Array, residual: Array) -> Array | None:
         """Return the longest step s + beta w, brought between the bounds, that makes q smaller.
 
-        It is None where none does.
+        Args:
+            s: a step.
+            w: the direction.
+            residual: F + J s.
+
+        Returns:
+            The step, None where no beta = 1, 1/2, 1/4, … makes q smaller.
         """
-        base, beta = self.value(s), 1.0
-        for _ in range(30):
-            trial = self._projected(s + beta * w)
+        base = self.value(s)
+        beta = 1.0
+        for _ in range(SEARCH_HALVINGS):
+            trial = self._clip(s + beta * w)
             slope = self.problem.dot(residual, trial - s)
             if slope < 0.0 and self.value(trial) - base <= DESCENT * slope:
                 return trial
             beta *= 0.5
         return None
 
-    def _block(self, free: Mask) -> tuple[PetscMatrix, "Preconditioner"]:
-        """J on the free unknowns and its preconditioner; the last one is kept."""
-        if self._kept is None or not self.problem.all(np.array_equal(self._kept[0], free)):
+    def _block_on(self, free: Mask) -> "Block":
+        """Return J on the free unknowns with its preconditioner, the last one if it is the same.
+
+        Collective.
+        """
+        is_same = self._block is not None and np.array_equal(self._block.free, free)
+        if self._block is None or not self.problem.all(is_same):
             self.close()
-            block = as_petsc(PetscAlgebra(self.problem.comm.mpi).block(self.J, free))
-            self._kept = free, block, Preconditioner(block, self.layers)
-        return self._kept[1], self._kept[2]
+            matrix = as_petsc(PetscAlgebra(self.problem.comm.mpi).block(self.J, free))
+            self._block = Block(free, matrix, Preconditioner(matrix, self.layers))
+        return self._block
 
     def _conjugate_gradients(
         self, free: Mask, s: Array, residual: Array, radius: float, aim: float
     ) -> tuple[Array, int, bool]:
-        """Return (w, iterations, whether it ended early), w on the free unknowns.
+        """Solve J w = -residual on the free unknowns, as far as the radius allows. Collective.
 
-        J w = -residual or as far towards it as the radius allows, counted from x. Directions of
-        negative curvature are followed to the edge (T. Steihaug, 1983).
+        Directions of negative curvature are followed to the edge of the region (T. Steihaug, 1983).
+
+        Args:
+            free: unknowns that may move.
+            s: the step so far.
+            residual: F + J s.
+            radius: of the region about x.
+            aim: reduction of the residual at which it ends.
+
+        Returns:
+            w, zero but for the free unknowns; the iterations; and whether it ended early, at the
+            edge or by negative curvature.
         """
-        block, precondition = self._block(free)
-        dot, D, s0 = self.problem.dot, self.diagonal[free], s[free]
-        outside = self.problem.dot(s[~free], self.diagonal[~free] * s[~free])
-        w, r = np.zeros_like(s0), -residual[free]
+        _, block, precondition = self._block_on(free)
+        dot = self.problem.dot
+        D = self.diagonal[free]
+        s_free = s[free]
+        held_square = dot(s[~free], self.diagonal[~free] * s[~free])
+        w = np.zeros_like(s_free)
+        r = -residual[free]
         z = precondition(r)
-        d, rz, first = z.copy(), dot(r, z), 0.0
-        first, count, early = rz, 0, False
+        d = z.copy()
+        rz = dot(r, z)
+        first = rz
+        count = 0
+        early = False
         while count < MOST and rz > aim**2 * first:
             Jd = block @ d
             curvature = dot(d, Jd)
-            # How far along d the edge of the region is: |s + w + tau d| = radius.
-            a, b, c = (
-                dot(d, D * d),
-                dot(d, D * (s0 + w)),
-                outside + dot(s0 + w, D * (s0 + w)) - radius**2,
-            )
-            edge = (-b + np.sqrt(max(b * b - a * c, 0.0))) / a if np.isfinite(radius) else np.inf
+
+            # How far along d the edge of the region is: |s + w + tau d| = radius, that is
+            # a tau² + 2 b tau + c = 0.
+            reached = s_free + w
+            a = dot(d, D * d)
+            b = dot(d, D * reached)
+            c = held_square + dot(reached, D * reached) - radius**2
+            edge = np.inf
+            if np.isfinite(radius):
+                edge = (-b + np.sqrt(max(b * b - a * c, 0.0))) / a
+
             count += 1
             if curvature <= 0.0 or rz / curvature >= edge:
                 early = True
@@ -218,35 +271,41 @@ class Model:
             w = w + rz / curvature * d
             r = r - rz / curvature * Jd
             z = precondition(r)
-            rz, before = dot(r, z), rz
+            before = rz
+            rz = dot(r, z)
             d = z + rz / before * d
         full = np.zeros_like(s)
         full[free] = w
         return full, count, early
 
-    def _negative(self) -> tuple[Array | None, int]:
-        """Return (a direction of negative curvature of J or None, iterations).
+    def _negative_direction(self) -> tuple[Array | None, int]:
+        """Find a direction of negative curvature of J by conjugate gradients. Collective.
 
-        The direction is on the unknowns that no bound holds; the iterations are those of conjugate
-        gradients.
+        They solve for a load without symmetry, so that each negative eigenvalue has a part in it,
+        and meet a direction of negative curvature if there is one, but for rounding.
+
+        Returns:
+            A direction on the unknowns that no bound holds, None where none is met, and the number
+            of iterations.
         """
-        free = (
-            self._off_bounds(np.zeros_like(self.x))
-            & (self.point.push[0] == 0.0)
-            & (self.point.push[1] == 0.0)
-        )
+        push_up, push_down = self.point.push
+        free = self._off_bounds(np.zeros_like(self.x)) & (push_up == 0.0) & (push_down == 0.0)
         if not self.problem.count(free):
             return None, 0
         load = self.diagonal * _uneven(self.problem.places())
-        block, precondition = self._block(free)
-        dot, r = self.problem.dot, load[free]
+        _, block, precondition = self._block_on(free)
+        dot = self.problem.dot
+        r = load[free]
         z = precondition(r)
-        d, rz = z.copy(), dot(r, z)
-        first, count = rz, 0
+        d = z.copy()
+        rz = dot(r, z)
+        first = rz
+        count = 0
         while count < MOST and rz > PROBED**2 * first:
-            Jd, count = block @ d, count + 1
+            Jd = block @ d
+            count += 1
             curvature = dot(d, Jd)
-            if curvature < -1e-12 * dot(d, self.diagonal[free] * d):
+            if curvature < -FLAT * dot(d, self.diagonal[free] * d):
                 full = np.zeros_like(self.x)
                 full[free] = d
                 return full, count
@@ -254,19 +313,28 @@ class Model:
                 break
             r = r - rz / curvature * Jd
             z = precondition(r)
-            rz, before = dot(r, z), rz
+            before = rz
+            rz = dot(r, z)
             d = z + rz / before * d
         return None, count
 
 
-class Preconditioner:
-    """Apply an approximate inverse of a symmetric matrix.
+class Block(NamedTuple):
+    """Hold J on some unknowns."""
 
-    It is positive definite also where the matrix is not: PETSc's incomplete Cholesky factor, which
-    shifts what would not be.
+    free: Mask
+    matrix: PetscMatrix
+    precondition: "Preconditioner"
+
+
+class Preconditioner:
+    """Apply an approximate inverse of a symmetric matrix, PETSc's incomplete Cholesky factor.
+
+    It is positive definite also where the matrix is not, as PETSc shifts pivots that would not be.
     """
 
     def __init__(self, block: PetscMatrix, layers: OptionLayers) -> None:
+        """Make it of a matrix, as the options say. Collective."""
         self._x, self._y = block.mat.createVecs()
         self._pc = PETSc.PC().create(block.mat.comm)
         self._pc.setOptionsPrefix(layers.prefix)
@@ -282,8 +350,8 @@ class Preconditioner:
 
     def close(self) -> None:
         """Free the PETSc objects. Collective."""
-        for one in (self._pc, self._x, self._y):
-            one.destroy()
+        for item in (self._pc, self._x, self._y):
+            item.destroy()
 
 
 def _set_up(pc: Any, _layers: OptionLayers) -> None:

@@ -44,11 +44,17 @@ UNHELD = (
 
 
 @dataclass
-class Ended:
-    """Hold where a method stopped.
+class Progress:
+    """Hold how far a method has come.
 
-    This is the best u, whether all conditions were met from the start, how many steps it took, with
-    which inner method, what failed, and whether a method for positive Jacobians did.
+    Attributes:
+        best: the best u so far, judged.
+        at_once: whether all conditions were met from the start.
+        steps: number of steps.
+        inner: number of iterations of the inner method in them.
+        method: the inner method of the last step.
+        failure: why it stopped without an answer; empty where it has one or goes on.
+        doubted: whether an inner method for positive Jacobians has failed.
     """
 
     best: Judged
@@ -59,14 +65,25 @@ class Ended:
     failure: str = ""
     doubted: bool = False
 
+    def advance(self, best: Judged) -> None:
+        """Count a step that has led to a better u."""
+        self.best = best
+        self.steps += 1
+
 
 def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -> Judged:
     """Write where to begin into u, and judge it. Collective.
 
-    Where conditions and bounds change a problem that is not linear, this is u as it was given; a
-    small change, which leaves forces hardly larger than the linear step that carries it would, is
-    written into u at once unless told to ``carry`` it. Else, and where F is not a number at this u,
-    it is u with the conditions and between the bounds.
+    Where conditions and bounds change a problem that is not linear, this is u as it was given, and
+    the first step carries the change. Elsewhere, and where F is not a number at this u, it is u
+    with the conditions and between the bounds.
+
+    Args:
+        problem: with u as it was given.
+        lower: (n,) bounds of the free unknowns from below.
+        upper: (n,) from above.
+        carry: True to carry small changes too; False to write into u at once what leaves forces
+            hardly larger than the linear step that carries it would.
     """
     given = problem.x
     if not problem.constant and problem.moves(lower, upper):
@@ -89,34 +106,48 @@ def solve_in_parts(
     settings: Volume,
     methods: Sequence[Method],
     limit: int,
-    *,
-    carry: bool = True,
-) -> Ended:
-    """Return where Newton's method ends.
+) -> Progress:
+    """Return where Newton's method ends. Collective.
 
     Where it fails as Dirichlet conditions change the first guess too much at once, they change it
-    in parts, each from the answer of the part before. Collective.
+    in parts, each from the answer of the part before.
+
+    Args:
+        problem: with u as it was given.
+        lower: (n,) bounds of the free unknowns from below.
+        upper: (n,) from above.
+        settings: of the methods for linear problems, with the tolerance of the answer.
+        methods: those to take; none for those that suit.
+        limit: number of steps, at most.
     """
     moves = not problem.constant and problem.moves(lower, upper)
     whole = newton(problem, lower, upper, settings, methods, limit, carry=False)
     if not whole.failure or not moves:
         return whole
+
+    # Half of the change first, or all of it where it was written into u at once; of a part that
+    # fails half.
     problem.put_back()
-    reached, part, steps, inner = 0.0, 1.0 if whole.at_once else 0.5, whole.steps, whole.inner
+    reached = 0.0
+    part = 1.0 if whole.at_once else 0.5
+    steps = whole.steps
+    inner = whole.inner
     while part >= SMALLEST_PART:
         before = np.array(problem.u.x.array)
         problem.aim(reached + part)
-        found = newton(problem, lower, upper, settings, methods, min(limit, STEPS_OF_A_PART))
-        steps, inner = steps + found.steps, inner + found.inner
-        if found.failure:
+        progress = newton(problem, lower, upper, settings, methods, min(limit, STEPS_OF_A_PART))
+        steps += progress.steps
+        inner += progress.inner
+        if progress.failure:
             problem.u.x.array[:] = before
             part *= 0.5
             continue
-        problem.put(found.best.x)
+        problem.put(progress.best.x)
         reached += part
         if reached == 1.0:
-            found.steps, found.inner = steps, inner
-            return found
+            progress.steps = steps
+            progress.inner = inner
+            return progress
     problem.put_back()
     return whole
 
@@ -130,88 +161,125 @@ def newton(
     limit: int,
     *,
     carry: bool = True,
-) -> Ended:
+) -> Progress:
     """Return where Newton's method ends: below the tolerance of the settings, or with a failure.
 
     Collective.
+
+    Args:
+        problem: with u where it begins.
+        lower: (n,) bounds of the free unknowns from below.
+        upper: (n,) from above.
+        settings: of the methods for linear problems, with the tolerance of the answer.
+        methods: those to take; none for those that suit.
+        limit: number of steps, at most.
+        carry: see ``begin``.
     """
     point = begin(problem, lower, upper, carry=carry)
-    found = Ended(point, at_once=point.left == 0.0)
+    progress = Progress(point, at_once=point.left == 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
     limit = min(limit, REFINEMENTS) if problem.constant else limit
-    while found.best.certificate.worst > settings.tolerance:
+    while progress.best.certificate.worst > settings.tolerance:
         if point.broken:
-            found.failure = NO_STEP if found.steps else NOT_A_NUMBER
-            return found
-        if found.steps == limit:
-            found.failure = "give a better first guess in u, or more iterations"
-            return found
-        left = take_step(found, point, steps)
-        found.doubted = bool(steps.failed)
+            progress.failure = NO_STEP if progress.steps else NOT_A_NUMBER
+            return progress
+        if progress.steps == limit:
+            progress.failure = "give a better first guess in u, or more iterations"
+            return progress
+        left = take_step(progress, point, steps)
+        progress.doubted = bool(steps.failed)
         if left is None:
-            return found
+            return progress
         point = Judged(problem, lower, upper, left)
-        found.steps += 1
-        if point.certificate.worst < found.best.certificate.worst or found.best.left:
-            found.best = point
-    return found
+        progress.steps += 1
+        is_better = point.certificate.worst < progress.best.certificate.worst
+        if is_better or progress.best.left:
+            progress.best = point
+    return progress
 
 
-def take_step(found: Ended, point: Judged, steps: LinearSteps) -> float | None:
-    """Take one step from a point, in u, and return what is then left.
+def take_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
+    """Take one step from a point, in u. Collective.
 
-    It goes towards the answer of the linear problem between the bounds or, where this one is not
-    found or leads nowhere, is a reduced step. Returned is the share of the change of held unknowns
-    that is then left; it is None, and the reason in ``found``, where neither helps. Collective.
+    It goes towards the answer of the linear problem between the bounds or, where this one has no
+    answer or leads nowhere, is a reduced step.
+
+    Args:
+        progress: gets the reason where neither helps.
+        point: where the step begins.
+        steps: solves linear problems.
+
+    Returns:
+        The share of the change of held unknowns that is then left; None where neither helps.
     """
     # Where all methods have failed before, the tangents are not positive: a reduced step costs one
     # factor.
-    ways = [linear_step, reduced] if steps.helps else [reduced, linear_step]
+    ways = [take_linear_step, take_reduced_step]
+    if not steps.helps:
+        ways.reverse()
     if point.problem.constant:
-        ways = [linear_step]
-    for way in ways:
-        left = way(found, point, steps)
+        ways = [take_linear_step]
+    for take in ways:
+        left = take(progress, point, steps)
         if left is not None:
-            found.failure = ""
+            progress.failure = ""
             return left
     return None
 
 
-def linear_step(found: Ended, point: Judged, steps: LinearSteps) -> float | None:
-    """Go towards the answer of the linear problem between the bounds; None if that fails.
+def take_linear_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
+    """Go towards the answer of the linear problem between the bounds. Collective.
 
-    Collective.
+    Args:
+        progress: gets the reason where it fails.
+        point: where the step begins.
+        steps: solves linear problems.
+
+    Returns:
+        The share of the change of held unknowns that is then left; None where it fails.
     """
     start = np.clip(point.x, point.lower, point.upper)
     try:
-        x, its, found.method = steps.solve(point.A, point.b, point.lower, point.upper, start)
+        x, iterations, progress.method = steps.solve(
+            point.A, point.b, point.lower, point.upper, start
+        )
     except StepFailure as failure:
-        found.failure = UNHELD if point.problem.constant else NO_STEP
+        progress.failure = UNHELD if point.problem.constant else NO_STEP
         log.debug("vi.solve: %s", failure)
         return None
-    found.inner += its
-    found.failure = NO_STEP
+    progress.inner += iterations
+    progress.failure = NO_STEP
     return advance(point, x)
 
 
-def reduced(found: Ended, point: Judged, steps: LinearSteps) -> float | None:
-    """Take a reduced step; None if that fails. Collective."""
-    found.failure = NO_STEP
+def take_reduced_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
+    """Take a reduced step. Collective.
+
+    Args:
+        progress: gets the reason where it fails.
+        point: where the step begins.
+        steps: solves linear problems.
+
+    Returns:
+        The share of the change of held unknowns that is then left; None where it fails.
+    """
+    progress.failure = NO_STEP
     try:
         left = advance(point, reduced_step(point))
     except StepFailure as failure:
         log.debug("vi.solve: %s", failure)
         return None
     if left is not None:
-        found.inner, found.method = found.inner + 1, "reduced step"
+        progress.inner += 1
+        progress.method = "reduced step"
     return left
 
 
 def advance(point: Judged, target: Array) -> float | None:
-    """Go from a point towards the target as far as is an improvement, in u.
+    """Go from a point towards the target, in u, as far as the natural residual falls. Collective.
 
-    Returned is the share of the change of held unknowns that is then left, None where no length
-    helps. Collective.
+    Returns:
+        The share of the change of held unknowns that is then left; None where no length helps.
     """
     problem = point.problem
     if problem.constant:
@@ -221,9 +289,12 @@ def advance(point: Judged, target: Array) -> float | None:
     # rounding.
     lower = np.minimum(point.lower, np.minimum(point.x, target))
     upper = np.maximum(point.upper, np.maximum(point.x, target))
-    step, natural = target - point.x, point.natural(point.x, point.F)
+    step = target - point.x
+    natural = point.natural(point.x, point.F)
     for length in 0.5 ** np.arange(HALVINGS):
-        x, left = np.clip(point.x + length * step, lower, upper), point.left * (1.0 - length)
-        if point.natural(x, point.put(x, left)) <= (1.0 - 2.0 * ARMIJO * length) * natural:
+        x = np.clip(point.x + length * step, lower, upper)
+        left = point.left * (1.0 - length)
+        F = point.put(x, left)
+        if point.natural(x, F) <= (1.0 - 2.0 * ARMIJO * length) * natural:
             return float(left)
     return None

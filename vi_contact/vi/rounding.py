@@ -16,14 +16,17 @@ FAR = 1e4
 
 
 def size_of_field(values: Array, lower: Array, upper: Array, comm: Comm) -> float:
-    """Return the largest finite number among the values of a field and its bounds.
-
-    It is the same on all ranks.
+    """Return the largest finite number among the values of a field and its bounds. Collective.
 
     Users write 1e7 or 1e20 where there is no bound. Such walls say nothing of the size of the
     field: the largest numbers are left out for as long as they lie on the far side of zero (lower <
-    0 or upper > 0) and are more than ``FAR`` times as large as the next smaller number. ``values``,
-    ``lower``, ``upper``: (n,) owned. Collective.
+    0 or upper > 0) and are more than ``FAR`` times as large as the next smaller number.
+
+    Args:
+        values: (n,) owned ones.
+        lower: (n,) bounds from below.
+        upper: (n,) bounds from above.
+        comm: of the mesh.
     """
     # Numbers that the field certainly reaches: its own values, and bounds that keep it away from
     # zero.

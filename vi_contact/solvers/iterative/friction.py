@@ -31,8 +31,9 @@ SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
 AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
 # of the largest friction limit: residual at which coefficients that are given are taken anew
 ROUND = 1e-4
-CIRCLES = 15  # Newton steps after which limits are given,
-GIVEN, MOST_GIVEN = 8, 256  # for so many rounds at first, and twice as many every time after
+CIRCLES = 15  # Newton steps after which limits are given
+GIVEN = 8  # rounds for which they are at first, and for twice as many every time after
+MOST_GIVEN = 256  # such rounds
 STEPS = 150  # of Newton
 
 

@@ -28,9 +28,14 @@ from ..volume.options import OptionLayers, Options
 from .layout import Layout, Nodewise
 from .operator import Work
 
-JACOBI, ICC, GAMG = "jacobi", "icc", "gamg"
+JACOBI = "jacobi"
+ICC = "icc"
+GAMG = "gamg"
 KINDS = (JACOBI, ICC, GAMG)
-SMALL, LARGE = 0.5, 30.0  # Courant numbers; CHOSEN: docs/guide/solvers.md has what was measured
+# Courant numbers up to which Jacobi and ICC serve; CHOSEN: docs/guide/solvers.md has what was
+# measured
+SMALL = 0.5
+LARGE = 30.0
 DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
 RENEWALS = 4  # in a step, at most
 FEW_LEVELS = 2  # of a multigrid: with fewer there is nothing for options of levels

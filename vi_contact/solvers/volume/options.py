@@ -113,7 +113,9 @@ class OptionLayers:
         of_ranks = comm.gather(unread_here)
         unread = None
         if of_ranks is not None:  # on the first rank
-            unread = [key for key in of_ranks[0] if all(key in keys for keys in of_ranks)]
+            unread = unread_here
+            for keys in of_ranks:
+                unread = [key for key in unread if key in keys]
         return list(comm.bcast(unread))
 
     def _tell_unread(self, owner: str, comm: Comm) -> None:

@@ -146,7 +146,13 @@ class Lent:
 
 
 def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
-    """Write the bounds of a step into PETSc's vectors, with PETSc's own infinities for none."""
+    """Write the bounds of a step into PETSc's vectors, with PETSc's own infinities for none.
+
+    Args:
+        scaled: has the bounds.
+        lower: a PETSc vector.
+        upper: a PETSc vector.
+    """
     lower.array[:] = np.maximum(scaled.lower, PETSc.NINFINITY)
     upper.array[:] = np.minimum(scaled.upper, PETSc.INFINITY)
 
