@@ -84,21 +84,21 @@ def read(text: TextFile) -> Record:
     """
     header, lines = _parts(text)
     rows = list(text.rows(lines))
-    header, lines, rows, found = _header(text, header, lines, rows)
+    header, lines, rows, facts = _header(text, header, lines, rows)
     if len(rows) < 2 and len(rows[0] if rows else ()) < (3 if text.dt is None else 2):
         raise InputError(f"{text.path}: the file has {len(rows)} samples; give two or more")
     text.refuse_uneven_rows(lines, rows)
     text.refuse_misaligned(lines)
-    step_known = found.step is not None or text.dt is not None
-    leading = _leading(text, lines, rows, found)
-    if not leading and _is_series(text, lines, rows, found, step_known):
-        return _series(text, header, lines, rows, found)
+    step_known = facts.step is not None or text.dt is not None
+    leading = _leading(text, lines, rows, facts)
+    if not leading and _is_series(text, lines, rows, facts, step_known):
+        return _series(text, header, lines, rows, facts)
     if len(rows[-1]) != len(rows[0]):
         raise InputError(
             f"{text.at(lines[-1])}: {len(rows[-1])} columns instead of {len(rows[0])}; a value is "
             "missing, get the complete file"
         )
-    return _component(text, header, lines, np.array(rows), found, leading)
+    return _component(text, header, lines, np.array(rows), facts, leading)
 
 
 def _parts(text: TextFile) -> tuple[list[int], list[int]]:
@@ -145,15 +145,15 @@ def _header(
         lines: indices of the lines of numbers.
         rows: the numbers on these.
     """
-    found = _Header()
+    facts = _Header()
     for index in header:
         match = _OURS.match(text.heads[index])
         if match:
             # Our own files: title, this line, then notes of what was done, which speak of other
             # files and former steps.
-            found.units = (index, canonical_units(text.at(index), match[1]))
-            found.step = (index, text.number(index, match[2]))
-            return header, lines, rows, found
+            facts.units = (index, canonical_units(text.at(index), match[1]))
+            facts.step = (index, text.number(index, match[2]))
+            return header, lines, rows, facts
     counts = find_counts(text, header)
     steps = find_steps(text, header)
     first = _count_and_step(rows) if len(rows) > 2 else None
@@ -166,23 +166,23 @@ def _header(
         header = [*header, *lines[: first.rows]]
         lines = lines[first.rows :]
         rows = rows[first.rows :]
-    found.count = agree(text, "the number of samples", counts)
-    found.step = agree(text, "the time step", steps)
+    facts.count = agree(text, "the number of samples", counts)
+    facts.step = agree(text, "the time step", steps)
 
     # Units and kind of motion, from all lines but that of the heading.
     width = max((len(row) for row in rows), default=0)
-    found.columns = column_heading(text, header, width)
-    columns = found.columns or []
+    facts.columns = column_heading(text, header, width)
+    columns = facts.columns or []
     prose = [index for index in header if not columns or index != columns[0].line]
     if not any(column.kind == "acceleration" for column in columns):
         refuse_other_motion(text, prose)
-    found.units = agree_on_units(text, find_units(text, prose))
-    if found.units is None and not any(column.unit for column in columns):
+    facts.units = agree_on_units(text, find_units(text, prose))
+    if facts.units is None and not any(column.unit for column in columns):
         unknown = find_unknown_units(text, prose)
         if unknown is not None:
             line, name = unknown
             canonical_units(text.at(line), name)
-    return header, lines, rows, found
+    return header, lines, rows, facts
 
 
 class _First(NamedTuple):
@@ -218,7 +218,7 @@ def _count_and_step(rows: Sequence[Sequence[float]]) -> _First | None:
 
 
 def _leading(
-    text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], found: _Header
+    text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], facts: _Header
 ) -> list[int]:
     """Return the columns that are no motion: numbers of samples and, the last of them, the time.
 
@@ -226,8 +226,8 @@ def _leading(
     the first one, if it rises. Rows that follow one another rise together, and have no time.
     """
     width = len(rows[0])
-    if found.columns is not None and len(found.columns) == width:
-        kinds = [column.kind for column in found.columns]
+    if facts.columns is not None and len(facts.columns) == width:
+        kinds = [column.kind for column in facts.columns]
         numbers = [k for k, kind in enumerate(kinds) if kind == "number"]
         if "time" in kinds:
             return [*numbers, kinds.index("time")]
@@ -250,7 +250,7 @@ def _leading(
     rising = bool(np.all(np.diff(first) > 0.0))
     if rising and (width == 2 or len(rows) > 7):
         return [0]
-    if width == 2 and text.dt is None and found.step is None:
+    if width == 2 and text.dt is None and facts.step is None:
         return [0]
     return []
 
@@ -274,7 +274,7 @@ def _is_series(
     text: TextFile,
     lines: Sequence[int],
     rows: Sequence[Sequence[float]],
-    found: _Header,
+    facts: _Header,
     step_known: bool,
 ) -> bool:
     """Tell whether rows are one series.
@@ -285,17 +285,17 @@ def _is_series(
         text: the file.
         lines: indices of the lines of the rows.
         rows: the numbers.
-        found: what the header says; a doubt may be added.
+        facts: what the header says; a doubt may be added.
         step_known: whether the file or its caller states a time step.
     """
     width = len(rows[0])
     values = sum(len(row) for row in rows)
     if width == 1:
         return True
-    if found.columns is not None or text.channel is not None:
+    if facts.columns is not None or text.channel is not None:
         return False
-    if found.count is not None and found.count[1] in (values, len(rows)):
-        return found.count[1] == values
+    if facts.count is not None and facts.count[1] in (values, len(rows)):
+        return facts.count[1] == values
     if len(rows[-1]) != width:
         return width > 2 or step_known
     names = ", ".join(f"{k}: column {k}" for k in range(1, width + 1))
@@ -327,7 +327,7 @@ def _is_series(
             f"{text.at(lines[0])}: {width} columns of which none is a time ({names}); pass "
             "channel= for one of them, or write one value a line where the rows follow one another"
         )
-    found.doubts.append(
+    facts.doubts.append(
         f"rows of {width} values are read one after the other; if the columns are components, pass "
         "channel="
     )
@@ -339,7 +339,7 @@ def _series(
     header: Sequence[int],
     lines: Sequence[int],
     rows: Sequence[Sequence[float]],
-    found: _Header,
+    facts: _Header,
 ) -> Record:
     """Return the record of values that follow one another.
 
@@ -348,7 +348,7 @@ def _series(
         header: indices of the lines of the header.
         lines: indices of the lines of the rows.
         rows: the values.
-        found: what the header says.
+        facts: what the header says.
     """
     values, line_of_value = join_rows(lines, rows)
     text.refuse_empty_lines(lines, rows)
@@ -362,10 +362,10 @@ def _series(
             )
     if text.channel is not None:
         text.choose(["acceleration"])
-    if found.count is not None:
-        count_line, count = found.count
+    if facts.count is not None:
+        count_line, count = facts.count
         text.refuse_other_count(count_line, count, len(values))
-    return _record(text, header, found, values, line_of_value, found.dt)
+    return _record(text, header, facts, values, line_of_value, facts.dt)
 
 
 def _component(
@@ -373,7 +373,7 @@ def _component(
     header: Sequence[int],
     lines: Sequence[int],
     table: Array,
-    found: _Header,
+    facts: _Header,
     leading: Sequence[int],
 ) -> Record:
     """Return the record of one column of a table.
@@ -383,7 +383,7 @@ def _component(
         header: indices of the lines of the header.
         lines: indices of the lines of the rows.
         table: (rows, columns), the numbers.
-        found: what the header says.
+        facts: what the header says.
         leading: columns that are no motion, the last of them the time.
     """
     length, width = table.shape
@@ -391,7 +391,7 @@ def _component(
         raise InputError(f"{text.path}: the file has {length} samples; give two or more")
 
     # The accelerations that a heading names, or all columns that may be some.
-    columns = found.columns or [Column(f"column {k + 1}", "", None, 0) for k in range(width)]
+    columns = facts.columns or [Column(f"column {k + 1}", "", None, 0) for k in range(width)]
     motions = [k for k in range(width) if k not in leading]
     accelerations = [k for k in motions if columns[k].kind == "acceleration"]
     places = accelerations or [k for k in motions if columns[k].kind == ""]
@@ -402,31 +402,31 @@ def _component(
             f"{text.at(line)}: the heading names no acceleration ({kinds}); get the file of "
             "accelerations"
         )
-    if found.count is not None:
-        count_line, count = found.count
+    if facts.count is not None:
+        count_line, count = facts.count
         text.refuse_other_count(count_line, count, length)
     place = places[text.choose([columns[k].name for k in places])]
     column = columns[place]
     if column.unit is not None:
         known = canonical_units(text.at(column.line), column.unit)
-        statements = [found.units] if found.units else []
-        found.units = agree_on_units(text, [*statements, (column.line, known)])
+        statements = [facts.units] if facts.units else []
+        facts.units = agree_on_units(text, [*statements, (column.line, known)])
 
     samples = table[:, place]
-    step = found.dt
+    step = facts.dt
     rounding = SAME_STEP
     step_from = "header"
     if leading:
         time_place = leading[-1]
         decimals = text.decimals(lines, time_place)
         samples, step, rounding = _on_times(
-            text, lines, table[:, time_place], samples, found, columns[time_place], decimals
+            text, lines, table[:, time_place], samples, facts, columns[time_place], decimals
         )
         step_from = "times in the file"
     return _record(
         text,
         header,
-        found,
+        facts,
         samples,
         lines if len(samples) == len(lines) else None,
         step,
@@ -441,7 +441,7 @@ def _on_times(
     lines: Sequence[int],
     times: Array,
     samples: Array,
-    found: _Header,
+    facts: _Header,
     column: Column,
     decimals: int | None,
 ) -> tuple[Array, float | None, float]:
@@ -454,12 +454,12 @@ def _on_times(
         lines: index of the line of every time.
         times: (n,), in their unit.
         samples: (n,), at these times.
-        found: what the header says; notes and doubts may be added.
+        facts: what the header says; notes and doubts may be added.
         column: what the heading says of the times.
         decimals: of the times as they are printed; None where they have exponents.
     """
     unit = TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s"))
-    stated = found.dt
+    stated = facts.dt
     given = text.dt if stated is None else stated  # by the file or its caller
     usual = float(np.median(np.diff(times)))
     rising = bool(np.all(np.diff(times) > 0.0))
@@ -472,14 +472,14 @@ def _on_times(
     numbered = usual == 1.0 and unit is None and rises_evenly(times, decimals=decimals)
     other_step = given is not None and given != 1.0
     if column.kind == "number" or (numbered and other_step):
-        found.notes.append("the first column counts the samples")
+        facts.notes.append("the first column counts the samples")
         return samples, stated, SAME_STEP
 
     # Seconds or milliseconds? A time step that is given tells.
     in_ms = given is not None and abs(1e-3 * usual - given) <= 1e-3 * given
     if unit is None and rising and in_ms:
         unit = 1e-3
-        found.doubts.append("the times are taken to be milliseconds, as the time step says")
+        facts.doubts.append("the times are taken to be milliseconds, as the time step says")
     agrees = given is not None and abs(usual - given) <= 1e-3 * given
     if unit is None and rising and usual >= LONGEST_TIME_STEP and not agrees:
         but = "" if given is None else f", but not with a time step of {given:g} s"
@@ -494,23 +494,23 @@ def _on_times(
     step, rounding, uneven = time_step(text, lines, seconds, decimals=decimals, unit=factor)
     if uneven:
         samples = interpolate(seconds, samples, step)
-        found.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
+        facts.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
     elif given is not None and abs(step - given) <= rounding * given:
         step = given if rounding > SAME_STEP else step
     elif stated is not None:
         raise InputError(
-            f"{text.at(found.step[0] if found.step else 0)}: the header states a time step of "
+            f"{text.at(facts.step[0] if facts.step else 0)}: the header states a time step of "
             f"{stated:g} s but the times count up by {step:g} s; correct the file, or get it again"
         )
     if times[0] != 0.0:
-        found.notes.append(f"the first time in the file is {seconds[0]:g} s and is t = 0 here")
+        facts.notes.append(f"the first time in the file is {seconds[0]:g} s and is t = 0 here")
     return samples, step, max(rounding, SAME_STEP)
 
 
 def _record(
     text: TextFile,
     header: Sequence[int],
-    found: _Header,
+    facts: _Header,
     samples: Sequence[float] | Array,
     lines: Sequence[int] | None,
     step: float | None,
@@ -524,7 +524,7 @@ def _record(
     Args:
         text: the file.
         header: indices of the lines of the header.
-        found: what the header says.
+        facts: what the header says.
         samples: as the file has them.
         lines: index of the line of every sample; None where they were interpolated.
         step: time step [s]; None where nobody states it.
@@ -537,9 +537,9 @@ def _record(
         comment = text.heads[index].strip().lstrip("# ").rstrip()
         if comment or "#" in text.heads[index]:
             comments.append(comment)
-    units_line, units = found.units or (None, None)
-    if found.step is not None and not dt_from.startswith("times"):
-        dt_from = f"header, line {found.step[0] + 1}"
+    units_line, units = facts.units or (None, None)
+    if facts.step is not None and not dt_from.startswith("times"):
+        dt_from = f"header, line {facts.step[0] + 1}"
     return text.record(
         samples,
         units=units,
@@ -548,10 +548,10 @@ def _record(
         lines=lines,
         title=comments[0] if comments else "",
         format="columns",
-        notes=(*comments, *found.notes),
-        counted="counted" if found.count is None else "counted, as the header says",
+        notes=(*comments, *facts.notes),
+        counted="counted" if facts.count is None else "counted, as the header says",
         dt_from=dt_from,
         dt_rounding=rounding,
         component=component,
-        doubts=tuple(found.doubts),
+        doubts=tuple(facts.doubts),
     )

@@ -122,9 +122,12 @@ def read(text: TextFile) -> Record:
     samples, lines = _samples(text, block)
 
     # The units stand on the line of the block, or with a peak that the samples have.
-    stated = [match[1] for match in (pattern.search(line) for pattern in _UNITS) if match]
     units_line: int = block.line
-    units: str | None = stated[0] if stated else None
+    units: str | None = None
+    for pattern in reversed(_UNITS):  # the first one counts
+        match = pattern.search(line)
+        if match:
+            units = match[1]
     if units is None:
         of_peak = _peak_units(text, block, samples)
         if of_peak is not None:
