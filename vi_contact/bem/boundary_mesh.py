@@ -191,6 +191,7 @@ class BoundaryMesh:
         return np.where(chosen & chosen[before], turns, 0.0)
 
     def _mask(self, elements: ArrayLike) -> NDArray[np.bool_]:
+        """Return a mask of elements (n,), or raise InputError where it is none."""
         return mask("BoundaryMesh", "elements", elements, (len(self),))
 
 

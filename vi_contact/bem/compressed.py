@@ -138,8 +138,9 @@ class CompressedBlocks:
         corners = ((0, 0), (4, 4), (8, 6), (10, 4))  # first row and column, over n
         indices = [np.indices((a * n, b * n)).reshape(2, -1) for a, b in shapes]
         indices[2] = indices[2][::-1]
-        moved = [part + n * np.array([at]).T for part, at in zip(indices, corners, strict=True)]
-        rows, columns = np.hstack(moved)
+        for k, (row, column) in enumerate(corners):
+            indices[k] = indices[k] + n * np.array([[row], [column]])
+        rows, columns = np.hstack(indices)
 
         # The entries of K stand there twice.
         of_double = self.places[16 * n**2 : 24 * n**2]

@@ -56,6 +56,7 @@ def march_contact(
     prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
 
     def solve(step: StepProblem) -> StepResult:
+        """Return the answer to a step, or raise StepFailure where its certificate is too large."""
         result = prepared.solve(step)
         certificate = kkt_residual(step, result)
         if not certificate.worst <= tolerance:

@@ -38,7 +38,8 @@ from .fundamental_solution import TimeKernels
 from .quadrature import Orders
 
 DENSE = 50_000_000  # numbers of all blocks beyond which they are compressed
-SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
+SMALLEST_RATIO = 0.05  # of c_P dt / h
+GREATEST_RATIO = 8.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,8 +83,8 @@ def solve_on_circle(
     kept_columns = np.array([m, m // 2][: 1 + len(one_unit)])
     pulls, given = _given_columns(forces, fixed, prescribed, one_unit)
 
-    # To the circle: the transform of what is scaled by R^j.
     def transform(values: Array) -> NDArray:
+        """Return the values at the frequencies: the transform of what is scaled by R^j."""
         return np.fft.rfft(values * scale[:, None, None], count, axis=0)
 
     loads = transform(pulls)

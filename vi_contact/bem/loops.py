@@ -39,7 +39,13 @@ def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
 
 
 def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) -> None:
-    """Raise InputError when a loop does not keep the body on its left."""
+    """Raise InputError when a loop does not keep the body on its left.
+
+    Args:
+        points: (n, 2), nodes, loop after loop [m].
+        sizes: number of nodes of each loop.
+        exterior: whether the body is the unbounded outside.
+    """
     loops = np.split(points, np.cumsum(sizes)[:-1])
     ways = should_run_forward(loops, exterior=exterior)
     for i, (loop, forward) in enumerate(zip(loops, ways, strict=True)):

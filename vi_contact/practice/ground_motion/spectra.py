@@ -85,10 +85,10 @@ def _factors(time: Array | float, length: Array | float, omega: Array, zeta: flo
 
     # Particular motions: under a = 1, and under a = t at 0 and at `time`. Free vibrations are
     # added that make them start from rest.
-    one = np.ones_like(omega)
-    constant = np.array([-one / omega**2, np.zeros_like(omega)])
-    ramp0 = np.array([2.0 * zeta / omega**3, -one / omega**2])
-    ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -one / omega**2])
+    ones = np.ones_like(omega)
+    constant = np.array([-ones / omega**2, np.zeros_like(omega)])
+    ramp0 = np.array([2.0 * zeta / omega**3, -ones / omega**2])
+    ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -ones / omega**2])
     of_one = constant - of_u * constant[0] - of_v * constant[1]
     of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
     small = omega * time < _SMALL

@@ -49,6 +49,7 @@ class CompanionRun:
 
     @cached_property
     def _problem(self) -> ContactProblem:
+        """Return the system, with consistent mass."""
         return replace(self._make(), mass=ConsistentMass())
 
     def bind(self, scheme: Scheme, dt: TimeSteps) -> None:

@@ -1,6 +1,4 @@
-"""Read plain columns.
-
-They are times and one or more accelerations, or accelerations alone, with or without a heading.
+"""Read plain columns: times and one or more accelerations, or accelerations alone.
 
 Accelerations alone are the path series of OpenSees (.th, .g3, .acc): values in one column or row by
 row. Lines before the numbers are read for units, time step, number of samples and names of columns
@@ -13,6 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from .at2 import begin_data
 from .headings import Column, column_heading
 from .statements import (
     TIME_UNITS,
+    Statement,
     agree,
     agree_on_units,
     find_counts,
@@ -32,15 +32,13 @@ from .statements import (
     find_unknown_units,
     refuse_other_motion,
 )
-from .text import NUMBER, SAME_STEP, TextFile
+from .text import NUMBER, SAME_STEP, TextFile, join_rows
 from .times import interpolate, rises_evenly, time_step
 
-LONGEST_TIME_STEP = (
-    0.5  # s; times that count up by more, in a unit that nobody states, may be in ms or be numbers
-)
-INTERLEAVED = (
-    0.5  # columns that are so much smoother than the rows are components, and no series in rows
-)
+# s; times that count up by more, in a unit that nobody states, may be in ms or be numbers.
+LONGEST_TIME_STEP = 0.5
+# Columns that are so much smoother than the rows are components, and no series in rows.
+INTERLEAVED = 0.5
 
 _WORD = re.compile(r"[^\W\d_]{3,}\W*+")
 _NO_VALUE = ("nan", "inf", "infinity", "null", "none", "missing", "nodata")
@@ -50,48 +48,57 @@ _WHOLE = re.compile(r"[\s\d+,;-]++")
 
 
 @dataclass
-class _Found:
-    """Hold what the header says.
+class _Header:
+    """Hold what the header says, and what becomes clear while the numbers are read.
 
-    That is units and their line, time step, number of samples, columns; and what is doubted.
+    Attributes:
+        units: the line that states them, and their key.
+        step: the line that states the time step, and the step [s].
+        count: the line that states the number of samples, and that number.
+        columns: that a heading names.
+        doubts: what was read in one of several ways that were possible.
+        notes: what was done while reading.
     """
 
     units: tuple[int, str] | None = None
-    step: tuple[int, float] | None = None
-    count: tuple[int, float] | None = None
+    step: Statement | None = None
+    count: Statement | None = None
     columns: list[Column] | None = None
     doubts: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def dt(self) -> float | None:
+        """Return the time step that is stated [s], or None."""
+        return None if self.step is None else self.step[1]
 
 
 def read(text: TextFile) -> Record:
     """Return the record of a file of columns.
 
-    `units` and `dt` are needed where the file does not state them.
-
-    Uneven times are refused unless resample_dt [s] is given: see ``time_step``. The first time of
-    the file becomes t = 0. A first column that counts up evenly is a time, or the number of the
-    sample. channel: which of several components, from 1, or its name in the heading. With dt and
-    without channel, rows of three or more values are read one after the other, unless the first
-    column is a time.
+    The caller's units and dt are needed where the file does not state them. Uneven times are
+    refused unless resample_dt is given: see ``time_step``. The first time of the file becomes t =
+    0. A first column that counts up evenly is a time, or the number of the sample. The channel is
+    which of several components, from 1, or its name in the heading. With dt and without channel,
+    rows of three or more values are read one after the other, unless the first column is a time.
     """
     header, lines = _parts(text)
     rows = list(text.rows(lines))
-    header, lines, rows, found = _header(text, header, lines, rows)
+    header, lines, rows, facts = _header(text, header, lines, rows)
     if len(rows) < 2 and len(rows[0] if rows else ()) < (3 if text.dt is None else 2):
         raise InputError(f"{text.path}: the file has {len(rows)} samples; give two or more")
     text.refuse_uneven_rows(lines, rows)
     text.refuse_misaligned(lines)
-    step = text.dt if found.step is None else found.step[1]
-    leading = _leading(text, lines, rows, found)
-    if not leading and _is_series(text, lines, rows, found, step is not None):
-        return _series(text, header, lines, rows, found)
+    step_known = facts.step is not None or text.dt is not None
+    leading = _leading(text, lines, rows, facts)
+    if not leading and _is_series(text, lines, rows, facts, step_known):
+        return _series(text, header, lines, rows, facts)
     if len(rows[-1]) != len(rows[0]):
         raise InputError(
             f"{text.at(lines[-1])}: {len(rows[-1])} columns instead of {len(rows[0])}; a value is "
             "missing, get the complete file"
         )
-    return _component(text, header, lines, np.array(rows), found, leading)
+    return _component(text, header, lines, np.array(rows), facts, leading)
 
 
 def _parts(text: TextFile) -> tuple[list[int], list[int]]:
@@ -118,83 +125,100 @@ def _is_words(line: str) -> bool:
         return False
     if start[:1].isalpha():
         return start.split()[0].strip(",;").lower() not in _NO_VALUE
-    words = [
-        word
-        for word in line.replace(",", " ").split()
-        if _WORD.fullmatch(word) and word.lower() not in _NO_VALUE
-    ]
-    return (
-        bool(words) or bool(line) and bool(_RULER.match(line)) and len(line) > 2 and "*" not in line
-    )
+    for word in line.replace(",", " ").split():
+        if _WORD.fullmatch(word) and word.lower() not in _NO_VALUE:
+            return True
+    is_ruler = _RULER.match(line) is not None
+    return is_ruler and len(line) > 2 and "*" not in line
 
 
 def _header(
     text: TextFile, header: list[int], lines: list[int], rows: list[list[float]]
-) -> tuple[list[int], list[int], list[list[float]], _Found]:
-    """Return the lines of the header, those of the numbers, the numbers.
+) -> tuple[list[int], list[int], list[list[float]], _Header]:
+    """Return the lines of the header, those of the numbers, the numbers, what the header says.
 
-    With them comes what the header says.
+    Numbers of samples and time steps that stand before the samples are moved to the header.
+
+    Args:
+        text: the file.
+        header: indices of the lines of words.
+        lines: indices of the lines of numbers.
+        rows: the numbers on these.
     """
-    found = _Found()
-    ours = next((index for index in header if _OURS.match(text.heads[index])), None)
-    if ours is not None and (match := _OURS.match(text.heads[ours])):
-        # our own files: title, this line, then notes of what was done, which speak of other files
-        # and former steps
-        found.units = (ours, canonical_units(text.at(ours), match[1]))
-        found.step = (ours, text.number(ours, match[2]))
-        return header, lines, rows, found
-    counts, steps = find_counts(text, header), find_steps(text, header)
-    if len(rows) > 2 and (first := _count_and_step(rows)) is not None:
-        # the two lines of eqsig: a label, then number of samples and time step; or the number alone
-        counts, steps = (
-            [*counts, (lines[0], first[0])],
-            [*steps, *((lines[0], one) for one in first[1:2])],
-        )
-        used = 2 if len(first) > 2 else 1
-        header, lines, rows = [*header, *lines[:used]], lines[used:], rows[used:]
+    facts = _Header()
+    for index in header:
+        match = _OURS.match(text.heads[index])
+        if match:
+            # Our own files: title, this line, then notes of what was done, which speak of other
+            # files and former steps.
+            facts.units = (index, canonical_units(text.at(index), match[1]))
+            facts.step = (index, text.number(index, match[2]))
+            return header, lines, rows, facts
+    counts = find_counts(text, header)
+    steps = find_steps(text, header)
+    first = _count_and_step(rows) if len(rows) > 2 else None
+    if first is not None:
+        # The two lines of eqsig: a label, then number of samples and time step; or the number
+        # alone.
+        counts.append((lines[0], first.samples))
+        if first.step is not None:
+            steps.append((lines[0], first.step))
+        header = [*header, *lines[: first.rows]]
+        lines = lines[first.rows :]
+        rows = rows[first.rows :]
+    facts.count = agree(text, "the number of samples", counts)
+    facts.step = agree(text, "the time step", steps)
+
+    # Units and kind of motion, from all lines but that of the heading.
     width = max((len(row) for row in rows), default=0)
-    found.columns = column_heading(text, header, width)
-    told = [index for index in header if not found.columns or index != found.columns[0].line]
-    found.count, found.step = (
-        agree(text, "the number of samples", counts),
-        agree(text, "the time step", steps),
-    )
-    if found.columns is None or not any(one.kind == "acceleration" for one in found.columns):
-        refuse_other_motion(text, told)
-    found.units = agree_on_units(text, find_units(text, told))
-    strange = find_unknown_units(text, told) if found.units is None else None
-    if strange is not None and not any(one.unit for one in found.columns or ()):
-        canonical_units(text.at(strange[0]), strange[1])
-    return header, lines, rows, found
+    facts.columns = column_heading(text, header, width)
+    columns = facts.columns or []
+    prose = [index for index in header if not columns or index != columns[0].line]
+    if not any(column.kind == "acceleration" for column in columns):
+        refuse_other_motion(text, prose)
+    facts.units = agree_on_units(text, find_units(text, prose))
+    if facts.units is None and not any(column.unit for column in columns):
+        unknown = find_unknown_units(text, prose)
+        if unknown is not None:
+            line, name = unknown
+            canonical_units(text.at(line), name)
+    return header, lines, rows, facts
 
 
-def _count_and_step(rows: Sequence[Sequence[float]]) -> tuple[float, ...] | None:
-    """Return the number of samples, and the time step.
+class _First(NamedTuple):
+    """Hold what the first rows of numbers say about the others."""
 
-    They stand before the samples in the first row or two.
+    samples: float  # number of samples
+    step: float | None  # time step [s]
+    rows: int  # how many rows say so
+
+
+def _count_and_step(rows: Sequence[Sequence[float]]) -> _First | None:
+    """Return the number of samples, and the time step, that stand before the samples, or None.
 
     They are two numbers before rows of one, of which the first is whole; or one number, or two on
-    two lines, before exactly as many numbers as it says. A third member tells that two rows were
-    taken.
+    two lines, before exactly as many numbers as it says.
     """
-    first, others = rows[0], rows[1:]
+    first = rows[0]
+    others = rows[1:]
     count = first[0]
     if count != round(count) or count < 2.0:
         return None
     values = sum(len(row) for row in others)
-    single = all(len(row) == 1 for row in others)
-    agrees = count in (values, len(others)) and len(others[0]) != 2
-    if len(first) == 2 and 0.0 < first[1] < 1.0 and (single or agrees):
-        return count, first[1]
+    if len(first) == 2 and 0.0 < first[1] < 1.0:
+        single = all(len(row) == 1 for row in others)
+        agrees = count in (values, len(others)) and len(others[0]) != 2
+        if single or agrees:
+            return _First(count, first[1], 1)
     if len(first) == 1 and count == values:
-        return (count,)
+        return _First(count, None, 1)
     if len(first) == 1 and len(rows[1]) == 1 and 0.0 < rows[1][0] < 1.0 and count == values - 1:
-        return count, rows[1][0], 2.0
+        return _First(count, rows[1][0], 2)
     return None
 
 
 def _leading(
-    text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], found: _Found
+    text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], facts: _Header
 ) -> list[int]:
     """Return the columns that are no motion: numbers of samples and, the last of them, the time.
 
@@ -202,43 +226,43 @@ def _leading(
     the first one, if it rises. Rows that follow one another rise together, and have no time.
     """
     width = len(rows[0])
-    if found.columns is not None and len(found.columns) == width:
-        numbers = [k for k, one in enumerate(found.columns) if one.kind == "number"]
-        times = [k for k, one in enumerate(found.columns) if one.kind == "time"]
-        if times:
-            return [*numbers, times[0]]
-        unnamed = [k for k, one in enumerate(found.columns) if one.kind == ""]
-        return [*numbers, *(k for k in unnamed[:1] if k == 0 and _counts(text, lines, rows, k))]
-    if width < 2 or len(rows[-1]) != width:
+    if facts.columns is not None and len(facts.columns) == width:
+        kinds = [column.kind for column in facts.columns]
+        numbers = [k for k, kind in enumerate(kinds) if kind == "number"]
+        if "time" in kinds:
+            return [*numbers, kinds.index("time")]
+        if kinds[0] == "" and _counts_up(text, lines, rows, 0):
+            return [*numbers, 0]
+        return numbers
+    if width < 2 or len(rows[-1]) != width or _rises_in_rows(rows):
         return []
-    whole_rows = rows if len(rows) > 2 else []
-    if (
-        whole_rows
-        and width > 2
-        and all(row[0] < row[1] < row[2] < after[0] for row, after in pairwise(whole_rows))
-    ):
-        return []  # a series in rows that rises all the time
-    leading = [
-        k for k in range(width - 1) if all(_counts(text, lines, rows, j) for j in range(k + 1))
-    ]
-    if leading:
-        steps = [rows[1][k] - rows[0][k] for k in leading]
-        keep = 2 if len(leading) > 1 and steps[0] == 1.0 and float(rows[0][0]).is_integer() else 1
-        return leading[:keep]
+
+    # The first columns that count up evenly: a time, or numbers of samples and a time.
+    even = 0
+    while even < width - 1 and _counts_up(text, lines, rows, even):
+        even += 1
+    if even:
+        is_number = rows[1][0] - rows[0][0] == 1.0 and float(rows[0][0]).is_integer()
+        return [0, 1] if even > 1 and is_number else [0]
+
+    # A first column that rises; of two columns the first one where nothing else gives a step.
     first = np.array([row[0] for row in rows])
     rising = bool(np.all(np.diff(first) > 0.0))
-    return (
-        [0]
-        if rising
-        and (width == 2 or len(rows) > 7)
-        or width == 2
-        and text.dt is None
-        and found.step is None
-        else []
-    )
+    if rising and (width == 2 or len(rows) > 7):
+        return [0]
+    if width == 2 and text.dt is None and facts.step is None:
+        return [0]
+    return []
 
 
-def _counts(
+def _rises_in_rows(rows: Sequence[Sequence[float]]) -> bool:
+    """Tell whether rows of three or more are a series that rises all the time."""
+    if len(rows) <= 2 or len(rows[0]) <= 2:
+        return False
+    return all(row[0] < row[1] < row[2] < after[0] for row, after in pairwise(rows))
+
+
+def _counts_up(
     text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], column: int
 ) -> bool:
     """Tell whether a column counts up evenly."""
@@ -250,54 +274,64 @@ def _is_series(
     text: TextFile,
     lines: Sequence[int],
     rows: Sequence[Sequence[float]],
-    found: _Found,
+    facts: _Header,
     step_known: bool,
 ) -> bool:
     """Tell whether rows are one series.
 
-    It raises InputError where columns are components, or nobody can tell.
+    Raises InputError where columns are components, or nobody can tell.
+
+    Args:
+        text: the file.
+        lines: indices of the lines of the rows.
+        rows: the numbers.
+        facts: what the header says; a doubt may be added.
+        step_known: whether the file or its caller states a time step.
     """
-    width, values = len(rows[0]), sum(len(row) for row in rows)
+    width = len(rows[0])
+    values = sum(len(row) for row in rows)
     if width == 1:
         return True
-    if found.columns is not None or text.channel is not None:
+    if facts.columns is not None or text.channel is not None:
         return False
-    if found.count is not None and found.count[1] in (values, len(rows)):
-        return found.count[1] == values
+    if facts.count is not None and facts.count[1] in (values, len(rows)):
+        return facts.count[1] == values
     if len(rows[-1]) != width:
         return width > 2 or step_known
-    names = _listed([Column("", "", None, 0)] * width)
+    names = ", ".join(f"{k}: column {k}" for k in range(1, width + 1))
     if not step_known:
-        remedy = (
-            "pass dt= in seconds, and channel= for one of the columns, or write one value a line"
-            if width < 4
-            else "pass dt= in seconds where the rows follow one another, and channel= too where "
-            "the columns are components"
-        )
+        if width < 4:
+            remedy = (
+                "pass dt= in seconds, and channel= for one of the columns, or write one value a "
+                "line"
+            )
+        else:
+            remedy = (
+                "pass dt= in seconds where the rows follow one another, and channel= too where "
+                "the columns are components"
+            )
         raise InputError(
             f"{text.at(lines[0])}: {width} columns instead of 2, and none is a time ({names}); "
             f"{remedy}"
         )
+
+    # A series is smoother from value to value than from row to row, components are smoother down
+    # their columns.
     table = np.array(rows)
     across = float(np.mean(np.abs(np.diff(table.ravel()))))
     along = float(np.mean(np.abs(np.diff(table, axis=0)))) if len(rows) > 1 else np.inf
-    # a series is smoother from value to value than from row to row, components are smoother down
-    # their columns
     components = along < INTERLEAVED * across and len(rows) > 9 and width < 5
-    if components or width < 4 and along < across / INTERLEAVED:
+    may_be_components = width < 4 and along < across / INTERLEAVED
+    if components or may_be_components:
         raise InputError(
             f"{text.at(lines[0])}: {width} columns of which none is a time ({names}); pass "
             "channel= for one of them, or write one value a line where the rows follow one another"
         )
-    found.doubts.append(
+    facts.doubts.append(
         f"rows of {width} values are read one after the other; if the columns are components, pass "
         "channel="
     )
     return True
-
-
-def _listed(columns: Sequence[Column]) -> str:
-    return ", ".join(f"{k}: {one.name or f'column {k}'}" for k, one in enumerate(columns, 1))
 
 
 def _series(
@@ -305,35 +339,33 @@ def _series(
     header: Sequence[int],
     lines: Sequence[int],
     rows: Sequence[Sequence[float]],
-    found: _Found,
+    facts: _Header,
 ) -> Record:
-    """Return the record of values that follow one another."""
-    values = [value for row in rows for value in row]
+    """Return the record of values that follow one another.
+
+    Args:
+        text: the file.
+        header: indices of the lines of the header.
+        lines: indices of the lines of the rows.
+        rows: the values.
+        facts: what the header says.
+    """
+    values, line_of_value = join_rows(lines, rows)
     text.refuse_empty_lines(lines, rows)
-    if (
-        header
-        and len(rows) > 1
-        and len(rows[0]) > 1
-        and _WHOLE.fullmatch(text.lines[lines[0]])
-        and not all(_WHOLE.fullmatch(text.lines[index]) for index in lines)
-    ):
-        raise InputError(
-            f"{text.at(lines[0])}: {shown(text.lines[lines[0]].strip())} are whole numbers and "
-            "others are not, so that they may belong to the header; begin lines of the header with "
-            "#"
-        )
+    if header and len(rows) > 1 and len(rows[0]) > 1:
+        whole = [bool(_WHOLE.fullmatch(text.lines[index])) for index in lines]
+        if whole[0] and not all(whole):
+            raise InputError(
+                f"{text.at(lines[0])}: {shown(text.lines[lines[0]].strip())} are whole numbers and "
+                "others are not, so that they may belong to the header; begin lines of the header "
+                "with #"
+            )
     if text.channel is not None:
         text.choose(["acceleration"])
-    if found.count is not None:
-        text.refuse_other_count(found.count[0], found.count[1], len(values))
-    return _record(
-        text,
-        header,
-        found,
-        values,
-        [index for index, row in zip(lines, rows, strict=True) for _ in row],
-        found.step and found.step[1],
-    )
+    if facts.count is not None:
+        count_line, count = facts.count
+        text.refuse_other_count(count_line, count, len(values))
+    return _record(text, header, facts, values, line_of_value, facts.dt)
 
 
 def _component(
@@ -341,122 +373,144 @@ def _component(
     header: Sequence[int],
     lines: Sequence[int],
     table: Array,
-    found: _Found,
+    facts: _Header,
     leading: Sequence[int],
 ) -> Record:
-    """Return the record of one column of a table."""
-    width = table.shape[1]
-    if table.shape[0] < 2:
-        raise InputError(f"{text.path}: the file has {table.shape[0]} samples; give two or more")
-    columns = found.columns or [Column(f"column {k + 1}", "", None, 0) for k in range(width)]
-    places = [
-        k for k in range(width) if k not in leading and columns[k].kind in ("acceleration", "")
-    ]
-    clear = [k for k in places if columns[k].kind == "acceleration"]
-    places = clear or places
+    """Return the record of one column of a table.
+
+    Args:
+        text: the file.
+        header: indices of the lines of the header.
+        lines: indices of the lines of the rows.
+        table: (rows, columns), the numbers.
+        facts: what the header says.
+        leading: columns that are no motion, the last of them the time.
+    """
+    length, width = table.shape
+    if length < 2:
+        raise InputError(f"{text.path}: the file has {length} samples; give two or more")
+
+    # The accelerations that a heading names, or all columns that may be some.
+    columns = facts.columns or [Column(f"column {k + 1}", "", None, 0) for k in range(width)]
+    motions = [k for k in range(width) if k not in leading]
+    accelerations = [k for k in motions if columns[k].kind == "acceleration"]
+    places = accelerations or [k for k in motions if columns[k].kind == ""]
     if not places:
         line = columns[0].line
-        kinds = ", ".join(f"{one.name}: {one.kind}" for one in columns)
+        kinds = ", ".join(f"{column.name}: {column.kind}" for column in columns)
         raise InputError(
             f"{text.at(line)}: the heading names no acceleration ({kinds}); get the file of "
             "accelerations"
         )
-    if found.count is not None:
-        text.refuse_other_count(found.count[0], found.count[1], table.shape[0])
+    if facts.count is not None:
+        count_line, count = facts.count
+        text.refuse_other_count(count_line, count, length)
     place = places[text.choose([columns[k].name for k in places])]
     column = columns[place]
     if column.unit is not None:
         known = canonical_units(text.at(column.line), column.unit)
-        found.units = agree_on_units(
-            text, [*([found.units] if found.units else []), (column.line, known)]
-        )
+        statements = [facts.units] if facts.units else []
+        facts.units = agree_on_units(text, [*statements, (column.line, known)])
+
     samples = table[:, place]
-    step, rounding, at = found.step and found.step[1], SAME_STEP, "header"
+    step = facts.dt
+    rounding = SAME_STEP
+    step_from = "header"
     if leading:
-        samples, step, rounding = _timed(
-            text, lines, table[:, leading[-1]], samples, found, columns[leading[-1]], leading
+        time_place = leading[-1]
+        decimals = text.decimals(lines, time_place)
+        samples, step, rounding = _on_times(
+            text, lines, table[:, time_place], samples, facts, columns[time_place], decimals
         )
-        at = "times in the file"
-    name = column.name if len(places) > 1 else ""
+        step_from = "times in the file"
     return _record(
         text,
         header,
-        found,
+        facts,
         samples,
         lines if len(samples) == len(lines) else None,
         step,
         rounding=rounding,
-        dt_from=at,
-        component=name,
+        dt_from=step_from,
+        component=column.name if len(places) > 1 else "",
     )
 
 
-def _timed(
+def _on_times(
     text: TextFile,
     lines: Sequence[int],
     times: Array,
     samples: Array,
-    found: _Found,
+    facts: _Header,
     column: Column,
-    leading: Sequence[int],
+    decimals: int | None,
 ) -> tuple[Array, float | None, float]:
     """Return the samples on even times, their step [s] and its rounding.
 
-    The step is None where the numbers are counts.
+    The step is the stated one, or None, where the numbers are counts.
+
+    Args:
+        text: the file.
+        lines: index of the line of every time.
+        times: (n,), in their unit.
+        samples: (n,), at these times.
+        facts: what the header says; notes and doubts may be added.
+        column: what the heading says of the times.
+        decimals: of the times as they are printed; None where they have exponents.
     """
-    unit, stated = (
-        TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s")),
-        found.step and found.step[1],
-    )
-    decimals = text.decimals(lines, leading[-1])
-    told = stated if stated is not None else text.dt
+    unit = TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s"))
+    stated = facts.dt
+    given = text.dt if stated is None else stated  # by the file or its caller
     usual = float(np.median(np.diff(times)))
     rising = bool(np.all(np.diff(times) > 0.0))
     if column.unit is not None and unit is None:
         raise InputError(
             f"{text.at(column.line)}: {column.unit!r} is no unit of time known here; write s or ms"
         )
+
+    # Numbers of samples?
     numbered = usual == 1.0 and unit is None and rises_evenly(times, decimals=decimals)
-    if column.kind == "number" or numbered and (told is not None and told != 1.0):
-        found.notes.append("the first column counts the samples")
+    other_step = given is not None and given != 1.0
+    if column.kind == "number" or (numbered and other_step):
+        facts.notes.append("the first column counts the samples")
         return samples, stated, SAME_STEP
-    if unit is None and rising and told is not None and abs(1e-3 * usual - told) <= 1e-3 * told:
+
+    # Seconds or milliseconds? A time step that is given tells.
+    in_ms = given is not None and abs(1e-3 * usual - given) <= 1e-3 * given
+    if unit is None and rising and in_ms:
         unit = 1e-3
-        found.doubts.append("the times are taken to be milliseconds, as the time step says")
-    if (
-        unit is None
-        and rising
-        and usual >= LONGEST_TIME_STEP
-        and (told is None or abs(usual - told) > 1e-3 * told)
-    ):
+        facts.doubts.append("the times are taken to be milliseconds, as the time step says")
+    agrees = given is not None and abs(usual - given) <= 1e-3 * given
+    if unit is None and rising and usual >= LONGEST_TIME_STEP and not agrees:
+        but = "" if given is None else f", but not with a time step of {given:g} s"
         raise InputError(
             f"{text.at(lines[1])}: the first column counts up by {usual:g}, which may be seconds, "
-            "milliseconds or numbers of samples"
-            + (f", but not with a time step of {told:g} s" if told is not None else "")
-            + "; pass the time step that they mean as dt= in seconds"
+            f"milliseconds or numbers of samples{but}; pass the time step that they mean as dt= in "
+            "seconds"
         )
+
     factor = 1.0 if unit is None else unit
     seconds = times if factor == 1.0 else times * factor
     step, rounding, uneven = time_step(text, lines, seconds, decimals=decimals, unit=factor)
     if uneven:
         samples = interpolate(seconds, samples, step)
-        found.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
-    elif told is not None and abs(step - told) <= rounding * told:
-        step = told if rounding > SAME_STEP else step
+        facts.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
+    elif given is not None and abs(step - given) <= rounding * given:
+        step = given if rounding > SAME_STEP else step
     elif stated is not None:
         raise InputError(
-            f"{text.at(found.step[0] if found.step else 0)}: the header states a time step of "
+            f"{text.at(facts.step[0] if facts.step else 0)}: the header states a time step of "
             f"{stated:g} s but the times count up by {step:g} s; correct the file, or get it again"
         )
     if times[0] != 0.0:
-        found.notes.append(f"the first time in the file is {seconds[0]:g} s and is t = 0 here")
+        facts.notes.append(f"the first time in the file is {seconds[0]:g} s and is t = 0 here")
     return samples, step, max(rounding, SAME_STEP)
 
 
 def _record(
     text: TextFile,
     header: Sequence[int],
-    found: _Found,
+    facts: _Header,
     samples: Sequence[float] | Array,
     lines: Sequence[int] | None,
     step: float | None,
@@ -465,25 +519,39 @@ def _record(
     dt_from: str = "",
     component: str = "",
 ) -> Record:
-    """Return the record, its title and notes from the header."""
-    words = [text.heads[index].strip().lstrip("# ").rstrip() for index in header]
-    comments = tuple(
-        word for index, word in zip(header, words, strict=True) if word or "#" in text.heads[index]
-    )
-    if found.step is not None and not dt_from.startswith("times"):
-        dt_from = f"header, line {found.step[0] + 1}"
+    """Return the record, its title and notes from the header.
+
+    Args:
+        text: the file.
+        header: indices of the lines of the header.
+        facts: what the header says.
+        samples: as the file has them.
+        lines: index of the line of every sample; None where they were interpolated.
+        step: time step [s]; None where nobody states it.
+        rounding: relative difference to the caller's step that counts as rounding.
+        dt_from: where the step comes from.
+        component: name of the column.
+    """
+    comments = []
+    for index in header:
+        comment = text.heads[index].strip().lstrip("# ").rstrip()
+        if comment or "#" in text.heads[index]:
+            comments.append(comment)
+    units_line, units = facts.units or (None, None)
+    if facts.step is not None and not dt_from.startswith("times"):
+        dt_from = f"header, line {facts.step[0] + 1}"
     return text.record(
         samples,
-        units=found.units and found.units[1],
-        line=found.units and found.units[0],
+        units=units,
+        line=units_line,
         dt=step,
         lines=lines,
         title=comments[0] if comments else "",
         format="columns",
-        notes=(*comments, *found.notes),
-        counted="counted" if found.count is None else "counted, as the header says",
+        notes=(*comments, *facts.notes),
+        counted="counted" if facts.count is None else "counted, as the header says",
         dt_from=dt_from,
         dt_rounding=rounding,
         component=component,
-        doubts=tuple(found.doubts),
+        doubts=tuple(facts.doubts),
     )

@@ -1,11 +1,10 @@
-"""Read COSMOS and CSMIP files (.V1, .V2, .V2c).
+"""Read COSMOS and CSMIP files (.V1, .V2, .V2c) of one or more channels.
 
-They have one or more channels, each with text, numbers and blocks of samples.
-
-A block begins with a line that states its number of points, quantity, units and Fortran format,
-such as "7500 points of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)" (CSMIP) or
-"12091 acceleration pts, approx 120 secs, units=cm/sec2(04),Format=(8F10.5)" (COSMOS), the time step
-of the latter being real number 34 of its header. Without a stated format it is (8F10.3). Samples
+A channel has text, numbers and blocks of samples. A block begins with a line that states its number
+of points, quantity, units and Fortran format, such as "7500 points of accel data equally spaced at
+.010 sec, in cm/sec2. (8f10.6)" (CSMIP) or "12091 acceleration pts, approx 120 secs,
+units=cm/sec2(04),Format=(8F10.5)" (COSMOS). The time step of the latter is real number 34 of its
+header. Without a stated format it is (8F10.3). Samples
 are cut by column, for they may touch. Velocities and displacements are skipped.
 """
 
@@ -19,6 +18,7 @@ from .statements import agree
 from .text import NUMBER, TextFile
 
 STEP = 33  # place of the time step among the real header values of COSMOS, from 0
+USUAL_FORMAT = (8, 10)  # samples on a line and their width, where no format is stated
 
 _FIRST = re.compile(
     r"^\s*+(?:un)?corrected\s++accelerogram\b|\(\s*+format\s++v[\d.]++ with \d++ text lines",
@@ -58,9 +58,14 @@ _UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.
 
 @dataclass(frozen=True)
 class Block:
-    """Describe samples announced on lines[line].
+    """Describe a block of samples.
 
-    There are `count` of them, `per_line` a line, `width` wide; ``header`` has its lines.
+    Attributes:
+        line: index of the line that announces them.
+        header: indices of the lines of the channel's header.
+        count: number of samples.
+        per_line: number of samples on a line.
+        width: of a sample, in characters.
     """
 
     line: int
@@ -84,17 +89,13 @@ def recognises(text: TextFile) -> bool:
 
 
 def begins_blocks(text: TextFile) -> bool:
-    """Tell whether one of the first lines announces a block of samples.
-
-    It does so with its format or its step.
-    """
-    lines = [
-        (index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()
-    ]
-    return any(
-        _announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line))
-        for index, line in lines
-    )
+    """Tell whether one of the first lines announces a block of samples, with format or step."""
+    for index, line in enumerate(text.heads[:400]):
+        if "header" in line.lower():
+            continue
+        if _read_announcement(text, index) and (_FORMAT.search(line) or _SPACED.search(line)):
+            return True
+    return False
 
 
 def read(text: TextFile) -> Record:
@@ -115,20 +116,28 @@ def read(text: TextFile) -> Record:
         raise InputError(
             f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)"
         )
-    stated = next((match[1] for pattern in _UNITS if (match := pattern.search(line))), None)
     words, comments = _words(text, block)
     cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
     samples, lines = _samples(text, block)
-    place = block.line
-    if stated is None and (peak := _peak_units(text, block, samples)) is not None:
-        place, stated = peak
+
+    # The units stand on the line of the block, or with a peak that the samples have.
+    units_line: int = block.line
+    units: str | None = None
+    for pattern in reversed(_UNITS):  # the first one counts
+        match = pattern.search(line)
+        if match:
+            units = match[1]
+    if units is None:
+        of_peak = _peak_units(text, block, samples)
+        if of_peak is not None:
+            units_line, units = of_peak
     return text.record(
         samples,
         lines=lines,
-        units=stated,
+        units=units,
         dt=_step(text, block),
-        line=place,
+        line=units_line,
         title=event,
         format="COSMOS" if cosmos else "CSMIP",
         notes=(*words, *comments),
@@ -142,32 +151,35 @@ def _blocks(text: TextFile) -> list[Block]:
 
     Blocks of other quantities belong to the channel before them.
     """
-    found, index, start = [], 0, 0
+    blocks = []
+    index = 0
+    start = 0  # of the header of a channel
     while index < len(text.lines):
-        announced = _announced(text, index)
-        form = _FORMAT.search(text.heads[index]) if announced else None
-        if announced and (form or _SPACED.search(text.heads[index])):
-            count, quantity = announced
-            per_line, width = (
-                (int(text.number(index, part or "1")) for part in form.groups())
-                if form
-                else (8, 10)
-            )
+        announcement = _read_announcement(text, index)
+        form = _FORMAT.search(text.heads[index]) if announcement else None
+        if announcement and (form or _SPACED.search(text.heads[index])):
+            count, quantity = announcement
+            per_line, width = USUAL_FORMAT
+            if form:
+                per_line = int(text.number(index, form[1] or "1"))
+                width = int(text.number(index, form[2]))
             block = Block(index, range(start, index), count, max(per_line, 1), max(width, 1))
             if quantity == "acc":
-                found.append(block)
-            index = start = block.end
+                blocks.append(block)
+            index = block.end
+            start = index
         elif _END.match(text.heads[index]):
-            index = start = index + 1
+            index += 1
+            start = index
         else:
             index += 1
-    return found
+    return blocks
 
 
-def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
-    """Return the number of points and quantity ("acc", "vel", "dis") of a line.
+def _read_announcement(text: TextFile, index: int) -> tuple[int, str] | None:
+    """Return the number of points and the quantity ("acc", "vel", "dis") of a line of a block.
 
-    The line begins a block; another one gives None.
+    A line that begins no block gives None.
     """
     line = text.heads[index]
     count = _COUNT.match(line)
@@ -178,33 +190,31 @@ def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
 
 
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
-    """Return the text of a channel's header, and its comments.
+    """Return the text of a channel's header, and its comments, with blanks squeezed.
 
-    The text ends where numbers begin; blanks are squeezed.
+    The text ends where numbers begin.
     """
     header = [" ".join(text.heads[index].split()) for index in block.header]
-    numbers = (
-        k for k, entry in enumerate(header) if _NUMBERS.fullmatch(entry) or "header values" in entry
-    )
+    end = len(header)
+    for k, entry in enumerate(header):
+        if _NUMBERS.fullmatch(entry) or "header values" in entry:
+            end = k
+            break
+    words = [entry for entry in header[:end] if entry]
     comments = [entry.lstrip("| ") for entry in header if entry.startswith("|")]
-    return [entry for entry in header[: next(numbers, len(header))] if entry], [
-        entry for entry in comments if entry
-    ]
+    return words, [comment for comment in comments if comment]
 
 
 def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     """Return the samples in the file's units, and the index of the line of each."""
-    unknown = next(
-        (text.number(index, mark[1]) for index, mark in _found(text, block.header, _UNKNOWN)), None
-    )
+    marks = [text.number(index, mark[1]) for index, mark in _search(text, block.header, _UNKNOWN)]
+    unknown = marks[0] if marks else None
     values: list[float] = []
     lines: list[int] = []
     for index in range(block.line + 1, block.end):
         line = text.lines[index].rstrip() if index < len(text.lines) else ""
-        fields, wanted = (
-            -(-len(line) // block.width),
-            min(block.per_line, block.count - len(values)),
-        )
+        fields = -(-len(line) // block.width)
+        wanted = min(block.per_line, block.count - len(values))
         if fields != wanted:
             raise InputError(
                 f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
@@ -217,12 +227,11 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
             )
         values += row
         lines += [index] * len(row)
+
+    # Numbers alone, in columns of the same width, are samples that nobody announces.
     after = text.lines[block.end] if block.end < len(text.lines) else ""
-    if (
-        after.strip()
-        and not _VALUE.sub("", after).strip()
-        and len(after.rstrip()) % block.width == 0
-    ):
+    numbers_alone = bool(after.strip()) and not _VALUE.sub("", after).strip()
+    if numbers_alone and len(after.rstrip()) % block.width == 0:
         raise InputError(
             f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
             f"{block.end + 1} holds more of them; get the complete file"
@@ -231,60 +240,69 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
 
 
 def _step(text: TextFile, block: Block) -> float | None:
-    """Return the time step stated with the samples.
-
-    It stands in the text of the header or among its real numbers.
-    """
+    """Return the time step that is stated with the samples, or in the header, or None."""
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
         return 1.0 / text.number(block.line, rate[1])
-    found = [
-        (index, text.number(index, spaced[1]))
-        for index, spaced in _found(text, (block.line, *block.header), _SPACED)
-    ]
-    for index, reals in _found(text, block.header, _REALS) if not found else ():
-        if form := _FORMAT.search(text.heads[index]):
-            rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))
-            width = max(int(text.number(index, form[2])), 1)
-            values = [value for row in rows for value in text.cut_fields(row, width)]
-            return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
-    stated = agree(text, "the time step", found)
-    return stated[1] if stated else None
+    steps = []
+    for index, spaced in _search(text, (block.line, *block.header), _SPACED):
+        steps.append((index, text.number(index, spaced[1])))
+    if not steps:
+        return _step_among_reals(text, block)
+    statement = agree(text, "the time step", steps)
+    return statement[1] if statement else None
+
+
+def _step_among_reals(text: TextFile, block: Block) -> float | None:
+    """Return the time step among the real numbers of the header, or None."""
+    for index, reals in _search(text, block.header, _REALS):
+        form = _FORMAT.search(text.heads[index])
+        if not form:
+            continue
+        lines = int(text.number(index, reals[2]))
+        width = max(int(text.number(index, form[2])), 1)
+        values: list[float] = []
+        for row in range(index + 1, min(index + 1 + lines, block.line)):
+            values += text.cut_fields(row, width)
+        return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
+    return None
 
 
 def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int, str] | None:
-    """Return the line and the units of the peak that the header states.
-
-    They are those of a header where the samples have that peak.
-    """
-    for index, match in _found(text, block.header, _PEAK):
-        peak, found = abs(text.number(index, match[1])), max(map(abs, samples))
-        if known_units(match[2]) is not None and abs(found - peak) <= 1e-3 * peak:
+    """Return the line and the units of a peak that the header states and the samples have."""
+    for index, match in _search(text, block.header, _PEAK):
+        peak = abs(text.number(index, match[1]))
+        largest = max(map(abs, samples))
+        if known_units(match[2]) is not None and abs(largest - peak) <= 1e-3 * peak:
             return index, match[2]
     return None
 
 
 def _component(text: TextFile, block: Block) -> str:
-    """Return the direction of the channel, such as "90 Deg" or "UP".
-
-    It comes from the text of its header.
-    """
-    named = (
-        _FROM.split(match[2], maxsplit=1)[0].split()
-        for _, match in _found(text, block.header, _CHANNEL)
-    )
-    older = (match[1] for _, match in _found(text, block.header, _COMPONENT))
-    return " ".join(next(filter(None, named), [])) or next(older, "")
+    """Return the direction of the channel in the header, such as "90 Deg" or "UP"."""
+    for _, match in _search(text, block.header, _CHANNEL):
+        direction, *_ = _FROM.split(match[2], maxsplit=1)
+        if direction.strip():
+            return " ".join(direction.split())
+    for _, match in _search(text, block.header, _COMPONENT):  # of older files
+        return match[1]
+    return ""
 
 
 def _station(text: TextFile, block: Block) -> str:
     """Return the number or code of the station, from the text of the header."""
-    named = next((match for _, match in _found(text, block.header, _STATION)), None)
-    return next(iter((_CODE.search(named[1]) or named)[1].split()), "") if named else ""
+    for _, match in _search(text, block.header, _STATION):
+        code = _CODE.search(match[1]) or match
+        words = code[1].split()
+        return words[0] if words else ""
+    return ""
 
 
-def _found(
+def _search(
     text: TextFile, indices: Iterable[int], pattern: re.Pattern[str]
 ) -> Iterator[tuple[int, re.Match[str]]]:
-    """Yield those of the lines in which there is the pattern."""
-    return ((index, match) for index in indices if (match := pattern.search(text.heads[index])))
+    """Yield those of the lines in which there is the pattern, and the first match on each."""
+    for index in indices:
+        match = pattern.search(text.heads[index])
+        if match:
+            yield index, match

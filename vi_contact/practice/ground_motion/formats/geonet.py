@@ -1,6 +1,4 @@
-"""Read files of GeoNet (New Zealand), .V1A and .V2A.
-
-They have three components, one after the other, with accelerations in mm/s².
+"""Read files of GeoNet (New Zealand), .V1A and .V2A, of three components in mm/s².
 
 Each component has 16 lines of text, 4 lines of 10 integers and 6 lines of 10 reals in columns of 8,
 then blocks of accelerations, velocities and displacements, ten a line in columns of 8. Integers 34
@@ -14,10 +12,14 @@ from dataclasses import dataclass
 
 from ....core.errors import InputError
 from ..record import Record
-from .statements import agree
+from .statements import Statement, agree
 from .text import NUMBER, TextFile
 
-TEXT_LINES, INTEGER_LINES, REAL_LINES, PER_LINE, WIDTH = 16, 4, 6, 10, 8
+TEXT_LINES = 16
+INTEGER_LINES = 4
+REAL_LINES = 6
+PER_LINE = 10  # numbers on a line
+WIDTH = 8  # of their columns
 COUNTS = slice(33, 36)  # places of the three numbers of samples among the 40 integers, from 0
 STEP = 25  # place of the time step among the 60 reals
 
@@ -38,7 +40,10 @@ _PEAK = re.compile(rf"^\s*+acceleration:\s*+peak\s*+({NUMBER})\s*+mm/s/s", re.IG
 class _Part:
     """Describe one component.
 
-    It has its first line, its name, and the numbers of its three blocks of samples.
+    Attributes:
+        start: index of its first line.
+        name: direction.
+        counts: numbers of samples of its three blocks.
     """
 
     start: int
@@ -57,10 +62,7 @@ class _Part:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether two of three signs are there.
-
-    They are the first line, "Accelerogram … Processed", and a peak in mm/s/s.
-    """
+    """Tell whether two of three are there: the first line, "… Processed", a peak in mm/s/s."""
     head = text.heads[:TEXT_LINES]
     signs = (
         _FIRST.search(head[0]) is not None,
@@ -78,37 +80,37 @@ def read(text: TextFile) -> Record:
     parts = list(_parts(text))
     part = parts[text.choose([part.name for part in parts])]
     values, lines = _samples(text, part)
+
+    # Number of samples and step, which the header states more than once.
     header = range(part.start, part.start + TEXT_LINES)
-    count = _first(text, header, _POINTS, "Number of points")
-    if count[1] != part.counts[0]:
+    count_line, count = _first(text, header, _POINTS, "Number of points")
+    if count != part.counts[0]:
         raise InputError(
-            f"{text.at(count[0])}: {count[1]:g} points are announced but the integers of the "
+            f"{text.at(count_line)}: {count:g} points are announced but the integers of the "
             f"header say {part.counts[0]}; get the file again"
         )
-    step = _first(text, header, _STEP, "the interval of the samples")
-    _check_step(text, part, step, count[1])
-    scale = next(
-        (text.number(k, match[1]) for k in header if (match := _SCALE.search(text.heads[k]))), 1.0
-    )
-    peak = next(
-        (text.number(k, match[1]) for k in header if (match := _PEAK.search(text.heads[k]))), None
-    )
-    found = max(map(abs, values)) * scale
-    doubts = (
-        ()
-        if peak is None or abs(found - abs(peak)) <= 0.01 * abs(peak) + 0.1
-        else (
-            f"the header says that the peak is {abs(peak):g} mm/s2, and the samples have {found:g} "
-            "mm/s2",
+    step_line, step = _first(text, header, _STEP, "the interval of the samples")
+    _check_step(text, part, (step_line, step), count)
+
+    scale = _find_number(text, header, _SCALE)
+    if scale is None:
+        scale = 1.0
+    peak = _find_number(text, header, _PEAK)
+    largest = max(map(abs, values)) * scale
+    doubts = []
+    if peak is not None and not abs(largest - abs(peak)) <= 0.01 * abs(peak) + 0.1:
+        doubts.append(
+            f"the header says that the peak is {abs(peak):g} mm/s2, and the samples have "
+            f"{largest:g} mm/s2"
         )
-    )
     words = [" ".join(text.heads[index].split()) for index in header]
-    station = next((match[1] for word in words if (match := _STATION.search(word))), "")
+    stations = [match[1] for match in map(_STATION.search, words) if match]
+    station = stations[0] if stations else ""
     return text.record(
         values,
         units="mm/s2",
         scale=scale,
-        dt=step[1],
+        dt=step,
         lines=lines,
         line=None,
         format="GeoNet",
@@ -116,8 +118,8 @@ def read(text: TextFile) -> Record:
         notes=tuple(filter(None, words)),
         station=station,
         component=part.name,
-        dt_from=f"header, line {step[0] + 1}",
-        doubts=doubts,
+        dt_from=f"header, line {step_line + 1}",
+        doubts=tuple(doubts),
     )
 
 
@@ -128,21 +130,16 @@ def _parts(text: TextFile) -> Iterator[_Part]:
     while total and not text.lines[total - 1].strip():
         total -= 1
     while start < total:
-        if not (
-            _FIRST.search(text.heads[start])
-            or any(map(_PROCESSED.search, text.heads[start : start + TEXT_LINES]))
-        ):
+        head = text.heads[start : start + TEXT_LINES]
+        if not (_FIRST.search(head[0]) or any(map(_PROCESSED.search, head))):
             raise InputError(
                 f"{text.at(start)}: a component should begin here with 'Corrected accelerogram' or "
                 "'Uncorrected accelerogram'; lines were lost or added, get the complete file"
             )
         integers = _fields(text, start + TEXT_LINES, INTEGER_LINES)
-        named = (_COMPONENT.search(line) for line in text.heads[start : start + TEXT_LINES])
-        part = _Part(
-            start,
-            next((match[1] for match in named if match), ""),
-            tuple(int(count) for count in integers[COUNTS]),
-        )
+        names = [match[1] for match in map(_COMPONENT.search, head) if match]
+        counts = tuple(int(count) for count in integers[COUNTS])
+        part = _Part(start, names[0] if names else "", counts)
         if part.counts[0] < 2 or min(part.counts) < 0 or part.end > total:
             raise InputError(
                 f"{text.at(start + TEXT_LINES + 3)}: {part.counts[0]} accelerations, "
@@ -172,7 +169,8 @@ def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
     values: list[float] = []
     lines: list[int] = []
     for index in range(part.data, part.data + -(-part.counts[0] // PER_LINE)):
-        row, wanted = text.cut_fields(index, WIDTH), min(PER_LINE, part.counts[0] - len(values))
+        row = text.cut_fields(index, WIDTH)
+        wanted = min(PER_LINE, part.counts[0] - len(values))
         if len(row) != wanted:
             raise InputError(
                 f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is "
@@ -184,37 +182,47 @@ def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
 
 
 def _first(text: TextFile, header: range, pattern: re.Pattern[str], what: str) -> tuple[int, float]:
-    """Return the line and the number of the first match; InputError where there is none."""
+    """Return the line and the number of the first match.
+
+    Raises InputError, which says what is missing, where there is none.
+    """
     for index in header:
-        if match := pattern.search(text.heads[index]):
+        match = pattern.search(text.heads[index])
+        if match:
             return index, text.number(index, next(filter(None, match.groups())))
     raise InputError(
         f"{text.at(header[0])}: the header does not give {what}; get the complete file"
     )
 
 
-def _check_step(text: TextFile, part: _Part, step: tuple[int, float], count: float) -> None:
-    """Raise InputError unless the step agrees with the one among the reals.
+def _find_number(text: TextFile, header: range, pattern: re.Pattern[str]) -> float | None:
+    """Return the number of the first match, or None where there is none."""
+    for index in header:
+        match = pattern.search(text.heads[index])
+        if match:
+            return text.number(index, match[1])
+    return None
 
-    It has to agree with the duration too.
-    """
+
+def _check_step(text: TextFile, part: _Part, step: Statement, count: float) -> None:
+    """Raise InputError unless the step agrees with the one among the reals, and the duration."""
+    _, seconds_of_step = step
     index = part.start + TEXT_LINES + INTEGER_LINES + STEP // PER_LINE
     column = STEP % PER_LINE
     word = text.lines[index][WIDTH * column : WIDTH * (column + 1)].strip()
     printed = text.number(index, word)
     if printed > 0.0:
-        half_digit = 0.5 * 10.0 ** -len(word.partition(".")[2])
-        agree(
-            text,
-            "the time step",
-            [step, (index, printed)],
-            rounding=max(1e-6, 1.01 * half_digit / step[1]),
-        )
+        _, _, decimals = word.partition(".")
+        half_digit = 0.5 * 10.0 ** -len(decimals)
+        rounding = max(1e-6, 1.01 * half_digit / seconds_of_step)
+        agree(text, "the time step", [step, (index, printed)], rounding=rounding)
     for place in range(part.start, part.start + TEXT_LINES):
-        if match := _DURATION.search(text.heads[place]):
-            seconds = text.number(place, match[1])
-            if not abs(seconds - count * step[1]) <= 1.01 * step[1] + 0.01:
-                raise InputError(
-                    f"{text.at(place)}: {seconds:g} s are announced but {count:g} points at "
-                    f"{step[1]:g} s follow; get the complete file"
-                )
+        match = _DURATION.search(text.heads[place])
+        if not match:
+            continue
+        seconds = text.number(place, match[1])
+        if not abs(seconds - count * seconds_of_step) <= 1.01 * seconds_of_step + 0.01:
+            raise InputError(
+                f"{text.at(place)}: {seconds:g} s are announced but {count:g} points at "
+                f"{seconds_of_step:g} s follow; get the complete file"
+            )

@@ -35,8 +35,11 @@ _FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)
 def recognises(text: TextFile) -> bool:
     """Tell whether five of the entries of a header, in any line, are there."""
     head = text.heads[:30]
-    present = [key for key in KEYS if any(line.startswith(key) for line in head)]
-    return len(present) >= 5
+    present = 0
+    for key in KEYS:
+        if any(line.startswith(key) for line in head):
+            present += 1
+    return present >= 5
 
 
 def read(text: TextFile) -> Record:

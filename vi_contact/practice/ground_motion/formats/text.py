@@ -49,10 +49,16 @@ Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line,
 
 @dataclass(frozen=True, kw_only=True)
 class TextFile:
-    """Hold a file as read.
+    """Hold a file as it was read, and what the caller of ``read_record`` says about it.
 
-    There are its path as given, its lines without ends, the sha256 of its bytes; and what
-    ``read_record`` is told.
+    Attributes:
+        path: of the file, as given.
+        lines: without their ends.
+        sha256: of the bytes.
+        units: of the samples, or None.
+        dt: time step, or None [s].
+        resample_dt: time step that the record is to have, or None [s].
+        channel: number or name of the component, or None.
     """
 
     path: str
@@ -91,18 +97,47 @@ class TextFile:
     ) -> Record:
         """Return the record of ``scale`` times samples.
 
-        It has the units and the time step [s] that the file states.
+        Args:
+            samples: as the file has them.
+            units: that the file states; None if it does not.
+            dt: time step that the file states [s]; None if it does not.
+            line: index of the line with the units; None if there is none.
+            scale: size of a sample in these units.
+            lines: index of the line of every sample, where values are looked for that stand for
+                missing ones; None for no such search.
+            counted: where the number of samples comes from.
+            dt_from: where the time step comes from.
+            dt_rounding: relative difference to the step of the caller that counts as rounding.
+            **told: title, notes, format, station, component and doubts of the record.
 
-        None: it does not state them. line: index of the one with the units. lines: index of the
-        line of every sample, where values are looked for that stand for missing ones. counted,
-        dt_from: where the number of samples and the time step come from. dt_rounding: relative
-        difference to the step of the caller that is rounding. told: title, notes, format, station,
-        component, doubts. Raises InputError for what the file and its caller leave open, or state
-        differently.
+        Raises:
+            InputError: what the file and its caller leave open, or state differently.
         """
         place = self.path if line is None else self.at(line)
-        names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
-        step = self.dt if dt is None else dt
+        name = self._agree_on_units(place, units)
+        step = self._agree_on_step(dt, dt_rounding)
+        if lines is not None:
+            refuse_fill_values(samples, lambda k: self.at(lines[k]))
+        stated = "header" if line is None else f"header, line {line + 1}"
+        return Record(
+            acceleration=UNITS[name] * scale * np.array(samples, dtype=float),
+            units=name,
+            dt=step,
+            source=self.path,
+            sha256=self.sha256,
+            samples_from=counted,
+            units_from="option" if units is None else stated,
+            dt_from="option" if dt is None else dt_from,
+            **told,
+        )
+
+    def _agree_on_units(self, place: str, units: str | None) -> str:
+        """Return the key of the units that the file states or the caller passes.
+
+        Raises InputError where there are none, or both differ.
+        """
+        given = [name for name in (units, self.units) if name is not None]
+        names = [canonical_units(place, name) for name in given]
         if not names:
             raise InputError(
                 f"{place}: the file does not state its units; pass units= as one of "
@@ -113,69 +148,61 @@ class TextFile:
                 f"{place}: the file states its units as {names[0]} but units={self.units!r} was "
                 "passed; leave units out or correct the file"
             )
-        if step is None:
+        return names[0]
+
+    def _agree_on_step(self, dt: float | None, rounding: float) -> float:
+        """Return the time step that the file states or the caller passes [s].
+
+        Raises InputError where there is none, or both differ by more than the rounding.
+        """
+        if dt is None:
+            if self.dt is None:
+                raise InputError(
+                    f"{self.path}: the file does not state its time step; pass dt= in seconds"
+                )
+            return self.dt
+        if self.dt is not None and not math.isclose(dt, self.dt, rel_tol=rounding):
             raise InputError(
-                f"{self.path}: the file does not state its time step; pass dt= in seconds"
-            )
-        if (
-            dt is not None
-            and self.dt is not None
-            and not math.isclose(dt, self.dt, rel_tol=dt_rounding)
-        ):
-            raise InputError(
-                f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was "
+                f"{self.path}: the file states a time step of {dt:g} s but dt={self.dt!r} was "
                 "passed; leave dt out or correct the file"
             )
-        if lines is not None:
-            refuse_fill_values(samples, lambda k: self.at(lines[k]))
-        stated = "header" if line is None else f"header, line {line + 1}"
-        return Record(
-            acceleration=UNITS[names[0]] * scale * np.array(samples, dtype=float),
-            units=names[0],
-            dt=step,
-            source=self.path,
-            sha256=self.sha256,
-            samples_from=counted,
-            units_from="option" if units is None else stated,
-            dt_from="option" if dt is None else dt_from,
-            **told,
-        )
+        return dt
 
     def choose(self, components: Sequence[str]) -> int:
         """Return which component the caller chose, from 0.
 
-        It raises InputError, which lists them, where none or another one is chosen.
-
-        channel: its number, from 1, or its name, capitals or not.
+        ``channel`` is its number, from 1, or its name, capitals or not. Raises InputError, which
+        lists the components, where none or another one is chosen.
         """
         if self.channel is None and len(components) == 1:
             return 0
         wanted = self.channel
         if isinstance(wanted, str):
-            same = [
-                k
-                for k, name in enumerate(components)
-                if name.casefold() == wanted.strip().casefold()
-            ]
+            folded = wanted.strip().casefold()
+            same = [k for k, name in enumerate(components) if name.casefold() == folded]
             if len(same) == 1:
                 return same[0]
-            wanted = int(wanted) if wanted.strip().isdecimal() and len(wanted) < 9 else wanted
-        if (
-            isinstance(wanted, int)
-            and not isinstance(wanted, bool)
-            and 0 < wanted <= len(components)
-        ):
+            if wanted.strip().isdecimal() and len(wanted) < 9:
+                wanted = int(wanted)
+        numbers = range(1, len(components) + 1)
+        if isinstance(wanted, int) and not isinstance(wanted, bool) and wanted in numbers:
             return wanted - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
         wrong = "" if self.channel is None else f"there is no channel {shown(self.channel)}: "
         count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
         raise InputError(f"{self.path}: {wrong}the file holds {count} ({names}); pass channel=")
 
-    def refuse_other_count(self, index: int, announced: float, found: int) -> None:
-        """Raise InputError unless as many samples were found as lines[index] announces."""
-        if found != announced:
+    def refuse_other_count(self, index: int, announced: float, count: int) -> None:
+        """Raise InputError unless as many samples follow as lines[index] announces.
+
+        Args:
+            index: of the line that announces them.
+            announced: number of samples.
+            count: number of samples that the file has.
+        """
+        if count != announced:
             raise InputError(
-                f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get "
+                f"{self.at(index)}: {announced:.12g} samples are announced but {count} follow; get "
                 "the complete file"
             )
 
@@ -184,20 +211,16 @@ class TextFile:
 
         They go up to a line '*** End data ***'.
         """
-        end = next(
-            (
-                index
-                for index in range(start, len(self.lines))
-                if _END_DATA.match(self.heads[index])
-            ),
-            len(self.lines),
-        )
-        return [index for index in range(start, end) if self.lines[index].strip()]
+        filled_lines = []
+        for index in range(start, len(self.lines)):
+            if _END_DATA.match(self.heads[index]):
+                break
+            if self.lines[index].strip():
+                filled_lines.append(index)
+        return filled_lines
 
     def series(self, start: int) -> tuple[list[float], list[int]]:
-        """Return all values on the lines from `start` on.
-
-        They come row after row, with the index of the line of each.
+        """Return all values on the lines from `start` on, and the index of the line of each.
 
         Raises InputError where a row but the last has another length than the first, or the last
         one is longer: a value was lost there, and those after it would be read too early.
@@ -207,9 +230,7 @@ class TextFile:
         self.refuse_uneven_rows(lines, rows)
         self.refuse_misaligned(lines)
         self.refuse_empty_lines(lines, rows)
-        return [value for row in rows for value in row], [
-            index for index, row in zip(lines, rows, strict=True) for _ in row
-        ]
+        return join_rows(lines, rows)
 
     def refuse_uneven_rows(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
         """Raise InputError unless all rows have the length that most have.
@@ -219,7 +240,8 @@ class TextFile:
         lengths = [len(row) for row in rows]
         usual = max(set(lengths), key=lambda length: (lengths.count(length), length), default=0)
         for k, length in enumerate(lengths):
-            if length != usual and not (k == len(lengths) - 1 and length < usual):
+            ends_early = k == len(lengths) - 1 and length < usual
+            if length != usual and not ends_early:
                 raise InputError(
                     f"{self.at(lines[k])}: the row has {length} values and other rows have "
                     f"{usual}; a value is missing or too many, get the complete file"
@@ -228,15 +250,12 @@ class TextFile:
     def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
         """Raise InputError for an empty line among values that stand one a line.
 
-        A value is missing there.
-
-        Empty lines between all of them are line ends that were doubled.
+        A value is missing there. Empty lines between all of them are line ends that were doubled.
         """
-        gaps = [
-            before
-            for before, after in pairwise(lines)
-            if after > before + 1 and not self.lines[before + 1].strip()
-        ]
+        gaps = []
+        for before, after in pairwise(lines):
+            if after > before + 1 and not self.lines[before + 1].strip():
+                gaps.append(before)
         if gaps and len(gaps) < len(lines) - 1 and all(len(row) == 1 for row in rows):
             raise InputError(
                 f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so "
@@ -251,14 +270,15 @@ class TextFile:
         """
         if len(lines) < 5:
             return
-        ends = [
-            tuple(match.end() for match in _NUMBER.finditer(self.lines[index])) for index in lines
-        ]
-        usual, often = Counter(ends[:-1]).most_common(1)[0]
+        ends = []
+        for index in lines:
+            matches = _NUMBER.finditer(self.lines[index])
+            ends.append(tuple(match.end() for match in matches))
+        ((usual, often),) = Counter(ends[:-1]).most_common(1)
         if len(usual) < 2 or often < 0.9 * (len(lines) - 1):
             return
-        for index, found in zip(lines, ends, strict=True):
-            if found != usual[: len(found)] and found[-1] < usual[len(found) - 1]:
+        for index, own in zip(lines, ends, strict=True):
+            if own != usual[: len(own)] and own[-1] < usual[len(own) - 1]:
                 raise InputError(
                     f"{self.at(index)}: the row is shorter than the others, whose numbers end at "
                     "the same places, so that a character is missing; get the complete file"
@@ -273,7 +293,7 @@ class TextFile:
     def numbers(self, index: int, decimal_commas: bool = False) -> list[float]:
         """Return the values on lines[index].
 
-        They are divided by blanks, commas or semicolons, or by the sign of the next.
+        They are divided by blanks, commas or semicolons, or by the sign of the next one.
 
         Raises InputError naming file, line and word for anything else, "1.234.567" included: where
         two unsigned numbers touch nobody can tell where the first one ends. An empty cell between
@@ -285,19 +305,18 @@ class TextFile:
                 f"{self.at(index)}: a cell is empty between two separators, so that a value is "
                 "missing; get the complete file"
             )
-        for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(
-            self.lines[index].strip()
-        ):
+        separator = _BETWEEN_DECIMALS if decimal_commas else _BETWEEN
+        for word in separator.split(self.lines[index].strip()):
             written = word.replace(",", ".") if decimal_commas else word
             parts = _NUMBER.findall(written)
-            # "1.234-105": the exponent lost its letter
-            whole_after_decimal = len({"." in part for part in parts}) > 1
-            if (
-                "".join(parts) != written
-                or whole_after_decimal
-                or any(part[0] not in "+-" for part in parts[1:])
-            ):
-                parts = [word]  # which is no number, and is refused as one
+
+            # Numbers that touch have signs, and all of them a point or none: in "1.234-105" the
+            # exponent lost its letter. What is no such word is refused as no number.
+            complete = "".join(parts) == written
+            alike = len({"." in part for part in parts}) <= 1
+            signed = all(part[0] in "+-" for part in parts[1:])
+            if not (complete and alike and signed):
+                parts = [word]
             values += [self.number(index, part) for part in parts]
         return values
 
@@ -305,22 +324,28 @@ class TextFile:
         """Return the most decimals in a column of numbers, None where some have an exponent."""
         decimal = self._decimal_commas(indices)
         split = _BETWEEN_DECIMALS if decimal else _BETWEEN
-        words = (split.split(self.lines[index].strip()) for index in indices)
-        styles = {_style(row[column]) for row in words if len(row) > column}
-        return (
-            None
-            if any(exponent for _, exponent in styles)
-            else max((found for found, _ in styles), default=None)
-        )
+        most = None
+        for index in indices:
+            row = split.split(self.lines[index].strip())
+            if len(row) <= column:
+                continue
+            decimals, has_exponent = _style(row[column])
+            if has_exponent:
+                return None
+            most = decimals if most is None else max(most, decimals)
+        return most
 
     def cut_fields(self, index: int, width: int, offset: int = 0) -> list[float]:
-        """Return the values on lines[index] in columns of `width` characters.
+        """Return the values on a line in columns of equal width, which may touch.
 
-        They begin at `offset`, and may touch.
+        Args:
+            index: of the line.
+            width: of the columns, in characters.
+            offset: where the first column begins.
 
-        Raises InputError naming file, line and columns for a field that is no number, or that does
-        not end at the end of its columns as numbers written by column do: a character was lost or
-        added on the line.
+        Raises:
+            InputError: a field that is no number, or that does not end at the end of its columns as
+                numbers written by column do: a character was lost or added on the line.
         """
         line = self.lines[index].rstrip()
         values = []
@@ -339,33 +364,39 @@ class TextFile:
     def number(self, index: int, word: str, where: str = "") -> float:
         """Return a finite number, also with Fortran's exponent letter D.
 
-        It raises InputError naming file, line and word.
+        Args:
+            index: of the line, for messages.
+            word: the number as it is written.
+            where: on the line it stands, for messages.
+
+        Raises:
+            InputError: a word that is no finite number.
         """
-        found = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
-        if not math.isfinite(found):
+        value = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
+        if not math.isfinite(value):
             raise InputError(
                 f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get "
                 "another file"
             )
-        return found
+        return value
 
     def entry(self, header: Entries, key: str) -> tuple[int, str]:
         """Return the line and the value of a header's key.
 
-        It raises InputError where the key is missing or empty.
+        Raises InputError where the key is missing or empty.
         """
-        if not header.get(key, (0, ""))[1]:
+        line, value = header.get(key, (0, ""))
+        if not value:
             raise InputError(f"{self.path}: the header does not give {key}; get the complete file")
-        return header[key]
+        return line, value
 
     def entry_number(self, header: Entries, key: str) -> float:
         """Return the number after a header's key."""
-        return self.number(*self.entry(header, key), f" of {key}")
+        line, value = self.entry(header, key)
+        return self.number(line, value, f" of {key}")
 
     def _refuse_cut_numbers(self, indices: Sequence[int], decimal_commas: bool) -> None:
-        """Raise InputError where the end of a number was cut off.
-
-        It does so as far as the other numbers tell it.
+        """Raise InputError where the end of a number was cut off, as far as other numbers tell it.
 
         That is a number whose exponent has one digit where others have leading zeros ("1.2E-0" for
         "1.2E-02"), and a last number that has fewer decimals, or no exponent, where all the others
@@ -377,14 +408,15 @@ class TextFile:
         for index in indices:
             line = self.lines[index].strip()
             words.append([word for word in split.split(line) if word])
-            short = [
-                word for word in words[-1] for digits in _EXPONENT.findall(word) if len(digits) == 1
-            ]
-            if zeros and short:
-                raise InputError(
-                    f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of "
-                    "other numbers; a digit was lost, get the complete file"
-                )
+            for word in words[-1]:
+                exponents = _EXPONENT.findall(word)
+                if zeros and any(len(digits) == 1 for digits in exponents):
+                    raise InputError(
+                        f"{self.at(index)}: the exponent of {shown(word)} is shorter than those of "
+                        "other numbers; a digit was lost, get the complete file"
+                    )
+
+        # The last number of the file, beside those above it.
         if len(words) < 2 or not words[-1]:
             return
         last = words[-1][-1]
@@ -394,9 +426,9 @@ class TextFile:
         styles = {_style(word) for word in column}
         if len(column) < 3 or len(styles) != 1 or not _NUMBER.fullmatch(last.replace(",", ".")):
             return
-        decimals, exponent = styles.pop()
-        found, has_exponent = _style(last)
-        if found < decimals or exponent and not has_exponent:
+        ((decimals, exponent),) = styles
+        last_decimals, last_exponent = _style(last)
+        if last_decimals < decimals or (exponent and not last_exponent):
             raise InputError(
                 f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its "
                 f"column have {decimals} decimals{' and an exponent' if exponent else ''}; get the "
@@ -404,25 +436,27 @@ class TextFile:
             )
 
     def _decimal_commas(self, indices: Sequence[int]) -> bool:
-        """Tell whether commas in these lines are decimal.
+        """Tell whether commas in these lines are decimal, and do not separate.
 
-        They then do not separate. It raises InputError where it cannot be told.
+        Raises InputError where it cannot be told.
         """
-        data = [self.lines[index] for index in indices]
-        inside = next(
-            (
-                index
-                for index, line in zip(indices, data, strict=True)
-                if _COMMA_INSIDE.search(line)
-            ),
-            None,
-        )
-        points, semicolons = (any(sign in line for line in data) for sign in ".;")
-        if inside is None or points and not semicolons:
+        inside = None  # the first line with a comma between digits
+        points = False
+        semicolons = False
+        for index in indices:
+            line = self.lines[index]
+            if inside is None and _COMMA_INSIDE.search(line):
+                inside = index
+            points = points or "." in line
+            semicolons = semicolons or ";" in line
+        if inside is None or (points and not semicolons):
             return False
-        words = (word for line in data for word in _BETWEEN_DECIMALS.split(line))
-        if any(word.count(",") > 1 or word.strip(",") != word for word in words):
-            return False
+
+        # Two commas in a word, or one beside a blank: commas separate.
+        for index in indices:
+            for word in _BETWEEN_DECIMALS.split(self.lines[index]):
+                if word.count(",") > 1 or word.strip(",") != word:
+                    return False
         if semicolons and not points:
             return True
         raise InputError(
@@ -433,16 +467,30 @@ class TextFile:
 
 def _style(word: str) -> tuple[int, bool]:
     """Return the number of decimals of a number, and whether it has an exponent."""
-    mantissa, letter, _ = re.sub("[Dd]", "E", word.upper().replace(",", ".")).partition("E")
-    return len(mantissa.partition(".")[2]), bool(letter)
+    written = word.upper().replace(",", ".").replace("D", "E")
+    mantissa, letter, _ = written.partition("E")
+    _, _, decimals = mantissa.partition(".")
+    return len(decimals), bool(letter)
+
+
+def join_rows(
+    lines: Sequence[int], rows: Sequence[Sequence[float]]
+) -> tuple[list[float], list[int]]:
+    """Return the values of all rows, one after the other, and the index of the line of each."""
+    values: list[float] = []
+    line_of_value: list[int] = []
+    for index, row in zip(lines, rows, strict=True):
+        values += row
+        line_of_value += [index] * len(row)
+    return values, line_of_value
 
 
 def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
-    """Read `path` as UTF-8 or, failing that, Latin-1.
+    """Read `path` as UTF-8 or, failing that, Latin-1; line ends may be any.
 
-    Line ends may be any; ``said`` is what the caller says about it.
+    ``said`` is what the caller says about the file: the other fields of ``TextFile``.
 
-    Raises InputError when the file is missing, unreadable, empty, too large or not text.
+    Raises InputError where the file is missing, unreadable, empty, too large or not text.
     """
     name = os.fspath(path)
     if "\0" in name:

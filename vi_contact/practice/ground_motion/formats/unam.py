@@ -1,6 +1,6 @@
-"""Read files of UNAM (Mexico).
+"""Read files of UNAM (Mexico), "ARCHIVO ESTANDAR DE ACELERACION".
 
-They are "ARCHIVO ESTANDAR DE ACELERACION": lines "KEY : value", then a column a channel, gal.
+They have lines "KEY : value", then a column for each channel, in gal.
 """
 
 import re
@@ -37,16 +37,21 @@ def read(text: TextFile) -> Record:
         )
     header: dict[str, tuple[int, str]] = {}
     for index in range(start):
-        if (match := _KEY.match(text.heads[index])) and match[1].strip():
-            header.setdefault(" ".join(match[1].split()).upper(), (index, match[2].strip()))
+        entry = _KEY.match(text.heads[index])
+        if entry and entry[1].strip():
+            key = " ".join(entry[1].split()).upper()
+            header.setdefault(key, (index, entry[2].strip()))
     form_line, form = _entry(text, header, "FORMATO DATOS")
-    if not (match := _FORMAT.match(form)):
+    fields = _FORMAT.match(form)
+    if fields is None:
         raise InputError(
             f"{text.at(form_line)}: the format {form!r} of the data is not like '3F10.4'; get the "
             "file again"
         )
-    channels, width = int(match[1]), int(match[2])
-    names = _split(_entry(text, header, "ORIENTACION C1")[1])
+    channels = int(fields[1])
+    width = int(fields[2])
+    _, directions = _entry(text, header, "ORIENTACION C1")
+    names = _split(directions)
     if len(names) != channels or width < 1:
         raise InputError(
             f"{text.at(form_line)}: the data have {channels} columns and the header names "
@@ -65,43 +70,39 @@ def read(text: TextFile) -> Record:
             )
         values.append(row[place])
     count_line, counts = _entry(text, header, "NUM. TOTAL DE MUESTRAS, C1")
-    count = _of(text, count_line, counts, place)
+    count = _number_of_channel(text, count_line, counts, place)
     text.refuse_other_count(count_line, count, len(values))
-    step = _step(text, header, place, count)
+    step_line, step = _step(text, header, place, count)
     units_line, units = _entry(text, header, "UNIDADES DE LOS DATOS")
-    station = header.get("CLAVE DE LA ESTACION", (0, ""))[1]
-    date = " ".join(
-        header.get(key, (0, ""))[1] for key in ("FECHA DEL SISMO [GMT]", "HORA EPICENTRO (GMT)")
-    )
-    notes = tuple(
-        " ".join(text.heads[index].split()) for index, content in header.values() if content
-    )
+    _, station = header.get("CLAVE DE LA ESTACION", (0, ""))
+    _, date = header.get("FECHA DEL SISMO [GMT]", (0, ""))
+    _, hour = header.get("HORA EPICENTRO (GMT)", (0, ""))
+    filled_lines = [index for index, content in header.values() if content]
+    notes = tuple(" ".join(text.heads[index].split()) for index in filled_lines)
     return text.record(
         values,
         units=units.partition("(")[0] or units,
         line=units_line,
-        dt=step[1],
+        dt=step,
         lines=lines,
         format="UNAM",
-        title=f"{date} {station}".strip(),
+        title=f"{date} {hour} {station}".strip(),
         station=station,
         component=names[place],
         notes=notes,
-        dt_from=f"header, line {step[0] + 1}",
+        dt_from=f"header, line {step_line + 1}",
     )
 
 
 def _entry(text: TextFile, header: dict[str, tuple[int, str]], start: str) -> tuple[int, str]:
     """Return the line and the value of the entry whose key begins so.
 
-    It raises InputError where it is missing or empty.
+    Raises InputError where it is missing or empty.
     """
-    found = next(
-        (entry for key, entry in header.items() if key.startswith(start) and entry[1]), None
-    )
-    if found is None:
-        raise InputError(f"{text.path}: the header does not give {start!r}; get the complete file")
-    return found
+    for key, (line, value) in header.items():
+        if key.startswith(start) and value:
+            return line, value
+    raise InputError(f"{text.path}: the header does not give {start!r}; get the complete file")
 
 
 def _split(value: str) -> list[str]:
@@ -109,7 +110,7 @@ def _split(value: str) -> list[str]:
     return [part.strip() for part in value.strip().lstrip("/").split("/")]
 
 
-def _of(text: TextFile, line: int, value: str, place: int) -> float:
+def _number_of_channel(text: TextFile, line: int, value: str, place: int) -> float:
     """Return the number of one channel of "/200/200/200"."""
     parts = _split(value)
     return text.number(line, parts[place] if place < len(parts) else "", " of the channel")
@@ -123,28 +124,27 @@ def _step(
     The sampling rate and the duration must confirm it.
     """
     line, steps = _entry(text, header, "INTERVALO DE MUESTREO, C1")
-    found = [(line, _of(text, line, steps, place))]
+    step = _number_of_channel(text, line, steps, place)
+    statements = [(line, step)]
     rate_line, rates = _entry(text, header, "VEL. DE MUESTREO, C1")
-    rate = _of(text, rate_line, rates, place)
-    found += [(rate_line, 1.0 / rate)] if rate > 0.0 else []
-    agree(text, "the time step", found, rounding=1e-3)
+    rate = _number_of_channel(text, rate_line, rates, place)
+    if rate > 0.0:
+        statements.append((rate_line, 1.0 / rate))
+    agree(text, "the time step", statements, rounding=1e-3)
     seconds_line, seconds = _entry(text, header, "DURACION DEL REGISTRO (S), C1")
-    duration = _of(text, seconds_line, seconds, place)
-    if not abs(duration - count * found[0][1]) <= 1.01 * found[0][1] + 0.01:
+    duration = _number_of_channel(text, seconds_line, seconds, place)
+    if not abs(duration - count * step) <= 1.01 * step + 0.01:
         raise InputError(
             f"{text.at(seconds_line)}: {duration:g} s are announced but {count:g} samples at "
-            f"{found[0][1]:g} s follow; get the complete file"
+            f"{step:g} s follow; get the complete file"
         )
-    return found[0]
+    return line, step
 
 
 def _first_row(text: TextFile, start: int) -> int:
     """Return the index of the line after the second ruler, or after the line of directions."""
-    rulers = [
-        k
-        for k in range(start, min(start + 8, len(text.lines)))
-        if text.heads[k].strip().startswith("-----")
-    ]
+    near = range(start, min(start + 8, len(text.lines)))
+    rulers = [k for k in near if text.heads[k].strip().startswith("-----")]
     if len(rulers) < 2:
         raise InputError(
             f"{text.at(start)}: the names of the columns do not stand between two rulers '-----'; "
