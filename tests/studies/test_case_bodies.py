@@ -13,14 +13,14 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from mpi4py import MPI
-from vi_contact.cli.entry import main
-from vi_contact.studies import read_case, refine, report
-from vi_contact.studies.cases.description import describe, in_words
-from vi_contact.studies.cases.library import located
 
 import vi_contact as vc
 from vi_contact import beam, layer
 from vi_contact.core.errors import InputError
+from vi_contact.practice.cli.entry import main
+from vi_contact.practice.studies import read_case, refine, report
+from vi_contact.practice.studies.cases.description import describe, in_words
+from vi_contact.practice.studies.cases.library import located
 
 pytestmark = pytest.mark.serial
 COMM = MPI.COMM_WORLD
