@@ -8,7 +8,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from types import NoneType, UnionType
 from typing import Any, get_args, get_origin
 
 if not __package__:  # run as a folder of the source tree, maybe not installed
@@ -18,6 +17,7 @@ from meshes.ball import BallMesh
 from meshes.disk import DiskMesh
 from meshes.raft import RaftMesh
 from vi_contact import meshes as room
+from vi_contact.core.arguments import members_of
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Quantity, quantities
 from vi_contact.meshes.gmsh_session import write
@@ -53,10 +53,7 @@ def parser() -> argparse.ArgumentParser:
 def add_option(command: argparse.ArgumentParser, field: Field[Any], asked: Quantity) -> None:
     """Add the option of one field of a shape: a switch, a number, or several numbers."""
     option = f"--{field.name.replace('_', '-')}"
-    # an option that may be left out is a number or None
-    kind = asked.kind
-    if isinstance(kind, UnionType):
-        kind = next(member for member in get_args(kind) if member is not NoneType)
+    kind = members_of(asked.kind)[0]  # an option that may be left out is a number or None
     several = get_origin(kind) is tuple
     number = get_args(kind)[0] if several else kind
     if number is bool:

@@ -144,10 +144,15 @@ def _members(kind: Any) -> tuple[Any, ...]:
     return typing.get_args(kind) if _is_union(kind) else (kind,)
 
 
+def members_of(kind: Any) -> list[Any]:
+    """Return the types of a union but for None, or the one type."""
+    return [member for member in _members(kind) if member is not type(None)]
+
+
 @cache
 def _single_number(kind: Any) -> type | None:
     """Return float or int where a value of this type is such a number or None; else None."""
-    members = [member for member in _members(kind) if member is not type(None)]
+    members = members_of(kind)
     return members[0] if len(members) == 1 and members[0] in (float, int) else None
 
 

@@ -72,9 +72,8 @@ def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
 
     What is the user's own may raise anywhere; the package's own needs no frame.
     """
-    if comm.size == 1 or type(value).__module__.startswith("vi_contact."):
-        return _NO_FRAME
-    return together(comm)
+    is_own = not type(value).__module__.startswith("vi_contact.")
+    return together(comm) if is_own else _NO_FRAME
 
 
 class _RankError(NamedTuple):

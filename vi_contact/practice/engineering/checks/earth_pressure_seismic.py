@@ -68,19 +68,7 @@ class MononobeOkabe(CoulombWedge):
             "δ up to φ, passive up to φ/2; φ - slope - ψ from 0, passive φ + slope - ψ; "
             "ground up to φ; soil that yields"
         ),
-        fields=(
-            "height",
-            "rho",
-            "surcharge",
-            "gravity",
-            "width",
-            "phi",
-            "delta",
-            "slope",
-            "batter",
-            "kh",
-            "kv",
-        ),
+        fields=(*CoulombWedge.formula.fields, "kh", "kv"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
     )

@@ -61,6 +61,7 @@ def wedge(
     )
 
 
+WALL_FIELDS = ("height", "rho", "surcharge", "gravity", "width")
 WALL_COLUMNS = ("N_{part}", "height_{part}")
 WALL_ANSWERS = {"thrust": "N/m", "height": "m"}
 
@@ -131,7 +132,7 @@ class AtRest(EarthPressure):
         text="N = K0 (ρ g H²/2 + q H), K0 = ν/(1-ν)",
         source="plane strain without lateral strain",
         range="an elastic layer on a smooth wall that does not move",
-        fields=("height", "rho", "surcharge", "gravity", "width", "nu"),
+        fields=(*WALL_FIELDS, "nu"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
     )
@@ -156,7 +157,7 @@ class Rankine(EarthPressure):
         text="N = K (ρ g H²/2 + q H), K = cos²β (cos β ∓ s)/(cos β ± s), s² = cos²β - cos²φ",
         source="Rankine 1857",
         range="β up to φ; soil that yields",
-        fields=("height", "rho", "surcharge", "gravity", "width", "phi", "slope"),
+        fields=(*WALL_FIELDS, "phi", "slope"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
     )
@@ -193,17 +194,7 @@ class CoulombWedge(EarthPressure):
         ),
         source="Coulomb 1776",
         range="δ up to φ, passive up to φ/2; ground up to φ; soil that yields",
-        fields=(
-            "height",
-            "rho",
-            "surcharge",
-            "gravity",
-            "width",
-            "phi",
-            "delta",
-            "slope",
-            "batter",
-        ),
+        fields=(*WALL_FIELDS, "phi", "delta", "slope", "batter"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
     )

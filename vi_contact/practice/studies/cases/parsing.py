@@ -2,14 +2,14 @@
 
 import logging
 import os
-import types
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Union, get_args, get_origin
+from typing import Any, get_args, get_origin
 
+from ....core.arguments import members_of
 from ....core.checks import SHOWN, shown
 from ....core.errors import InputError
 from ....core.renamed import WORDS
@@ -96,12 +96,6 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     if renamed in names:
         return f"it is now {renamed}"
     return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
-
-
-def members_of(hint: Any) -> list[Any]:
-    """Return the types of a union, or the one type."""
-    kinds = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
-    return [one for one in kinds if one is not type(None)]
 
 
 def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:

@@ -10,12 +10,13 @@ from inspect import getdoc
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
+from ....core.arguments import members_of
 from ....core.quantities import Between
 from ....laws.materials import LinearElastic
 from .bodies import OWN
 from .case import TABLES
 from .own_classes import is_protocol
-from .parsing import Words, choices_of, is_list, is_path, members_of
+from .parsing import Words, choices_of, is_list, is_path
 from .quantities import AT_START, FIELD, HISTORY, Expression
 from .stage_tables import BY_KEY, WHOLE
 from .table_calls import Callee
