@@ -277,7 +277,8 @@ class ScaledDelassus:
             )
         scale = energy_scale(G).reshape(m, d)
         if d > 1:  # one number for the tangents of a node: disks stay disks
-            mean = np.mean(scale[:, 1:] ** -2.0, axis=1)
+            tangents = np.ascontiguousarray(scale[:, 1:])  # without gaps: see energy_scale
+            mean = np.mean(tangents**-2.0, axis=1)
             scale[:, 1:] = mean[:, None] ** -0.5
         self.scale = scale
         self.bilateral = bilateral.copy()

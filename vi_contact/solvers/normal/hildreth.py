@@ -208,5 +208,5 @@ def _inverse(factor: Array) -> tuple[Array, Array]:
     """Return D = G⁻¹ scaled to unit diagonal, e D e, and e = D_ii^(-1/2)."""
     triangle = lapack.dpotri(factor, lower=1)[0] if factor.size else factor
     inverse = np.tril(triangle) + np.tril(triangle, -1).T
-    e = np.diagonal(inverse) ** -0.5
+    e = np.ascontiguousarray(np.diagonal(inverse)) ** -0.5  # without gaps: see energy_scale
     return np.ascontiguousarray(e[:, None] * inverse * e), e

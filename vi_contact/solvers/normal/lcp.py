@@ -231,7 +231,9 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
         raise InputError(
             "the Delassus operator contains NaN or infinity: check the factorisation it came from"
         )
-    diagonal = np.asarray(G.diagonal(), dtype=float)
+    # A copy without gaps: numpy raises numbers with gaps to a power in another way, which may
+    # differ in the last digit, where its answer happens to lie next to them in memory.
+    diagonal = np.ascontiguousarray(G.diagonal(), dtype=float)
     if signed:
         diagonal = np.where(diagonal == 0.0, max_abs(G) or 1.0, np.abs(diagonal))
     wrong = np.flatnonzero(~(diagonal > 0.0))
