@@ -5,7 +5,7 @@ demos=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 . "$demos/../install/setup.sh"
 
 launch=()
-if [ "${1:-}" = -n ]; then launch=(mpirun -n "${2:?number of ranks}"); shift 2; fi
+if [ "${1:-}" = -n ]; then launch=("${vi_ranks[@]}" "${2:?number of ranks}"); shift 2; fi
 name=${1:-}
 if [ -z "$name" ] || [ ! -f "$demos/$name.py" ]; then
   echo "vi_contact: ${name:+no demo \"$name\"; }choose one of:" $(cd "$demos" && ls ./*.py 2>/dev/null | sed 's|^\./||; s|\.py$||') >&2

@@ -23,9 +23,13 @@ vi_mpi_environment() {
     *) export PRTE_MCA_mapby=:oversubscribe PRTE_MCA_bindto=none ;;
   esac
   export OMPI_MCA_ess_singleton_isolated=1  # one rank without mpirun: no daemon to start, none to fail
-  export OMPI_MCA_mpi_yield_when_idle=1 HWLOC_HIDE_ERRORS=2 UCX_LOG_LEVEL=fatal
+  export HWLOC_HIDE_ERRORS=2 UCX_LOG_LEVEL=fatal
   export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,openib,ofi,uct,usnic OMPI_MCA_btl_vader_single_copy_mechanism=none
 }
+
+# Several ranks give their cores away while they wait for each other. One rank must not: MUMPS asks MPI a hundred thousand times in
+# a small run, and beside other work each answer would cost it its turn: minutes in the place of seconds.
+vi_ranks=(env OMPI_MCA_mpi_yield_when_idle=1 mpirun -n)
 
 # dolfinx keeps compiled forms, and matplotlib its fonts, under ~/.cache: elsewhere when there is no such place.
 vi_cache_environment() {

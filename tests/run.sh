@@ -32,7 +32,7 @@ share() {
 run() {  # on $1 ranks, with pytest's arguments
   local ranks=$1 launch=() limit=() code=0 p=0 f=0 s=0; shift
   # --capture=sys: a library that calls exit() on one rank takes what pytest has captured from it along
-  if [ "$ranks" -eq 1 ]; then set -- $(share "$@") "$@"; else launch=(mpirun -n "$ranks"); set -- --capture=sys "$@"; fi
+  if [ "$ranks" -eq 1 ]; then set -- $(share "$@") "$@"; else launch=("${vi_ranks[@]}" "$ranks"); set -- --capture=sys "$@"; fi
   [ -z "$seconds" ] || limit=(timeout -k 10 "$((SECONDS < seconds ? seconds - SECONDS : 1))")
   : >"$tally"
   # bash lets what it starts with & ignore Ctrl-C, which tests send themselves
