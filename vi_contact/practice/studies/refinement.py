@@ -18,8 +18,8 @@ from ...run.files.folder import CHECKPOINT, HISTORY_CSV
 from ...run.files.reading import RunFolder, read_run
 from ..engineering.peak_values import GROWS, peaks
 from ..plots.sections import SAY, Section, Table, number
-from .cases.library import COPY, copied_settings, read_copy
-from .cases.toml_file import toml_value, with_settings
+from .cases.library import COPY, read_copy, read_settings
+from .cases.toml_file import format_value, with_settings
 
 FOLDER = "refined"  # in the run folder
 NAMES = {"h": "h/2", "dt": "dt/2"}
@@ -55,7 +55,7 @@ def refine(
     for name in NAMES:
         try:
             out = inner_folder(run.folder, FOLDER, name)
-            same, settings = _same(run, name), [*copied_settings(run.folder), *_halved(run, name)]
+            same, settings = _same(run, name), [*read_settings(run.folder), *_halved(run, name)]
             if not (same and _status(out) == "finished"):
                 case = read_case(run.folder / COPY, settings, allow=allow)
                 case.run(
@@ -92,7 +92,7 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
             else None
         )
         refine = 1 + tables["mesh"].get("refine", 0)
-        yield f"mesh.refine={refine}" if finer is None else f"mesh.divisions={toml_value(finer)}"
+        yield f"mesh.refine={refine}" if finer is None else f"mesh.divisions={format_value(finer)}"
     elif not isinstance(dt, int | float):
         raise InputError(
             f"the time step is not a number, {dt}: halve it in the case and compare the runs"
@@ -131,7 +131,7 @@ def _status(folder: Path) -> str:
     return str(read_run(folder).facts.get("status")) if is_own(folder / HISTORY_CSV) else ""
 
 
-def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
+def describe_refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     """Return the section with the peaks of a run and of those in its folder ``refined``.
 
     It says so if there are none; ``failed`` is name -> why, of ``refine``.

@@ -26,8 +26,8 @@ from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from .cases.library import COPY, read_copy
 from .cases.parsing import Words, read
-from .cases.table_calls import Spot, build, callee
-from .refinement import refinement
+from .cases.table_calls import Spot, build, make_callee
+from .refinement import describe_refinement
 
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
@@ -73,7 +73,7 @@ def report(
     sections[:0] = [replace(sections.pop(0), pictures=sketched)] if model else []
     more = [
         _checks(folder),
-        error := refinement(run, failed or {}),
+        error := describe_refinement(run, failed or {}),
         Section("Pictures", pictures=drawn),
     ]
     sections[-2:-2] = [one for one in more if one.sentences or one.tables or one.pictures]
@@ -116,7 +116,7 @@ def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
     table = read_copy(folder).get("check", [])
     words = Words(
         folder,
-        {Check: {name: callee(getattr(checks, name)) for name in checks.__all__}},
+        {Check: {name: make_callee(getattr(checks, name)) for name in checks.__all__}},
         {},
         (),
         {},

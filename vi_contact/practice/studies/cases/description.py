@@ -26,8 +26,8 @@ from ....run.sampling import sampling_warning
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
 from .bodies import Body
-from .table_calls import Call, Group, build, nodes_in
-from .unread_choices import left_over
+from .table_calls import Call, Group, build, walk_nodes
+from .unread_choices import find_left_over
 from .vocabulary import Parts
 
 ELEMENTS = (
@@ -157,7 +157,7 @@ def describe(
     """
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
-    told = _meshed(problem, tags) if case.body is None else case.body.told
+    told = _meshed(problem, tags) if case.body is None else case.body.description
     bodies = told["bodies"]
     run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
     model = {
@@ -195,7 +195,7 @@ def describe(
     } | _modes(case, problem, most)
     model |= {
         "defects": list(_defects(model)),
-        "warnings": [*_warnings(model), *left_over(case.path, case.tables)],
+        "warnings": [*_warnings(model), *find_left_over(case.path, case.tables)],
     }
     for sentence, refused in judge_loose_bodies(problem) if problem.system.floating else ():
         model["defects" if refused else "warnings"].append(sentence)
@@ -210,7 +210,7 @@ def describe(
 
 
 def _meshed(problem: ContactProblem, tags: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is told of bodies with a mesh, as ``Body.told`` has it of others."""
+    """Return what is told of bodies with a mesh, as ``Body.description`` has it of others."""
     space = space_of("describe", problem.system)
     volumes = cell_volumes(space.mesh)
     bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
@@ -223,7 +223,7 @@ def _meshed(problem: ContactProblem, tags: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def in_words(model: Mapping[str, Any]) -> str:
+def put_in_words(model: Mapping[str, Any]) -> str:
     """Return what ``describe`` found, as lines of text."""
     lines = []
     for part in PARTS:
@@ -309,7 +309,7 @@ def _contact(
     """
     surface, tables = problem.surface, case.nodes.get("contact", ())
     nodes = tables if isinstance(tables, tuple) else (tables,)
-    grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]
+    grouped = [[one for one in walk_nodes(node) if isinstance(one, Group)] for node in nodes]
     names = [
         node.arguments.get("name") or " on ".join(one.name for one in groups)
         for node, groups in zip(nodes, grouped, strict=True)
@@ -386,7 +386,7 @@ def _records(case: Any, system: Any) -> list[dict[str, Any]]:
     """
     calls = (
         one
-        for one in nodes_in(case.nodes.get("system", ()))
+        for one in walk_nodes(case.nodes.get("system", ()))
         if isinstance(one, Call) and one.callee.name == "upgoing"
     )
     rising = (build(one.arguments.get("motion", ()), {"system": system}) for one in calls)

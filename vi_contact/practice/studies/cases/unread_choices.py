@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError
-from .bodies import OWN
+from .bodies import BODY_TABLES
 from .stage_tables import OF_MOTION, WHOLE
-from .table_calls import Call, Node, nodes_in
+from .table_calls import Call, Node, walk_nodes
 
 RATIO_LAW = "DampingRatio"
 BLIND_TO_RATIOS = (
@@ -70,7 +70,7 @@ class Part:
         return arguments
 
 
-def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
+def find_unread(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield all choices without effect.
 
     tables: of the file, with its stages; parts: the stages in their order, or the one whole
@@ -90,7 +90,7 @@ def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> It
         yield from _released(path, tables)
 
 
-def left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
+def find_left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
     """Yield a sentence for each table that waits for a motion in a case of static stages.
 
     These are no mistake, as one looks at the weight alone before the motion is added: they are
@@ -126,7 +126,7 @@ def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> 
         users = [
             part
             for part in parts
-            if any(one is part.nodes["material"][name] for one in nodes_in(part.nodes["system"]))
+            if any(one is part.nodes["material"][name] for one in walk_nodes(part.nodes["system"]))
         ]
         if not users:
             yield (
@@ -142,7 +142,7 @@ def _ratios(part: Part) -> Iterator[Finding]:
     """Yield the law of damping ratios without a ratio, and ratios without the law."""
     law = part.system.get("damping")
     word = law.callee.name if isinstance(law, Call) else "NoDamping"
-    used = [one for one in nodes_in(part.system.get("material", ())) if isinstance(one, Call)]
+    used = [one for one in walk_nodes(part.system.get("material", ())) if isinstance(one, Call)]
     named = part.nodes.get("material", {})
     names = [name for name, one in named.items() if any(one is other for other in used)]
     damped = [name for name in names if named[name].arguments.get("xi")]
@@ -172,7 +172,7 @@ def _without_contact(part: Part) -> Iterator[Finding]:
 
     It yields them too where there is none that they act on, or another before them.
     """
-    surfaces = [one for key in ("contact", *OWN) for one in part.calls(key)]
+    surfaces = [one for key in ("contact", *BODY_TABLES) for one in part.calls(key)]
     yield from _without_slip(part)
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
@@ -215,7 +215,7 @@ def _without_contact(part: Part) -> Iterator[Finding]:
 
 def _without_slip(part: Part) -> Iterator[Finding]:
     """Yield friction of a body that cannot slide."""
-    for body in (one for key in OWN for one in part.calls(key)):
+    for body in (one for key in BODY_TABLES for one in part.calls(key)):
         if part.calls("friction") and body.callee.name in STRAIGHT:
             yield (
                 "friction",
@@ -294,7 +294,7 @@ def _twice(part: Part) -> Iterator[Finding]:
 
 def _recorded_weight(part: Part) -> Iterator[Finding]:
     """Yield recorders that take off a weight which the body does not have."""
-    loads = [one for one in nodes_in(part.system.get("loads", ())) if isinstance(one, Call)]
+    loads = [one for one in walk_nodes(part.system.get("loads", ())) if isinstance(one, Call)]
     if part.calls("gravity") or any(one.callee.name == "BodyForce" for one in loads):
         return
     for one in part.calls("record"):

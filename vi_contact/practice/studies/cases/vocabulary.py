@@ -60,9 +60,9 @@ from ...soil import SoilCurves, UpgoingVelocity
 from . import bodies
 from .bodies import BeamBody, LayerLaw, ParticleBody
 from .expressions import Expression, Places
-from .own_classes import defect, is_protocol
+from .own_classes import describe_defect, is_protocol
 from .parsing import Words
-from .table_calls import Callee, callee
+from .table_calls import Callee, make_callee
 
 _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
     core: (Obstacle, FrictionLaw),
@@ -324,7 +324,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
 }
 
 
-def names_of(kind: Any) -> tuple[str, ...]:
+def list_names(kind: Any) -> tuple[str, ...]:
     """Return the words for things of a kind: ``names_of(Scheme)`` are the schemes."""
     return tuple(_choices()[kind])
 
@@ -355,7 +355,7 @@ class _Listed(Mapping[str, Callee]):
             found |= {one.name: one for one in _callees(room, self._kind, own)}
         functions = _FUNCTIONS.get(self._kind, {}).items()
         return found | {
-            name: callee(one(), name=name)
+            name: make_callee(one(), name=name)
             for name, one in functions
             if names is None or name in names
         }
@@ -383,8 +383,8 @@ def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Call
     Named constructors are among them; none needs functions.
     """
     for cls in (getattr(room, name) for name in names):
-        if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
-            made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
+        if isinstance(cls, type) and not is_protocol(cls) and not describe_defect(cls, kind):
+            made = [make_callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
             yield from (
                 one
                 for one in made
@@ -399,7 +399,7 @@ def _constructors(cls: type) -> Iterator[Any]:
             yield getattr(cls, name)
 
 
-def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
+def make_words(folder: Path, allowed: Sequence[str] = ()) -> Words:
     """Return the words of a case file in this folder.
 
     Its relative paths begin there; ``allowed`` are others' packages.

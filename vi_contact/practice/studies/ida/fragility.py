@@ -27,7 +27,7 @@ from scipy.special import log_ndtr, ndtr
 from ....core.algebra import Array
 from ....core.arguments import checked
 from ....core.errors import InputError
-from .measures import Demand, demand
+from .measures import Demand, read_demand
 
 NORMAL = 1.959963984540054  # 95 % of the normal distribution lie within so many standard deviations
 SAME = 1e-9  # of two intensities: they are those of records that were scaled to one
@@ -35,7 +35,7 @@ SAME = 1e-9  # of two intensities: they are those of records that were scaled to
 LEAST = 0.01
 
 
-def limit(text: str) -> tuple[Demand, float]:
+def read_limit(text: str) -> tuple[Demand, float]:
     """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column.
 
     InputError for others.
@@ -52,17 +52,17 @@ def limit(text: str) -> tuple[Demand, float]:
             f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such "
             "as contact_max_slip:max=0.05"
         )
-    return demand(name), found
+    return read_demand(name), found
 
 
-def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
+def bracket_capacities(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
     """Return (records, 2) values of the column ``level`` at which limits are passed.
 
     Between these two each record first passes a limit.
 
     Of a record count the runs below its first failed one; one without any is left out.
     """
-    (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
+    (one, most), found, ended = read_limit(text), dict[str, tuple[float, float]](), set()
     for row in sorted(
         (row for row in rows if row[level] is not None), key=lambda row: float(row[level])
     ):

@@ -33,11 +33,11 @@ from ....run.wall_time import WallTime
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ..cases.case import Case, read_case
 from ..cases.description import describe
-from ..cases.parsing import nearest
-from .fragility import fragility_curve, limit, passing
-from .measures import Demand, Intensity, demand, fractiles, intensity
-from .processes import executed, refuse_mpirun
-from .runs import ROW, OneRun, Row, Shaking, read_json, read_row, shakings
+from ..cases.parsing import suggest_nearest
+from .fragility import bracket_capacities, fragility_curve, read_limit
+from .measures import Demand, Intensity, compute_fractiles, read_demand, read_intensity
+from .processes import execute_runs, refuse_mpirun
+from .runs import ROW, OneRun, Row, Shaking, gather_shakings, read_json, read_row
 
 Units = dict[str, tuple[str, str]]
 SECONDS = 30.0  # between two lines about the time left
@@ -104,7 +104,7 @@ class IDA:
     @cached_property
     def measure(self) -> Intensity:
         """Return the intensity measure."""
-        return intensity(self.intensity, self._first_period)
+        return read_intensity(self.intensity, self._first_period)
 
     def _first_period(self) -> float:
         settings = (*self.case.settings, *self.shakings[0].settings(self.case))
@@ -115,13 +115,15 @@ class IDA:
     def wanted(self) -> list[Demand]:
         """Return the demand parameters, those of the limits among them."""
         return list(
-            dict.fromkeys((*map(demand, self.demands), *(limit(text)[0] for text in self.limits)))
+            dict.fromkeys(
+                (*map(read_demand, self.demands), *(read_limit(text)[0] for text in self.limits))
+            )
         )
 
     @property
     def shakings(self) -> list[Shaking]:
         """Return the motions by name."""
-        return shakings(self.case, self.motions)
+        return gather_shakings(self.case, self.motions)
 
     def runs(self, out: Path) -> list[OneRun]:
         """Return every record at every scale, record by record."""
@@ -200,7 +202,7 @@ def run_ida(
         )
         number, begin = 0, time.monotonic()
         told = begin
-        for found in executed(left, jobs, launch, end):
+        for found in execute_runs(left, jobs, launch, end):
             now = time.monotonic()
             if isinstance(found, float):
                 if now > told + SECONDS and found > 0.0:
@@ -241,7 +243,7 @@ def _check_demands(study: IDA) -> None:
         if one.column not in written:
             raise InputError(
                 f"demand '{one.column}': the runs record no such column: "
-                f"{nearest(one.column, written)}"
+                f"{suggest_nearest(one.column, written)}"
             )
 
 
@@ -371,7 +373,7 @@ def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str]
     found, table, measure = {}, [], study.measure
     for text in study.limits:
         try:
-            fit = fragility_curve(passing(rows, text, measure.name))
+            fit = fragility_curve(bracket_capacities(rows, text, measure.name))
         except InputError as error:
             say(f"fragility of {text}: {error}")
             continue
@@ -421,5 +423,9 @@ def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) 
         levels, values = np.array(good).reshape(-1, 2).T
         curves[record] = levels, values
     return DemandPanel(
-        column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed)
+        column[1].partition(":")[0],
+        column[0],
+        curves,
+        *compute_fractiles(curves, SHARES),
+        tuple(failed),
     )

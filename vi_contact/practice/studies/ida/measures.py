@@ -67,7 +67,7 @@ def _seconds(text: str) -> float:
         return 0.0
 
 
-def intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
+def read_intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
     """Return the measure of a word.
 
     Words are pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %), and
@@ -123,7 +123,7 @@ class Demand:
         return _WAYS[self.way][0](np.asarray(history[self.column], dtype=float))
 
 
-def demand(text: str) -> Demand:
+def read_demand(text: str) -> Demand:
     """Return the demand of a word.
 
     It is "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last".
@@ -136,7 +136,7 @@ def demand(text: str) -> Demand:
     return Demand(column, way or "absmax")
 
 
-def fractiles(
+def compute_fractiles(
     curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]
 ) -> tuple[Array, Array]:
     """Return (levels (n,), demands (n, shares)).

@@ -33,7 +33,7 @@ AGAIN = "ended the study: give the same command again to go on"
 _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")
 
 
-def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
+def build_command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
     """Return the command of these runs.
 
     Each begins from its checkpoint if there is one; it raises OutOfTime without wall time left.
@@ -54,7 +54,9 @@ def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> lis
     return [*launch, sys.executable, "-m", "vi_contact.practice.cli.batch", json.dumps(asked)]
 
 
-def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> subprocess.Popen[str]:
+def start_process(
+    runs: Sequence[OneRun], launch: Sequence[str], end: WallTime
+) -> subprocess.Popen[str]:
     """Start them, in the environment without what MPI of this process may have put there."""
     package = str(Path(__file__).resolve().parents[2])
     way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -63,7 +65,7 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
         | dict(os.environ)
         | {"PYTHONPATH": way}
     )
-    words = command(runs, launch, end)
+    words = build_command(runs, launch, end)
     for one in runs:
         if read_row(one.folder / ROW) is not None:
             remove(one.folder / ROW)
@@ -151,7 +153,7 @@ class Processes:
         with self._lock:
             if self._stopped.is_set():
                 raise KeyboardInterrupt
-            process = started(runs, self._launch, self._end)
+            process = start_process(runs, self._launch, self._end)
             self._going.add(process)
         return process
 
@@ -163,7 +165,7 @@ class Processes:
         _stop(left)
 
 
-def executed(
+def execute_runs(
     runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime
 ) -> Iterator[Row | float]:
     """Run them in so many processes at a time, and yield the row of each when it ends.

@@ -18,7 +18,7 @@ from ...ground_motion.processing import scaled
 from ...ground_motion.record import Record
 from ..cases.case import Case, read_case
 from ..cases.stage_tables import refuse_own
-from ..cases.toml_file import toml_value
+from ..cases.toml_file import format_value
 
 Row = dict[str, Any]
 ROW = "row.json"
@@ -41,7 +41,7 @@ class Shaking:
         Its own scales are multiplied by the factor.
         """
         found = []
-        for (place, table), path in zip(ground_motions(case), self.files, strict=True):
+        for (place, table), path in zip(gather_ground_motions(case), self.files, strict=True):
             record = table.get("record")
             key = (
                 f"{place}.record.path"
@@ -49,7 +49,7 @@ class Shaking:
                 else f"{place}.record"
             )
             found += [
-                f"{key}={toml_value(str(path))}",
+                f"{key}={format_value(str(path))}",
                 f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}",
             ]
         return tuple(found)
@@ -69,7 +69,7 @@ def _record(path: Path, settings: tuple[str, ...], allowed: tuple[str, ...]) -> 
     return scaled(motion.record, factor=motion.scale)
 
 
-def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
+def gather_ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     """Return (key, table) of the ground motions of a case.
 
     It raises InputError unless it is shaken by records alone.
@@ -122,12 +122,14 @@ def record_set(word: str) -> list[list[str]]:
     return [[str(folder / name) for name in files] for files in found]
 
 
-def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -> list[Shaking]:
+def gather_shakings(
+    case: Case, motions: Sequence[str | Path | Sequence[str | Path]]
+) -> list[Shaking]:
     """Return the records by name.
 
     A motion is a file, or one file for each ground motion of the case.
     """
-    count = len(ground_motions(case))
+    count = len(gather_ground_motions(case))
     found: dict[str, Shaking] = {}
     for motion in motions:
         files = tuple(
