@@ -19,7 +19,7 @@ import vi_contact as vc
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.sketch import sketch
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import _warnings, describe, put_in_words
+from vi_contact.practice.studies.cases.description import _find_warnings, describe, put_in_words
 
 COMM = MPI.COMM_WORLD
 HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0
@@ -449,7 +449,9 @@ def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> No
     for dt, count in ((0.99, 0), (1.01, 1)):
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
         said = [
-            one for one in _warnings(model) if "first natural period with the contact open" in one
+            one
+            for one in _find_warnings(model)
+            if "first natural period with the contact open" in one
         ]
         assert len(said) == count
     assert set(described(written(shared_tmp), COMM, "mesh.gap=0.1")) - set(model) == set()
