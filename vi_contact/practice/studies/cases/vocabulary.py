@@ -490,13 +490,10 @@ def _needs_function(target: Callee) -> bool:
 def _list_constructors(cls: type) -> Iterator[Any]:
     """Yield the classmethods that return an object of the class."""
     for name, member in vars(cls).items():
-        if isinstance(member, classmethod) and _find_return_type(member) is cls:
-            yield getattr(cls, name)
-
-
-def _find_return_type(method: classmethod[Any, Any, Any]) -> Any:
-    """Return what the annotations of a classmethod say that it returns."""
-    return get_type_hints(method.__func__).get("return")
+        if isinstance(member, classmethod):
+            returned = get_type_hints(member.__func__).get("return")
+            if returned is cls:
+                yield getattr(cls, name)
 
 
 def make_words(folder: Path, allowed: Sequence[str] = ()) -> Words:
