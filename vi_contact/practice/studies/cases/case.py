@@ -129,13 +129,9 @@ class Case:
     @property
     def out(self) -> Path | None:
         """Return the run folder of [run], if it names one."""
-        return self._read_plain("out")
-
-    def _read_plain(self, key: str) -> Any:
-        """Return a value of [run]; None where it is left out, or made of other things."""
         run = self.nodes["run"]
-        value = run.arguments.get(key) if isinstance(run, Call) else None
-        return None if isinstance(value, Call) else value
+        out = run.arguments.get("out") if isinstance(run, Call) else None
+        return None if isinstance(out, Call) else out
 
     def excitations(self, **context: Any) -> tuple[Excitation, ...]:
         """Return what shakes the body; record files are read here."""

@@ -176,9 +176,7 @@ def run_ida(
     say: Callable[[str], None] = print,
     wall_time: str | None = None,
 ) -> list[Row]:
-    """Make the runs that have not finished yet, and table and figure of all.
-
-    The table and figure are of all that are in ``out``. Return its rows.
+    """Make the runs that have not finished yet, and table and figure of all that are in ``out``.
 
     Eight runs share a process and, where the body serves all excitations, its assembly and every
     pass over its matrices (``simulate_many``). What a run cannot do is told in its row, and the
@@ -197,11 +195,14 @@ def run_ida(
         wall_time: as of ``simulate``: every run gets what is left of it, and ends with a checkpoint
             before it is over.
 
+    Returns:
+        The rows of the table.
+
     Raises:
         InputError: a folder of another study, or in which the same part runs, a part or number of
             jobs that makes no sense, inside mpirun.
-        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to
-            go on.
+        KeyboardInterrupt: after the runs have been told to stop. Call again to go on.
+        OutOfTime: likewise.
     """
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
