@@ -236,7 +236,7 @@ def test_the_first_period_of_the_model(motions: list[str]) -> None:
     period = 1.0 / lowest_frequency(case.parts(alone()).system)
     expected, record = read_intensity(f"sa:{period}"), study.shakings[0].record(case)
     assert study.measure.name == expected.name and study.measure.meaning == expected.meaning
-    assert study.measure.of(record) == pytest.approx(expected.of(record), rel=1e-6)
+    assert study.measure.compute(record) == pytest.approx(expected.compute(record), rel=1e-6)
     with pytest.raises(InputError, match="intensity 'sa:T2': give the period after the colon"):
         read_intensity("sa:T2", lambda: 1.0)
 
@@ -268,7 +268,7 @@ def test_a_study_ends_in_curves_and_goes_on(
         }, dict.fromkeys(wanted, ("m", "u"))
 
     monkeypatch.setattr("vi_contact.practice.studies.ida.ida.execute_runs", executed)
-    monkeypatch.setattr("vi_contact.practice.studies.ida.ida._history", history)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.ida._read_history", history)
     said: list[str] = []
     for levels in ((1.0, 2.0, 4.0), (1.0, 1.5, 2.0, 3.0, 4.0)):
         made.clear()

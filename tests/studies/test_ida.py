@@ -478,12 +478,14 @@ def test_measures() -> None:
     record = Record(np.sin(0.3 * np.arange(400)), 0.01)
     for word in ("pga", "pgv", "pgd", "arias", "cav", "housner", "sa:0.3"):
         measure = read_intensity(word)
-        found = measure.of(scaled(record, factor=measure.scale(record, 2.5)))
+        found = measure.compute(scaled(record, factor=measure.scale(record, 2.5)))
         assert found == pytest.approx(2.5, rel=1e-9), word
-        grown = 3.0**measure.degree * measure.of(record)
-        assert measure.of(scaled(record, factor=3.0)) == pytest.approx(grown, rel=1e-9)
+        grown = 3.0**measure.degree * measure.compute(record)
+        assert measure.compute(scaled(record, factor=3.0)) == pytest.approx(grown, rel=1e-9)
     values = {"x": np.array([1.0, np.nan, -4.0, 2.0])}
-    found = [read_demand(f"x{way}").of(values) for way in ("", ":absmax", ":max", ":min", ":last")]
+    found = [
+        read_demand(f"x{way}").compute(values) for way in ("", ":absmax", ":max", ":min", ":last")
+    ]
     assert found == [4.0, 4.0, 2.0, -4.0, 2.0]
 
 

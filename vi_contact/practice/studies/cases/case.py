@@ -490,9 +490,9 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     path = Path(path)
     tables = read_toml(path)
     case = _read_tables(path, with_settings(tables, settings), settings, allow)
-    unread = _find_unread(case)
+    unread = _collect_unread(case)
     if unread:
-        before = _find_unread_without_settings(path, tables, allow) if settings else []
+        before = _collect_unread_without_settings(path, tables, allow) if settings else []
         refuse_unread(unread, before, settings)
     return case
 
@@ -541,7 +541,7 @@ def _refuse_groups(nodes: Mapping[str, Node], body: str) -> None:
                 )
 
 
-def _find_unread(case: Case) -> list[tuple[str, str]]:
+def _collect_unread(case: Case) -> list[tuple[str, str]]:
     """Return the choices of a case that nothing reads: key and sentence of each."""
     if case.stages:
         parts = [
@@ -552,7 +552,7 @@ def _find_unread(case: Case) -> list[tuple[str, str]]:
     return list(find_unread(case.path, case.tables, parts))
 
 
-def _find_unread_without_settings(
+def _collect_unread_without_settings(
     path: Path, tables: Mapping[str, Any], allow: Sequence[str]
 ) -> list[tuple[str, str]]:
     """Return the choices of the file alone that nothing reads.
@@ -560,7 +560,7 @@ def _find_unread_without_settings(
     The list is empty where the file is no case without the settings that complete it.
     """
     try:
-        return _find_unread(_read_tables(path, tables, (), allow))
+        return _collect_unread(_read_tables(path, tables, (), allow))
     except InputError:
         return []
 

@@ -104,7 +104,7 @@ def read_arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: 
             f"lacks the key '{missing[0]}', which {target.name} needs: give it"
         )
     nodes = {
-        key: read(value, target.hints[key], spot.at(key, target.unit(key)), words)
+        key: read(value, target.hints[key], spot.go_to_key(key, target.unit(key)), words)
         for key, value in values.items()
     }
     return Call(target, nodes, spot)
@@ -194,7 +194,9 @@ def _read_entries(value: list[Any], member: Any, spot: Spot, words: Words) -> tu
     elif len(kinds) != len(value):
         raise spot.make_error(f"has {len(value)} entries: give {len(kinds)}")
     pairs = enumerate(zip(value, kinds, strict=True), start=1)
-    return tuple(read(entry, kind, spot.entry(number), words) for number, (entry, kind) in pairs)
+    return tuple(
+        read(entry, kind, spot.go_to_entry(number), words) for number, (entry, kind) in pairs
+    )
 
 
 def _read_table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
@@ -214,7 +216,7 @@ def _read_table(value: dict[str, Any], members: list[Any], spot: Spot, words: Wo
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]
             return {
-                key: read(entry, kind, spot.at(key, spot.unit), words)
+                key: read(entry, kind, spot.go_to_key(key, spot.unit), words)
                 for key, entry in value.items()
             }
     raise spot.make_error(f"is a table: give {_describe_all(members, words)}")

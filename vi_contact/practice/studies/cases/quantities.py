@@ -106,7 +106,7 @@ def read_field(values: list[Any], members: Sequence[Any], spot: Spot) -> Places 
         if isinstance(value, str | int | float)
     ]
     components = tuple(
-        _read_expression(text, letters, spot.entry(number))
+        _read_expression(text, letters, spot.go_to_entry(number))
         for number, text in enumerate(texts, start=1)
     )
     if len(components) < len(values) or not any(component.used for component in components):

@@ -46,11 +46,11 @@ class Spot:
     def __str__(self) -> str:
         return f"[{self.table}] {self.key}".strip() if self.table else f"[{self.key}]"
 
-    def at(self, key: str, unit: str | None = None) -> "Spot":
+    def go_to_key(self, key: str, unit: str | None = None) -> "Spot":
         """Return the spot of a key of the table that is here."""
         return Spot(self.file, self._join_names(), key, unit)
 
-    def entry(self, number: int) -> "Spot":
+    def go_to_entry(self, number: int) -> "Spot":
         """Return the spot of an entry of the list that is here, counted from 1."""
         return Spot(self.file, self.table, f"{self.key}[{number}]", self.unit)
 

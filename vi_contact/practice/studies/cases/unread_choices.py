@@ -59,7 +59,7 @@ class Part:
     nodes: Mapping[str, Node]
     static: bool = False
 
-    def calls(self, table: str) -> list[Call]:
+    def list_calls(self, table: str) -> list[Call]:
         """Return the calls that a table, or an array of tables, makes itself; those in them not."""
         node = self.nodes.get(table, ())
         entries = node if isinstance(node, tuple) else (node,)
@@ -194,10 +194,10 @@ def _find_vain_contact_laws(part: Part) -> Iterator[Finding]:
 
     It yields them too where there is none that they act on, or another before them.
     """
-    surfaces = [call for key in ("contact", *BODY_TABLES) for call in part.calls(key)]
+    surfaces = [call for key in ("contact", *BODY_TABLES) for call in part.list_calls(key)]
     yield from _find_friction_without_slip(part)
     for table, happens in OF_CONTACT.items():
-        laws = part.calls(table)
+        laws = part.list_calls(table)
         # A law of masses of others may change all masses.
         changes_all = table == "mass" and bool(laws) and laws[0].callee.name not in MASSES
         if laws and not surfaces and not changes_all:
@@ -209,7 +209,7 @@ def _find_vain_contact_laws(part: Part) -> Iterator[Finding]:
                 ),
             )
     on_springs = bool(surfaces) and all("springs" in call.arguments for call in surfaces)
-    if part.calls("impact") and on_springs:
+    if part.list_calls("impact") and on_springs:
         yield (
             "impact",
             (
@@ -226,7 +226,9 @@ def _find_vain_contact_laws(part: Part) -> Iterator[Finding]:
                 "[[contact]]: give the contact, or the step alone"
             ),
         )
-    if part.calls("mass") and any("mass" in call.arguments for call in part.calls("scheme")):
+    if part.list_calls("mass") and any(
+        "mass" in call.arguments for call in part.list_calls("scheme")
+    ):
         yield (
             "scheme.mass",
             (
@@ -238,8 +240,8 @@ def _find_vain_contact_laws(part: Part) -> Iterator[Finding]:
 
 def _find_friction_without_slip(part: Part) -> Iterator[Finding]:
     """Yield friction of a body that cannot slide."""
-    for body in (call for key in BODY_TABLES for call in part.calls(key)):
-        if part.calls("friction") and body.callee.name in STRAIGHT:
+    for body in (call for key in BODY_TABLES for call in part.list_calls(key)):
+        if part.list_calls("friction") and body.callee.name in STRAIGHT:
             yield (
                 "friction",
                 (
@@ -251,13 +253,15 @@ def _find_friction_without_slip(part: Part) -> Iterator[Finding]:
 
 def _find_vain_solvers(part: Part) -> Iterator[Finding]:
     """Yield methods for steps that the case does not have, and solvers that have failed before."""
-    laws = [call.callee.name for call in part.calls("friction")]
+    laws = [call.callee.name for call in part.list_calls("friction")]
     friction = next((law for law in laws if law != "Frictionless"), "")
     for table in ("solver", "escalation"):
-        for call in part.calls(table):
+        for call in part.list_calls(table):
             if call.callee.name == "Condensed":
                 yield from _find_vain_keys_of_condensed(part.label, table, call.arguments, friction)
-    for earlier, later in combinations([*part.calls("solver"), *part.calls("escalation")], 2):
+    for earlier, later in combinations(
+        [*part.list_calls("solver"), *part.list_calls("escalation")], 2
+    ):
         if earlier == later:
             yield (
                 "escalation",
@@ -326,9 +330,9 @@ def _find_doubles(part: Part) -> Iterator[Finding]:
 def _find_vain_recorders(part: Part) -> Iterator[Finding]:
     """Yield recorders that take off a weight which the body does not have."""
     loads = [node for node in walk_nodes(part.system.get("loads", ())) if isinstance(node, Call)]
-    if part.calls("gravity") or any(load.callee.name == "BodyForce" for load in loads):
+    if part.list_calls("gravity") or any(load.callee.name == "BodyForce" for load in loads):
         return
-    for recorder in part.calls("record"):
+    for recorder in part.list_calls("record"):
         if "gravity" in recorder.arguments:
             yield (
                 "record",
@@ -367,7 +371,7 @@ def _find_lost_initial_values(parts: Sequence[Part]) -> Iterator[Finding]:
 def _find_vain_inertia(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield masses of held nodes that no ground motion and no weight accelerates."""
     has_inertia = any("base_inertia" in part.system for part in parts)
-    accelerated = any(part.calls("excitation") or part.calls("gravity") for part in parts)
+    accelerated = any(part.list_calls("excitation") or part.list_calls("gravity") for part in parts)
     if has_inertia and not accelerated:
         yield (
             "system.base_inertia",

@@ -415,12 +415,12 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
 
 
 def list_names(kind: Any) -> tuple[str, ...]:
-    """Return the words for things of a kind: ``names_of(Scheme)`` are the schemes."""
-    return tuple(_choices()[kind])
+    """Return the words for things of a kind: ``list_names(Scheme)`` are the schemes."""
+    return tuple(_gather_choices()[kind])
 
 
 @cache
-def _choices() -> Mapping[Any, Mapping[str, Callee]]:
+def _gather_choices() -> Mapping[Any, Mapping[str, Callee]]:
     """Return kind -> word -> what it calls."""
     kinds_of_rooms = (kind for kinds in _KINDS.values() for kind in kinds)
     return MappingProxyType({kind: _Choices(kind) for kind in (*kinds_of_rooms, *_FUNCTIONS)})
@@ -511,5 +511,5 @@ def make_words(folder: Path, allowed: Sequence[str] = ()) -> Words:
         LayerLaw: "contact_layer",
     }
     return Words(
-        folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
+        folder, _gather_choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
     )

@@ -217,7 +217,7 @@ def run_ida(
     with lock_folder(SerialComm(), out, lock):
         every = study.runs(out)
         mine = every[part[0] - 1 :: part[1]]
-        left = [run for run in mine if run.done() is None]
+        left = [run for run in mine if run.read_finished() is None]
         if left:
             _check_demands(study)
         say(
@@ -396,12 +396,12 @@ def _tabulate(
             # The intensity is that of the unscaled motion, times a power of the scale.
             shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
             with suppress(InputError):
-                unscaled = measure.of(shaking.record(case))
+                unscaled = measure.compute(shaking.record(case))
                 measured[measure.name] = unscaled * row["scale"] ** measure.degree
         if row["status"] == "finished":
-            history, columns = _history(folder, tuple(demand.column for demand in demands))
+            history, columns = _read_history(folder, tuple(demand.column for demand in demands))
             for demand in demands:
-                measured[demand.name] = demand.of(history)
+                measured[demand.name] = demand.compute(history)
                 unit, meaning = columns[demand.column]
                 units[demand.name] = (unit, f"{demand.meaning}: {meaning}")
         rows.append({name: measured.get(name, row.get(name)) for name in units})
@@ -427,7 +427,7 @@ def _make_sort_key(row: Row) -> tuple[str, float]:
 
 
 @cache
-def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], Units]:
+def _read_history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], Units]:
     """Return the wanted columns of a finished run, read once, and what its columns mean.
 
     Where one of them is missing, it returns all, whose names the error tells.

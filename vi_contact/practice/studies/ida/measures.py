@@ -24,21 +24,21 @@ _WAYS: dict[str, tuple[Callable[[Array], float], str]] = {
 
 @dataclass(frozen=True)
 class Intensity:
-    """Define an intensity measure: of(record) in ``unit``; a motion times f has f**degree of it.
+    """Define an intensity measure; a motion times f has f**degree of it.
 
     Attributes:
         name: of its column.
         unit: of its values.
         meaning: in words.
         degree: power of the scale in it [-].
-        of: record -> value.
+        compute: record -> value in ``unit``.
     """
 
     name: str
     unit: str
     meaning: str
     degree: int
-    of: Callable[[Record], float]
+    compute: Callable[[Record], float]
 
     def scale(self, record: Record, level: float) -> float:
         """Return the factor that brings the record to this level.
@@ -46,7 +46,7 @@ class Intensity:
         Raises:
             InputError: unless both are positive.
         """
-        value = self.of(record)
+        value = self.compute(record)
         if not (level > 0.0 and value > 0.0):
             raise InputError(
                 f"level {level:g} of {self.name}: the record has {value:g}; give levels above "
@@ -127,7 +127,7 @@ class Demand:
         """Return it in words."""
         return f"{_WAYS[self.way][1]} {self.column}"
 
-    def of(self, history: Mapping[str, Array]) -> float:
+    def compute(self, history: Mapping[str, Array]) -> float:
         """Return the value of a run; InputError for a column it has not recorded."""
         if self.column not in history:
             known = ", ".join(history)

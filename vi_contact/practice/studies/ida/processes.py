@@ -123,7 +123,7 @@ class Processes:
         self._going: set[subprocess.Popen[str]] = set()
         self.shares: dict[subprocess.Popen[str], float] = {}
 
-    def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
+    def execute(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
         """Yield the row of each run as it ends, None when more is done.
 
         What a dead process has left is run one by one.
@@ -142,7 +142,7 @@ class Processes:
                 break
         if len(runs) > 1:
             for run in runs:
-                yield from self.rows([run])
+                yield from self.execute([run])
         elif runs:
             yield runs[0].keep("".join(other_lines), process.returncode)
 
@@ -225,7 +225,7 @@ def execute_runs(
 
     def make(batch: Sequence[OneRun]) -> None:
         try:
-            for row in processes.rows(batch):
+            for row in processes.execute(batch):
                 # The sum of now, as others go on before it is read.
                 news.put(float(sum(list(processes.shares.values()))) if row is None else row)
         except BaseException as error:

@@ -199,7 +199,7 @@ class OneRun:
     folder: Path
     wrong: str = ""
 
-    def done(self) -> Row | None:
+    def read_finished(self) -> Row | None:
         """Return the row of a run that has finished, or None."""
         inner_folder(self.folder.parents[1], self.folder.parent.name, self.folder.name)
         row = read_row(self.folder / ROW)
