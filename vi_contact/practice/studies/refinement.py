@@ -165,8 +165,10 @@ def describe_refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     """
     refined: dict[str, dict[str, Any]] = {}
     for name in NAMES:
+        if name in failed:  # its folder may be none
+            continue
         out = inner_folder(run.folder, FOLDER, name)
-        if name not in failed and _read_status(out) == "finished" and _is_of_same_case(run, name):
+        if _read_status(out) == "finished" and _is_of_same_case(run, name):
             other = read_run(out)
             refined[name] = {peak.name: peak for peak in peaks(other.history, other.columns)}
     sentences = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]
