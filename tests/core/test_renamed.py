@@ -9,7 +9,7 @@ import pytest
 
 import vi_contact
 from vi_contact.core import renamed
-from vi_contact.practice.studies.cases.parsing import nearest
+from vi_contact.practice.studies.cases.parsing import suggest_nearest
 
 pytestmark = pytest.mark.serial
 
@@ -43,5 +43,5 @@ def test_a_name_that_never_was_is_no_name(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_an_old_word_of_a_case_file_names_the_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(renamed.WORDS, "bouncing", "Elastic")
-    assert nearest("bouncing", ["Elastic", "Inelastic"]) == "it is now Elastic"
-    assert nearest("bouncing", ["Inelastic"]).endswith("Known: Inelastic")
+    assert suggest_nearest("bouncing", ["Elastic", "Inelastic"]) == "it is now Elastic"
+    assert suggest_nearest("bouncing", ["Inelastic"]).endswith("Known: Inelastic")

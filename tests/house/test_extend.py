@@ -136,9 +136,9 @@ def test_a_scheme_is_one_file_and_one_registry_line(tmp_path: Path) -> None:
     asked = """
 import vi_contact as vc
 from vi_contact.core.step import Scheme
-from vi_contact.practice.studies.cases.vocabulary import names_of
+from vi_contact.practice.studies.cases.vocabulary import list_names
 name = "BackwardEuler"
-print(vc.BackwardEuler(), name in vc.__all__, name in names_of(Scheme), vc.__file__)
+print(vc.BackwardEuler(), name in vc.__all__, name in list_names(Scheme), vc.__file__)
 """
     assert python(["-c", asked], tmp_path, str(tmp_path)).startswith(
         f"BackwardEuler() True True {tmp_path}"

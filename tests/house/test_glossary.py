@@ -38,9 +38,9 @@ def shipped() -> list[Path]:
 
 def test_tables_of_case_files_are_named() -> None:
     pytest.importorskip("dolfinx")
-    from vi_contact.practice.studies.cases.schema import text
+    from vi_contact.practice.studies.cases.schema import write_schema
 
-    schema = json.loads(text())
+    schema = json.loads(write_schema())
     missing = {
         name for name in schema["properties"] if not {name, f"[{name}]", f"[[{name}]]"} & CODE
     }

@@ -30,7 +30,7 @@ from vi_contact.practice.cli.entry import main
 from vi_contact.practice.engineering import contact_summary
 from vi_contact.practice.ground_motion import Record, read_record
 from vi_contact.practice.studies.cases.case import read_case
-from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.library import locate
 from vi_contact.practice.studies.cases.short_settings import ShortOptions
 from vi_contact.practice.studies.cases.table_calls import build as build_call
 from vi_contact.practice.studies.cases.toml_file import read_toml
@@ -348,7 +348,7 @@ def test_the_case_that_ships_is_the_channel_of_the_figures():
 
 def built_in(*given, **short):
     """The channel that ships with the package."""
-    path = located("channel")
+    path = locate("channel")
     return read_case(path, ShortOptions(**short).settings(read_toml(path), given))
 
 

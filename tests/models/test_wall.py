@@ -19,7 +19,7 @@ from vi_contact.laws.materials import LinearElastic, Rayleigh
 from vi_contact.practice.ground_motion import read_record
 from vi_contact.practice.ground_motion.excitation import GroundMotion
 from vi_contact.practice.studies.cases.case import Case, read_case
-from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.library import locate
 from vi_contact.practice.studies.cases.short_settings import ShortOptions
 from vi_contact.practice.studies.cases.toml_file import read_toml
 from vi_contact.run.march import march
@@ -176,7 +176,7 @@ def test_the_ground_accelerates_the_whole_mass():
 
 def built_in(*given: str, **short: Any) -> Case:
     """The wall that ships with the package."""
-    path = located("wall")
+    path = locate("wall")
     return read_case(path, ShortOptions(**short).settings(read_toml(path), given))
 
 

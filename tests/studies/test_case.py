@@ -25,10 +25,10 @@ from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.soil import FreeField, upgoing
 from vi_contact.practice.studies import Case, read_case
-from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.library import locate
 from vi_contact.practice.studies.cases.short_settings import REFERENCE, ROLLERS, ShortOptions
 from vi_contact.practice.studies.cases.toml_file import with_settings
-from vi_contact.practice.studies.cases.vocabulary import names_of, words
+from vi_contact.practice.studies.cases.vocabulary import list_names, make_words
 from vi_contact.solvers.friction.problem import FrictionMethod
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -215,7 +215,7 @@ def test_the_wall_with_other_values(shared_tmp: Path) -> None:
         "scheme.phi=",
         "fields=",
     )
-    found = read_case(located("wall"), given).run(COMM, progress=False)
+    found = read_case(locate("wall"), given).run(COMM, progress=False)
     model = build(Wall(thickness=0.3), COMM, base_inertia="catalogue")
     expected = vc.simulate(
         model.problem("a", excitation=vc.Harmonic(1.0, 14.0)),
@@ -230,7 +230,7 @@ def test_the_wall_with_other_values(shared_tmp: Path) -> None:
 
 def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
     """Keys of its mesh; a recorder that stands with the demo, its weight and static stage."""
-    text = located("channel").read_text("utf-8") + (
+    text = locate("channel").read_text("utf-8") + (
         '\n[[record]]\ntype = "demos.parts.problems.channel:SoilProbe"\n'
         "points = {1_soil = [10.0, 5.0]}\n"
     )
@@ -668,7 +668,9 @@ def test_the_command_runs_checks_and_restarts(
 def test_case_files_know_the_public_names() -> None:
     """Laws, obstacles, excitations, schemes, solvers, their methods and recorders, but those that
     take functions."""
-    known = {name.split(".")[0] for choices in words(ROOT).choices.values() for name in choices}
+    known = {
+        name.split(".")[0] for choices in make_words(ROOT).choices.values() for name in choices
+    }
     wanted = {*laws.__all__, *schemes.__all__, *solvers.__all__, *meshes.__all__}
     wanted |= {
         "Energy",
@@ -701,15 +703,19 @@ def test_case_files_know_the_public_names() -> None:
 def test_schemes_and_solvers_have_one_vocabulary() -> None:
     """Case files, the command line, ``vc.`` and the rooms say the same names, each listed once."""
     assert (
-        {name.split(".")[0] for name in names_of(Scheme)} == set(schemes.__all__) <= set(vc.__all__)
+        {name.split(".")[0] for name in list_names(Scheme)}
+        == set(schemes.__all__)
+        <= set(vc.__all__)
     )
-    assert {"GeneralisedAlpha.spectral_radius", "LinearMultistep.newmark"} <= set(names_of(Scheme))
+    assert {"GeneralisedAlpha.spectral_radius", "LinearMultistep.newmark"} <= set(
+        list_names(Scheme)
+    )
     assert (
-        set(names_of(Solver))
+        set(list_names(Solver))
         == {"Automatic", "Condensed", "Iterative", "Volume", "CrossChecked"}
         <= set(vc.__all__)
     )
-    assert set(names_of(FrictionMethod)) == set(solvers.friction.__all__) - {
+    assert set(list_names(FrictionMethod)) == set(solvers.friction.__all__) - {
         "Anderson",
         "Plain",
         "RateIteration",

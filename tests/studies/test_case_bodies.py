@@ -19,8 +19,8 @@ from vi_contact import beam, layer
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import read_case, refine, report
-from vi_contact.practice.studies.cases.description import describe, in_words
-from vi_contact.practice.studies.cases.library import located
+from vi_contact.practice.studies.cases.description import describe, put_in_words
+from vi_contact.practice.studies.cases.library import locate
 
 pytestmark = pytest.mark.serial
 COMM = MPI.COMM_WORLD
@@ -90,7 +90,7 @@ KINDS = {
 def test_a_beam_of_a_case_is_that_of_the_room(kind):
     """The numbers of a case and of the Python interface are the same."""
     settings = [*KINDS[kind], *SMALL[1:]] if KINDS[kind] else SMALL
-    found = read_case(located("beam"), settings).run(COMM, progress=False)
+    found = read_case(locate("beam"), settings).run(COMM, progress=False)
     record = [vc.Energy(), vc.Contact(), vc.Probe({"tip": (5.0, 0.0)})]
     own = vc.simulate(
         beam_of_python(kind),
@@ -106,7 +106,7 @@ def test_a_beam_of_a_case_is_that_of_the_room(kind):
 
 def test_a_particle_returns_as_its_layer_was_asked_to():
     """e is found to the order of the time step, and the case is that of the room."""
-    found = read_case(located("layer")).run(COMM, progress=False)
+    found = read_case(locate("layer")).run(COMM, progress=False)
     history = found.history
     left = np.sqrt(history["energy_kinetic"][-1] / history["energy_kinetic"][0])
     assert left == pytest.approx(0.7, rel=2e-4)
@@ -122,7 +122,7 @@ def test_a_particle_returns_as_its_layer_was_asked_to():
 
 def test_a_particle_may_have_an_impact_law_in_place_of_a_layer():
     settings = ["layer=", 'impact={type="Newton", e=0.5}', "scheme.type=ZienkiewiczWoodTaylor"]
-    history = read_case(located("layer"), settings).run(COMM, progress=False).history
+    history = read_case(locate("layer"), settings).run(COMM, progress=False).history
     left = history["energy_kinetic"][-1] / history["energy_kinetic"][0]
     assert left == pytest.approx(0.25, rel=1e-9)
 
@@ -130,7 +130,7 @@ def test_a_particle_may_have_an_impact_law_in_place_of_a_layer():
 def test_the_force_of_a_particle_acts_towards_the_wall():
     """Far from the wall it moves by s = v t + f t²/(2 m)."""
     settings = ["particle.distance=10.0", "particle.force=3.0", "particle.mass=2.0"]
-    history = read_case(located("layer"), settings).run(COMM, progress=False).history
+    history = read_case(locate("layer"), settings).run(COMM, progress=False).history
     t = history["t"]
     np.testing.assert_allclose(history["u_x_particle"], t + 0.75 * t**2, rtol=1e-9, atol=1e-12)
 
@@ -163,9 +163,9 @@ def test_a_run_goes_on_after_a_stop(name, tmp_path):
     """A run that has stopped half way, within the layer too, ends as one that has not."""
     settings = SMALL if name == "beam" else []
     end = "run.t_end=0.25" if name == "beam" else "run.t_end=0.13"
-    read_case(located(name), [*settings, end]).run(COMM, out=tmp_path / "two", progress=False)
+    read_case(locate(name), [*settings, end]).run(COMM, out=tmp_path / "two", progress=False)
     for out, restart in (("two", True), ("one", False)):
-        read_case(located(name), settings).run(
+        read_case(locate(name), settings).run(
             COMM, out=tmp_path / out, restart=restart, progress=False
         )
     one, two = ((tmp_path / out / "history.csv").read_bytes() for out in ("one", "two"))
@@ -176,7 +176,7 @@ def test_a_run_goes_on_after_a_stop(name, tmp_path):
 @pytest.mark.parametrize("name", ["beam", "layer"])
 def test_a_run_folder_is_whole_and_is_reported(name, tmp_path):
     settings = SMALL if name == "beam" else ["run.dt=0.002"]
-    read_case(located(name), settings).run(COMM, out=tmp_path, progress=False)
+    read_case(locate(name), settings).run(COMM, out=tmp_path, progress=False)
     kept = {path.name for path in tmp_path.iterdir()}
     assert {"case.toml", "history.csv", "history.h5", "model.json", "summary.json"} <= kept
     model = json.loads((tmp_path / "model.json").read_text(encoding="utf-8"))
@@ -187,11 +187,11 @@ def test_a_run_folder_is_whole_and_is_reported(name, tmp_path):
 
 @pytest.mark.slow
 def test_a_beam_is_refined_and_a_particle_has_no_elements(tmp_path):
-    read_case(located("beam"), SMALL).run(COMM, out=tmp_path / "beam", progress=False)
+    read_case(locate("beam"), SMALL).run(COMM, out=tmp_path / "beam", progress=False)
     assert refine(tmp_path / "beam", COMM, progress=False) == {}
     finer = json.loads((tmp_path / "beam" / "refined" / "h" / "model.json").read_text())
     assert finer["bodies"][0]["cells"] == 40
-    read_case(located("layer")).run(COMM, out=tmp_path / "layer", progress=False)
+    read_case(locate("layer")).run(COMM, out=tmp_path / "layer", progress=False)
     failed = refine(tmp_path / "layer", COMM, progress=False)
     assert failed == {"h": "a particle has no elements to halve: halve the time step alone"}
 
@@ -203,20 +203,20 @@ def test_check_describes_a_beam(tmp_path, capsys):
     assert "tip: one point, 0.05 m before the wall; Coulomb(mu=0.3)" in said
     assert "beam: 200 cells, 5 kg" in said and "start: clamped along x, y" in said
     assert (tmp_path / "run" / "model.png").stat().st_size > 0
-    model = describe(read_case(located("beam"), SMALL), COMM)
+    model = describe(read_case(locate("beam"), SMALL), COMM)
     # of the clamped rod, c = 10 m/s: 4 l/c
     assert model["periods"][1] == pytest.approx(2.0, rel=1e-3)
     assert model["mass"] == 5.0 and model["waves"][0]["c_s"] == 10.0
 
 
 def test_check_describes_a_particle_and_warns_of_a_step_too_long_for_the_layer():
-    model = describe(read_case(located("layer"), ["run.dt=0.01"]), COMM)
-    said = in_words(model)
+    model = describe(read_case(locate("layer"), ["run.dt=0.01"]), COMM)
+    said = put_in_words(model)
     assert "1D, 1 unknown, 1 kg" in said and "particle: one point, 0.15 m before the wall" in said
     assert "0.05 m wide, passed in b/V = 0.05 s at 1 m/s" in said
     (warning,) = model["warnings"]
     assert "longer than a tenth of the time in which a body passes the layer" in warning
-    assert describe(read_case(located("layer"), ["run.dt=0.005"]), COMM)["warnings"] == []
+    assert describe(read_case(locate("layer"), ["run.dt=0.005"]), COMM)["warnings"] == []
 
 
 REFUSED = {
@@ -258,8 +258,8 @@ REFUSED = {
 def test_what_does_not_go_together_is_refused(name, setting):
     """In one sentence, with the file, the table and a remedy, before a step is computed."""
     with pytest.raises(InputError, match=REFUSED[name][setting]) as error:
-        read_case(located(name), [setting]).check()
-    assert str(error.value).startswith(str(located(name))) and "\n" not in str(error.value)
+        read_case(locate(name), [setting]).check()
+    assert str(error.value).startswith(str(locate(name))) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -280,9 +280,9 @@ def test_what_does_not_go_with_a_layer_is_refused(old, new, says, tmp_path):
 
 def test_friction_of_a_body_that_cannot_slide_is_refused(tmp_path):
     """In the file itself; after ``--set`` it has nothing to act on, and is let be."""
-    text = Path(located("beam")).read_text(encoding="utf-8")
+    text = Path(locate("beam")).read_text(encoding="utf-8")
     straight = 'beam={type="rod_problem", elements={count=20}, rod={gap=0.05}}'
-    assert read_case(located("beam"), [straight, "record.3=", *SMALL[1:]]).run(COMM, progress=False)
+    assert read_case(locate("beam"), [straight, "record.3=", *SMALL[1:]]).run(COMM, progress=False)
     case = tmp_path / "rod.toml"
     case.write_text(
         re.sub(r"\[beam.beam\].*?\[friction\]", "[friction]", text, flags=re.DOTALL)
@@ -297,6 +297,6 @@ def test_a_body_without_a_mesh_takes_one_process():
     class Two:
         size = 2
 
-    case = read_case(located("beam"))
+    case = read_case(locate("beam"))
     with pytest.raises(InputError, match=r"\[beam\] is computed by one process, and there are 2"):
         case.parts(Two())

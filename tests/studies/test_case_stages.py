@@ -22,7 +22,7 @@ from vi_contact.practice.cli.batch import results
 from vi_contact.practice.soil import upgoing
 from vi_contact.practice.studies import read_case
 from vi_contact.practice.studies.cases.short_settings import ShortOptions
-from vi_contact.practice.studies.ida.runs import ground_motions
+from vi_contact.practice.studies.ida.runs import gather_ground_motions
 from vi_contact.run import session, static
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -357,7 +357,7 @@ def test_short_options_and_records_are_not_lost(tmp_path: Path) -> None:
         ):
             option.settings(case(tmp_path).tables)
     with pytest.raises(InputError, match=r"house.toml: ida changes \[excitation\], and the last"):
-        ground_motions(case(tmp_path))
+        gather_ground_motions(case(tmp_path))
 
 
 STAGE = '[[stage]]\nname = "gravity"\n'

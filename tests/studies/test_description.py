@@ -19,7 +19,7 @@ import vi_contact as vc
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.sketch import sketch
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import _warnings, describe, in_words
+from vi_contact.practice.studies.cases.description import _find_warnings, describe, put_in_words
 
 COMM = MPI.COMM_WORLD
 HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0
@@ -169,7 +169,7 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
     printed = capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {"model.json", "model.png"}
     model = json.loads((out / "model.json").read_text("utf-8"))
-    assert printed.startswith(in_words(model)) and printed.endswith("the file is in order\n")
+    assert printed.startswith(put_in_words(model)) and printed.endswith("the file is in order\n")
     assert "  upper_bottom on lower_top: 2 points on 0.25 m²; Coulomb(mu=0.5)\n" in printed
     assert (out / "model.png").read_bytes()[:4] == b"\x89PNG"
 
@@ -393,7 +393,7 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
         "(3.07692, 6) and 4 more places; 1 node partly covered (carried by their neighbours), at "
         "(15.3846, 6)"
     )
-    assert f"  base: {contact['nodes']}" in in_words(model)
+    assert f"  base: {contact['nodes']}" in put_in_words(model)
     assert {kind: len(places) for kind, places in contact["others"].items()} == {
         "in front of nothing": 7,
         "partly covered": 1,
@@ -449,7 +449,9 @@ def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> No
     for dt, count in ((0.99, 0), (1.01, 1)):
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
         said = [
-            one for one in _warnings(model) if "first natural period with the contact open" in one
+            one
+            for one in _find_warnings(model)
+            if "first natural period with the contact open" in one
         ]
         assert len(said) == count
     assert set(described(written(shared_tmp), COMM, "mesh.gap=0.1")) - set(model) == set()

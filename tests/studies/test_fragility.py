@@ -20,8 +20,8 @@ from vi_contact.practice.engineering import lowest_frequency
 from vi_contact.practice.ground_motion import Record, write_at2
 from vi_contact.practice.plots.studies import plot_fragility
 from vi_contact.practice.studies import IDA, fragility_curve, read_case, record_set, run_ida
-from vi_contact.practice.studies.ida.fragility import limit, passing
-from vi_contact.practice.studies.ida.measures import intensity
+from vi_contact.practice.studies.ida.fragility import bracket_capacities, read_limit
+from vi_contact.practice.studies.ida.measures import read_intensity
 from vi_contact.practice.studies.ida.runs import OneRun, Row
 
 pytestmark = pytest.mark.serial
@@ -152,14 +152,14 @@ def test_where_records_pass() -> None:
         row("g", 1.0, 0.0),
         row("g", 2.0, 0.0),
     ]
-    assert passing(rows, "u:max=0.5", "pga").tolist() == [
+    assert bracket_capacities(rows, "u:max=0.5", "pga").tolist() == [
         [1, 2],
         [1, INF],
         [1, 2],
         [2, INF],
         [0, 2],
     ]
-    assert passing(rows, "u:min=0.1", "pga").tolist() == [
+    assert bracket_capacities(rows, "u:min=0.1", "pga").tolist() == [
         [0, 1],
         [1, INF],
         [0, 1],
@@ -170,9 +170,9 @@ def test_where_records_pass() -> None:
         with pytest.raises(
             InputError, match=f"limit '{wrong}': give COLUMN:WAY=VALUE with a number"
         ):
-            limit(wrong)
+            read_limit(wrong)
     with pytest.raises(InputError, match="demand 'u:most'"):
-        limit("u:most=1")
+        read_limit("u:most=1")
 
 
 def test_sets_of_records(tmp_path: Path) -> None:
@@ -234,11 +234,11 @@ def test_the_first_period_of_the_model(motions: list[str]) -> None:
     )
     study = IDA(case, motions, ["u_x_top"], scales=(1.0,), intensity="sa:T1")
     period = 1.0 / lowest_frequency(case.parts(alone()).system)
-    expected, record = intensity(f"sa:{period}"), study.shakings[0].record(case)
+    expected, record = read_intensity(f"sa:{period}"), study.shakings[0].record(case)
     assert study.measure.name == expected.name and study.measure.meaning == expected.meaning
-    assert study.measure.of(record) == pytest.approx(expected.of(record), rel=1e-6)
+    assert study.measure.compute(record) == pytest.approx(expected.compute(record), rel=1e-6)
     with pytest.raises(InputError, match="intensity 'sa:T2': give the period after the colon"):
-        intensity("sa:T2", lambda: 1.0)
+        read_intensity("sa:T2", lambda: 1.0)
 
 
 def test_a_study_ends_in_curves_and_goes_on(
@@ -267,8 +267,8 @@ def test_a_study_ends_in_curves_and_goes_on(
             one: np.array([0.0, factors[name] * float(level)]) for one in wanted
         }, dict.fromkeys(wanted, ("m", "u"))
 
-    monkeypatch.setattr("vi_contact.practice.studies.ida.ida.executed", executed)
-    monkeypatch.setattr("vi_contact.practice.studies.ida.ida._history", history)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.ida.execute_runs", executed)
+    monkeypatch.setattr("vi_contact.practice.studies.ida.ida._read_history", history)
     said: list[str] = []
     for levels in ((1.0, 2.0, 4.0), (1.0, 1.5, 2.0, 3.0, 4.0)):
         made.clear()

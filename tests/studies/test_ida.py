@@ -32,10 +32,10 @@ from vi_contact.practice.cli.entry import main
 from vi_contact.practice.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.practice.plots.studies import DemandPanel, plot_ida
 from vi_contact.practice.studies import IDA, read_case, run_ida
-from vi_contact.practice.studies.cases.library import located
-from vi_contact.practice.studies.cases.toml_file import toml_value
-from vi_contact.practice.studies.ida.measures import demand, fractiles, intensity
-from vi_contact.practice.studies.ida.processes import command, executed
+from vi_contact.practice.studies.cases.library import locate
+from vi_contact.practice.studies.cases.toml_file import format_value
+from vi_contact.practice.studies.ida.measures import compute_fractiles, read_demand, read_intensity
+from vi_contact.practice.studies.ida.processes import build_command, execute_runs
 from vi_contact.practice.studies.ida.runs import OneRun, Shaking
 from vi_contact.run.files.folder import lock_folder
 from vi_contact.run.solution import Solution
@@ -277,7 +277,7 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
         f"trap '' INT; echo $$ > '{going}'; sleep 3600"
     )
     start = time.monotonic()
-    rows = executed([long, short], 2, ("sh", "-c", words), WallTime())
+    rows = execute_runs([long, short], 2, ("sh", "-c", words), WallTime())
     assert next(rows)["reason"] == "ended with status 1"
     with pytest.raises(KeyboardInterrupt):
         rows.throw(KeyboardInterrupt())
@@ -291,7 +291,7 @@ def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> Non
     its own."""
     shaking = Shaking("motion_1", (Path("motion_1.at2").resolve(),))
     case = read_case(
-        located("wall"),
+        locate("wall"),
         [
             'excitation={type="GroundMotion", record="x.at2", direction=[1, 0]}',
             "run.dt=0.005",
@@ -307,7 +307,7 @@ def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> Non
     runs = [OneRun(case, shaking, scale, tmp_path / f"x{scale}") for scale in (1.0, 2.0)]
     shares: list[float] = []
     ends = dict(
-        results(json.loads(command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append)
+        results(json.loads(build_command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append)
     )
     assert shares[-1] == 1.0
     for number, run in enumerate(runs):
@@ -344,8 +344,8 @@ def test_what_a_process_that_died_has_left_runs_alone(
         end = "; kill -9 $$" if len(made) == 1 else ""
         return subprocess.Popen(["sh", "-c", words + end], stdout=subprocess.PIPE, text=True)
 
-    monkeypatch.setattr("vi_contact.practice.studies.ida.processes.started", started)
-    found = list(executed(runs, 1, (), WallTime()))
+    monkeypatch.setattr("vi_contact.practice.studies.ida.processes.start_process", started)
+    found = list(execute_runs(runs, 1, (), WallTime()))
     rows = {row["record"]: row for row in found if not isinstance(row, float)}
     assert made == [["m0", "m1", "m2"], ["m1"], ["m2"]] and found[0] == 1.5
     assert [rows[name]["status"] for name in ("m0", "m1", "m2")] == [
@@ -368,12 +368,12 @@ def test_a_wall_time_ends_a_study(
         1.0,
         study / "runs" / "long",
     )
-    assert json.loads(command([run], (), WallTime("5"))[-1])["wall_time"] == "3:15"
+    assert json.loads(build_command([run], (), WallTime("5"))[-1])["wall_time"] == "3:15"
     with pytest.raises(
         OutOfTime,
         match="200 s left of the wall time 5 ended the study: give the same command again",
     ):
-        list(executed([run], 1, ("sh", "-c", "exit 75"), WallTime("5")))
+        list(execute_runs([run], 1, ("sh", "-c", "exit 75"), WallTime("5")))
     assert not (run.folder / "row.json").exists()
     before = table(study)
     asked = [
@@ -477,13 +477,15 @@ def test_measures() -> None:
     """Degrees: f times the motion has f**degree of the measure. Demands skip what is no number."""
     record = Record(np.sin(0.3 * np.arange(400)), 0.01)
     for word in ("pga", "pgv", "pgd", "arias", "cav", "housner", "sa:0.3"):
-        measure = intensity(word)
-        found = measure.of(scaled(record, factor=measure.scale(record, 2.5)))
+        measure = read_intensity(word)
+        found = measure.compute(scaled(record, factor=measure.scale(record, 2.5)))
         assert found == pytest.approx(2.5, rel=1e-9), word
-        grown = 3.0**measure.degree * measure.of(record)
-        assert measure.of(scaled(record, factor=3.0)) == pytest.approx(grown, rel=1e-9)
+        grown = 3.0**measure.degree * measure.compute(record)
+        assert measure.compute(scaled(record, factor=3.0)) == pytest.approx(grown, rel=1e-9)
     values = {"x": np.array([1.0, np.nan, -4.0, 2.0])}
-    found = [demand(f"x{way}").of(values) for way in ("", ":absmax", ":max", ":min", ":last")]
+    found = [
+        read_demand(f"x{way}").compute(values) for way in ("", ":absmax", ":max", ":min", ":last")
+    ]
     assert found == [4.0, 4.0, 2.0, -4.0, 2.0]
 
 
@@ -494,12 +496,12 @@ def test_fractiles_of_straight_curves() -> None:
         str(c): (np.array([3.0, 1.0, 2.0 + c]), c * np.array([3.0, 1.0, 2.0 + c]))
         for c in (1, 2, 3)
     }
-    levels, values = fractiles(curves, (0.16, 0.5, 0.84))
+    levels, values = compute_fractiles(curves, (0.16, 0.5, 0.84))
     assert levels.tolist() == [1.0, 3.0]
     assert values == pytest.approx(np.outer(levels, [1.32, 2.0, 2.68]))
-    assert len(fractiles({"1": curves["1"]}, (0.5,))[0]) == 0
+    assert len(compute_fractiles({"1": curves["1"]}, (0.5,))[0]) == 0
     apart = {"1": (np.array([1.0, 2.0]), np.ones(2)), "2": (np.array([3.0, 4.0]), np.ones(2))}
-    assert len(fractiles(apart, (0.5,))[0]) == 0
+    assert len(compute_fractiles(apart, (0.5,))[0]) == 0
 
 
 def test_the_picture_of_many_records(tmp_path: Path) -> None:
@@ -507,7 +509,7 @@ def test_the_picture_of_many_records(tmp_path: Path) -> None:
     nothing to scale."""
     curves = {str(k): (np.arange(3.0), k * np.arange(3.0)) for k in range(8)}
     panels = [
-        DemandPanel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
+        DemandPanel("a", "m", curves, *compute_fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
         DemandPanel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3))),
     ]
     assert (
@@ -517,4 +519,4 @@ def test_the_picture_of_many_records(tmp_path: Path) -> None:
 
 def test_paths_are_quoted_for_toml() -> None:
     for text in ('a "b" \\ c', "ä ☃ 😀", "tab\tline\n\x7f"):
-        assert tomllib.loads(f"x = {toml_value(text)}")["x"] == text
+        assert tomllib.loads(f"x = {format_value(text)}")["x"] == text

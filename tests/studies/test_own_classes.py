@@ -20,9 +20,9 @@ from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.own_classes import defect
-from vi_contact.practice.studies.cases.vocabulary import words
-from vi_contact.practice.studies.ida.processes import command
+from vi_contact.practice.studies.cases.own_classes import describe_defect
+from vi_contact.practice.studies.cases.vocabulary import make_words
+from vi_contact.practice.studies.ida.processes import build_command
 from vi_contact.practice.studies.ida.runs import OneRun, Shaking
 from vi_contact.run.wall_time import WallTime
 
@@ -220,7 +220,7 @@ def test_runs_of_a_study_are_allowed_the_same(folder: Path) -> None:
     motion = ("excitation.type=GroundMotion", "excitation.record=m.at2")
     case = read_case(folder / "case.toml", law("pack:Law", *motion), allow=("pack", "other"))
     asked = json.loads(
-        command(
+        build_command(
             [OneRun(case, Shaking("m", (Path("m.at2"),)), 1.0, folder / "run")], (), WallTime()
         )[-1]
     )
@@ -382,8 +382,8 @@ def test_random_names(folder: Path) -> None:
 def test_every_word_satisfies_its_protocol() -> None:
     """The same question is put to classes of the package; a class of another kind has a defect."""
     for kind in (Scheme, Solver, Recorder, FrictionLaw, ImpactLaw, MassLaw, Excitation):
-        for one in words(Path()).choices[kind].values():
-            assert not isinstance(one.function, type) or defect(one.function, kind) == ""
-    assert defect(Coulomb, Scheme).startswith("has no method check, start, jump")
-    assert defect(ConsistentMass, ImpactLaw) == "has no method target"
-    assert defect(ConsistentMass, Coulomb) == "is no Coulomb"
+        for one in make_words(Path()).choices[kind].values():
+            assert not isinstance(one.function, type) or describe_defect(one.function, kind) == ""
+    assert describe_defect(Coulomb, Scheme).startswith("has no method check, start, jump")
+    assert describe_defect(ConsistentMass, ImpactLaw) == "has no method target"
+    assert describe_defect(ConsistentMass, Coulomb) == "is no Coulomb"

@@ -21,7 +21,7 @@ from vi_contact.core.units import STANDARD_GRAVITY as G
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import comparisons, read_case
 from vi_contact.practice.studies.cases.library import STARTERS
-from vi_contact.practice.studies.cases.stages import leading
+from vi_contact.practice.studies.cases.stages import run_leading_stages
 
 pytestmark = pytest.mark.serial
 LARGE = "mesh.refine=0"  # the quick size that each case names
@@ -131,7 +131,9 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
 def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
     """What a study computes once for all records, without a folder for the fields that the case
     writes."""
-    reached, parts, state = leading(read_case(STARTERS / "wall.toml", [LARGE]), MPI.COMM_SELF)
+    reached, parts, state = run_leading_stages(
+        read_case(STARTERS / "wall.toml", [LARGE]), MPI.COMM_SELF
+    )
     assert reached is not None and reached.number == 1 and parts.steady and state is not None
     assert state.r_n.max() > 0.0
 

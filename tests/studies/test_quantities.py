@@ -17,7 +17,7 @@ from mpi4py import MPI
 from vi_contact import core, fem, meshes
 from vi_contact.core.errors import InputError
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.quantities import text_node
+from vi_contact.practice.studies.cases.quantities import read_quantity
 from vi_contact.practice.studies.cases.short_settings import ShortOptions
 from vi_contact.practice.studies.cases.table_calls import Call, Spot
 
@@ -63,7 +63,7 @@ def spot(unit: str | None) -> Spot:
 @pytest.mark.serial
 @pytest.mark.parametrize(("text", "unit"), VALUES)
 def test_values_are_those_of_si(text: str, unit: str) -> None:
-    assert text_node(text, [float], spot(unit)) == pytest.approx(VALUES[text, unit], rel=1e-15)
+    assert read_quantity(text, [float], spot(unit)) == pytest.approx(VALUES[text, unit], rel=1e-15)
 
 
 WRONG = {
@@ -93,7 +93,7 @@ WRONG = {
 @pytest.mark.parametrize(("text", "unit"), WRONG)
 def test_what_does_not_fit_is_refused(text: str, unit: str) -> None:
     with pytest.raises(InputError) as caught:
-        text_node(text, [float], spot(unit))
+        read_quantity(text, [float], spot(unit))
     said = str(caught.value)
     assert (
         said.startswith(f"wall.toml: [material.soil] E is '{text}'") and WRONG[text, unit] in said

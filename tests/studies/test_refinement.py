@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
-from vi_contact.practice.studies.cases.library import base_folder, read_copy
-from vi_contact.practice.studies.refinement import refine, refinement
+from vi_contact.practice.studies.cases.library import find_base_folder, read_copy
+from vi_contact.practice.studies.refinement import describe_refinement, refine
 from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
@@ -71,7 +71,7 @@ def test_both_columns_and_their_difference(
     the case that was run (V11.3)."""
     case, out = written(tmp_path), tmp_path / "out" / "run"
     assert main(["run", str(case), "--out", str(out), "--quiet"]) == 0
-    assert base_folder(out / "case.toml") == tmp_path
+    assert find_base_folder(out / "case.toml") == tmp_path
     assert main(["report", str(out), "--refine", "--out", str(tmp_path / "page.pdf")]) == 0
     said = capsys.readouterr().out
     base, fine, short = (
@@ -81,7 +81,7 @@ def test_both_columns_and_their_difference(
     assert (len(base.contact.points), len(fine.contact.points)) == (2, 4)  # the corner is clamped
     assert fine.facts["steps"] == base.facts["steps"] == 20 and short.facts["steps"] == 40
     assert base.history["t"][-1] == pytest.approx(short.history["t"][-1]) == pytest.approx(0.2)
-    section = refinement(base, {})
+    section = describe_refinement(base, {})
     (table,) = section.tables
     assert table.header == ["column", "unit", "this run", "h/2", "difference", "dt/2", "difference"]
     rows = {row[0]: row for row in table.rows}
@@ -101,8 +101,8 @@ def test_both_columns_and_their_difference(
         main(["run", str(case), "--out", str(out), "--quiet", "--set", "material.rubber.E=2e6"])
         == 0
     )
-    assert not refinement(read_run(out), {}).tables  # those were of another case
-    assert "was not measured" in refinement(read_run(out), {}).sentences[-1]
+    assert not describe_refinement(read_run(out), {}).tables  # those were of another case
+    assert "was not measured" in describe_refinement(read_run(out), {}).sentences[-1]
 
 
 def test_what_fails_is_told(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_what_fails_is_told(tmp_path: Path) -> None:
     (out / "refined" / "h").write_text("no folder")
     failed = refine(out, MPI.COMM_SELF, progress=False)
     assert list(failed) == ["h"]
-    section = refinement(read_run(out), failed)
+    section = describe_refinement(read_run(out), failed)
     assert any(text.startswith("The run with h/2 failed: ") for text in section.sentences)
     assert section.tables[0].header[3:] == ["dt/2", "difference"]
     (out / "case.toml").unlink()

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from vi_contact.practice.cli.entry import main
-from vi_contact.practice.studies.cases.schema import text
+from vi_contact.practice.studies.cases.schema import write_schema
 from vi_contact.practice.studies.cases.toml_file import read_toml, with_settings
 
 pytestmark = pytest.mark.serial
@@ -22,7 +22,7 @@ WALL = ROOT / "demos" / "cases" / "wall.toml"
 
 def test_keys_have_the_limits_units_and_meanings_of_annotations() -> None:
     """They hold for numbers; texts with units stay allowed."""
-    rules = json.loads(text())
+    rules = json.loads(write_schema())
     body = rules["definitions"]["LinearElastic.LinearElastic"]["properties"]
     assert body["E"] == {
         "type": ["number", "string"],

@@ -23,7 +23,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import read_case
 from vi_contact.practice.studies.cases.description import describe
-from vi_contact.practice.studies.cases.toml_file import toml_value
+from vi_contact.practice.studies.cases.toml_file import format_value
 
 COMM = MPI.COMM_WORLD
 CASE = """
@@ -898,7 +898,7 @@ class Answers:
     """What cases compute, and products with their matrices."""
 
     def __init__(self, folder: Path, tables: dict[str, Any]) -> None:
-        lines = [f"{name} = {toml_value(one)}" for name, one in tables.items()]
+        lines = [f"{name} = {format_value(one)}" for name, one in tables.items()]
         self.case = read_case(written(folder, "\n".join(lines)))
         self.parts = self.case.parts(COMM)
 

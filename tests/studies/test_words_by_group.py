@@ -18,7 +18,7 @@ from vi_contact.core.step import Recorder
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.vocabulary import names_of
+from vi_contact.practice.studies.cases.vocabulary import list_names
 
 COMM = MPI.COMM_WORLD
 CASE = """
@@ -170,4 +170,4 @@ def test_every_public_recorder_has_a_word() -> None:
         "Reactions",
         "SectionForces",
     }
-    assert recorders == set(names_of(Recorder))
+    assert recorders == set(list_names(Recorder))

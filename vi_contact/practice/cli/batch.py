@@ -18,7 +18,7 @@ from ...core.errors import ViContactError
 from ...core.step import State
 from ...run.simulate_many import Ended, simulate_many
 from ..studies.cases.case import Case, read_case
-from ..studies.cases.stages import leading
+from ..studies.cases.stages import run_leading_stages
 from ..studies.cases.vocabulary import Parts
 from .entry import status_of
 from .errors import told, world
@@ -48,7 +48,7 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
     if not runs:
         return
     case, _ = next(iter(runs.values()))
-    reached, parts, state = leading(case, comm)
+    reached, parts, state = run_leading_stages(case, comm)
     if parts.steady and (reached is None or reached.number == len(case.stages) - 1):
         yield from _together(runs, parts, state, tell)
         return

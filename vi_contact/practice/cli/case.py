@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ... import schemes
 from ...core import timing
 from ...core.errors import InputError
-from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located, starters
+from ..studies.cases.library import FOLDER, copy_starter, list_builtin_cases, list_starters, locate
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import say, world
@@ -76,7 +76,7 @@ def add_case_commands(commands: Any) -> None:
             "Write a commented case file and the Gmsh script of its mesh, which you then change."
         ),
     )
-    new.add_argument("name", metavar="NAME", help=", ".join(starters()))
+    new.add_argument("name", metavar="NAME", help=", ".join(list_starters()))
     new.add_argument(
         "folder", metavar="DIR", nargs="?", help="folder to write into (default: NAME)"
     )
@@ -161,14 +161,14 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 
 
 def _cases(options: argparse.Namespace) -> str:
-    lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
+    lines = [f"{name:<10} {title}" for name, title in list_builtin_cases().items()]
     return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
 def _schema(options: argparse.Namespace) -> str:
-    from ..studies.cases.schema import text  # late: finite elements
+    from ..studies.cases.schema import write_schema  # late: finite elements
 
-    return text().rstrip()
+    return write_schema().rstrip()
 
 
 def _new(options: argparse.Namespace) -> str:
@@ -187,7 +187,7 @@ def _run(options: argparse.Namespace) -> str:
     from ...run.wall_time import seconds_of
     from ..studies.cases.case import read_case  # late: finite elements
 
-    comm, path = world(), located(options.case)
+    comm, path = world(), locate(options.case)
     timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
         seconds_of(options.wall_time)
@@ -235,7 +235,7 @@ def _checked(case: "Case", comm: Any, folder: Path) -> str:
     from ...run.files.folder import is_marked, run_folder
     from ..plots.histories import write_picture  # late: matplotlib
     from ..plots.sketch import sketch
-    from ..studies.cases.description import describe, in_words, write_model
+    from ..studies.cases.description import describe, put_in_words, write_model
 
     case.check()
     parts = case.parts(comm)
@@ -246,7 +246,7 @@ def _checked(case: "Case", comm: Any, folder: Path) -> str:
     write_model(ranks, model, run_folder(ranks, folder))
     on_root(ranks, lambda: write_picture(sketch(model), folder / "model.png", bbox_inches="tight"))
     if comm.rank == 0:
-        say(f"{in_words(model)}\npicture: {folder / 'model.png'}")
+        say(f"{put_in_words(model)}\npicture: {folder / 'model.png'}")
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core.checks import shown
 from ...core.errors import InputError, OutOfTime, ViContactError
-from ..studies.cases.library import located
+from ..studies.cases.library import locate
 from .errors import say
 from .options import add_command, add_settings
 
@@ -157,7 +157,7 @@ def _ida(options: argparse.Namespace) -> str:
         ) from None
     motions = [files for motion in options.motions for files in record_set(motion)]
     study = IDA(
-        read_case(located(options.case), options.settings, allow=options.allow),
+        read_case(locate(options.case), options.settings, allow=options.allow),
         motions,
         options.edp,
         scales=options.scales or (),

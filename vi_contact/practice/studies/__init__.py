@@ -4,8 +4,8 @@
 ``run(comm)`` computes it; ``run_ida`` makes an incremental dynamic analysis of it:
 docs/guide/studies.md; ``report(folder)`` reports on a run.
 >>> from vi_contact.practice.studies import read_case
->>> from vi_contact.practice.studies.cases.library import located  # of the cases that ship
->>> read_case(located("wall"), ["run.steps=10"]).tables["run"]["steps"]
+>>> from vi_contact.practice.studies.cases.library import locate  # of the cases that ship
+>>> read_case(locate("wall"), ["run.steps=10"]).tables["run"]["steps"]
 10
 """
 

@@ -18,8 +18,8 @@ from ...run.files.folder import CHECKPOINT, HISTORY_CSV
 from ...run.files.reading import RunFolder, read_run
 from ..engineering.peak_values import GROWS, peaks
 from ..plots.sections import SAY, Section, Table, number
-from .cases.library import COPY, copied_settings, read_copy
-from .cases.toml_file import toml_value, with_settings
+from .cases.library import COPY, read_copy, read_settings
+from .cases.toml_file import format_value, with_settings
 
 FOLDER = "refined"  # in the run folder
 NAMES = {"h": "h/2", "dt": "dt/2"}
@@ -33,16 +33,22 @@ def refine(
 ) -> dict[str, str]:
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt.
 
-    Return name -> why it failed. A finished run is kept, and an interrupted run is continued.
-    Collective.
+    A finished run is kept, and an interrupted run is continued. Collective.
 
-    InputError for a folder without case file or whose run has not finished. ``allow``: as of
-    ``read_case``.
+    Args:
+        folder: of the run.
+        comm: the ranks.
+        allow: as of ``read_case``.
+        progress: whether to print a progress line.
+
+    Returns:
+        "h" or "dt" -> why its run failed.
+
+    Raises:
+        InputError: for a folder without case file or whose run has not finished.
     """
-    from .cases.case import read_case  # late: finite elements
-
     check("refine", "folder", folder, str | Path)
-    run, failed = read_run(folder), {}
+    run = read_run(folder)
     if not is_own(run.folder / COPY):
         raise InputError(
             f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a "
@@ -52,74 +58,94 @@ def refine(
         raise InputError(
             f"the run in '{folder}' has not finished: continue it with --restart, then refine it"
         )
+    failed = {}
     for name in NAMES:
         try:
-            out = inner_folder(run.folder, FOLDER, name)
-            same, settings = _same(run, name), [*copied_settings(run.folder), *_halved(run, name)]
-            if not (same and _status(out) == "finished"):
-                case = read_case(run.folder / COPY, settings, allow=allow)
-                case.run(
-                    comm, out=out, restart=same and is_own(out / CHECKPOINT), progress=progress
-                )
+            _run_refined(run, name, comm, allow, progress)
         except ViContactError as error:
             failed[name] = str(error)
     return failed
 
 
-def _same(run: RunFolder, name: str) -> bool:
-    """Whether the refined run is of the case that the run folder holds."""
-    wanted = with_settings(read_copy(run.folder), list(_halved(run, name)))
+def _run_refined(
+    run: RunFolder, name: str, comm: Any, allow: Sequence[str], progress: bool
+) -> None:
+    """Make one of the refined runs, unless it has finished; the last arguments as of ``refine``."""
+    from .cases.case import read_case  # late: finite elements
+
+    out = inner_folder(run.folder, FOLDER, name)
+    same = _is_of_same_case(run, name)
+    settings = [*read_settings(run.folder), *_halve(run, name)]
+    if same and _read_status(out) == "finished":
+        return
+    case = read_case(run.folder / COPY, settings, allow=allow)
+    restart = same and is_own(out / CHECKPOINT)
+    case.run(comm, out=out, restart=restart, progress=progress)
+
+
+def _is_of_same_case(run: RunFolder, name: str) -> bool:
+    """Tell whether the refined run is of the case that the run folder holds."""
+    wanted = with_settings(read_copy(run.folder), list(_halve(run, name)))
     return read_copy(inner_folder(run.folder, FOLDER, name)) == wanted
 
 
-def _halved(folder: RunFolder, name: str) -> Iterator[str]:
-    """Yield the settings that halve elements or time steps.
+def _halve(folder: RunFolder, name: str) -> Iterator[str]:
+    """Yield the settings that halve elements, for "h", or time steps, for "dt".
 
     The runs have the same duration and no fields.
     """
-    tables, dt = read_copy(folder.folder), folder.facts.get("dt")
+    tables = read_copy(folder.folder)
     if "fields" in tables:
         yield "fields="
-    if name == "h" and "mesh" not in tables:
-        yield f"beam.elements.count={2 * _elements(tables)}"
-    elif name == "h":
-        size = tables["mesh"].get("divisions")  # numbers of elements, or their size
-        finer = (
-            [2 * one for one in size]
-            if isinstance(size, list)
-            else 0.5 * size
-            if isinstance(size, float)
-            else None
-        )
-        refine = 1 + tables["mesh"].get("refine", 0)
-        yield f"mesh.refine={refine}" if finer is None else f"mesh.divisions={toml_value(finer)}"
-    elif not isinstance(dt, int | float):
+    if name == "dt":
+        yield from _halve_steps(tables, folder.facts.get("dt"))
+    elif "mesh" in tables:
+        yield _halve_mesh(tables["mesh"])
+    else:
+        yield f"beam.elements.count={2 * _count_elements(tables)}"
+
+
+def _halve_mesh(mesh: Mapping[str, Any]) -> str:
+    """Return the setting that halves elements of a mesh: by [mesh] divisions, or by refining it."""
+    divisions = mesh.get("divisions")  # numbers of elements, or their size
+    if isinstance(divisions, list):
+        return f"mesh.divisions={format_value([2 * number for number in divisions])}"
+    if isinstance(divisions, float):
+        return f"mesh.divisions={format_value(0.5 * divisions)}"
+    return f"mesh.refine={1 + mesh.get('refine', 0)}"
+
+
+def _halve_steps(tables: Mapping[str, Any], dt: Any) -> Iterator[str]:
+    """Yield the settings that halve the time step of the case and of all stages.
+
+    Args:
+        tables: of the case.
+        dt: of the run [s].
+    """
+    if not isinstance(dt, int | float):
         raise InputError(
             f"the time step is not a number, {dt}: halve it in the case and compare the runs"
         )
-    else:
-        yield f"run.dt={0.5 * dt!r}"
-        for k, stage in enumerate([tables, *tables.get("stage", ())]):
-            key, own = f"stage.{k}.run" if k else "run", stage.get("run", {})
-            if k and "dt" in own:
-                yield f"{key}.dt={0.5 * _plain(own['dt'], f'{key}.dt')!r}"
-            if "steps" in own:
-                yield f"{key}.steps={2 * _plain(own['steps'], f'{key}.steps')}"
+    yield f"run.dt={0.5 * dt!r}"
+    for k, table in enumerate([tables, *tables.get("stage", ())]):  # stages count from 1
+        key = f"stage.{k}.run" if k else "run"
+        run = table.get("run", {})
+        if k and "dt" in run:
+            yield f"{key}.dt={0.5 * _check_number(run['dt'], f'{key}.dt')!r}"
+        if "steps" in run:
+            yield f"{key}.steps={2 * _check_number(run['steps'], f'{key}.steps')}"
 
 
-def _elements(tables: Mapping[str, Any]) -> int:
+def _count_elements(tables: Mapping[str, Any]) -> int:
     """Return the number of elements of a beam; InputError for a body without elements."""
     if "beam" not in tables:
         raise InputError("a particle has no elements to halve: halve the time step alone")
     count = tables["beam"].get("elements", {}).get("count", Elements().count)
-    return int(_plain(count, "beam.elements.count"))
+    return int(_check_number(count, "beam.elements.count"))
 
 
-def _plain(value: Any, key: str) -> Any:
-    """Return a number of the case.
-
-    It raises InputError for one that is written as a text, which has no half.
-    """
+def _check_number(value: Any, key: str) -> Any:
+    """Return a number of the case; InputError for one written as a text, which has no half."""
     if isinstance(value, int | float):
         return value
     raise InputError(
@@ -127,51 +153,58 @@ def _plain(value: Any, key: str) -> Any:
     )
 
 
-def _status(folder: Path) -> str:
+def _read_status(folder: Path) -> str:
+    """Return the status of a run; "" without one."""
     return str(read_run(folder).facts.get("status")) if is_own(folder / HISTORY_CSV) else ""
 
 
-def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
+def describe_refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     """Return the section with the peaks of a run and of those in its folder ``refined``.
 
     It says so if there are none; ``failed`` is name -> why, of ``refine``.
     """
-    found = {}
+    refined: dict[str, dict[str, Any]] = {}
     for name in NAMES:
-        if name in failed:
+        if name in failed:  # its folder may be none
             continue
         out = inner_folder(run.folder, FOLDER, name)
-        if _status(out) == "finished" and _same(run, name):
+        if _read_status(out) == "finished" and _is_of_same_case(run, name):
             other = read_run(out)
-            found[name] = {one.name: one for one in peaks(other.history, other.columns)}
-    said = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]
-    if not found:
-        return Section("Discretisation error", [*said, SAY["untried"]])
-    header = ["column", "unit", "this run"] + [
-        text for one in found for text in (NAMES[one], "difference")
-    ]
-    rows, own = [], [one for one in peaks(run.history, run.columns) if one.name not in UNSIZED]
-    for one in own:
-        base, like = _size(one), max(_size(other) for other in own if other.unit == one.unit)
-        told = [_size(each[one.name]) if one.name in each else np.nan for each in found.values()]
-        if base > NOISE * like:
-            pairs = [
-                (number(other), f"{round(100.0 * (other / base - 1.0), 2) + 0.0:+g} %")
-                for other in told
-            ]
-            mark = ", raw: not convergent at impacts" if one.quantity.endswith(GROWS) else ""
-            rows.append(
-                [
-                    one.name + mark,
-                    one.unit,
-                    number(base),
-                    *(text for pair in pairs for text in pair),
-                ]
-            )
-    return Section(
-        "Discretisation error", [SAY["refined"], *said], [Table(header, rows, sortable=True)]
-    )
+            refined[name] = {peak.name: peak for peak in peaks(other.history, other.columns)}
+    sentences = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]
+    if not refined:
+        return Section("Discretisation error", [*sentences, SAY["untried"]])
+
+    header = ["column", "unit", "this run"]
+    for name in refined:
+        header += [NAMES[name], "difference"]
+    sized = [peak for peak in peaks(run.history, run.columns) if peak.name not in UNSIZED]
+    rows = []
+    for peak in sized:
+        largest = max(_measure(other) for other in sized if other.unit == peak.unit)
+        if _measure(peak) > NOISE * largest:
+            rows.append(_compare(peak, refined))
+    table = Table(header, rows, sortable=True)
+    return Section("Discretisation error", [SAY["refined"], *sentences], [table])
 
 
-def _size(peak: Any) -> float:
+def _compare(peak: Any, refined: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the row of a peak: its size, and those of the refined runs with the difference in %.
+
+    Args:
+        peak: of the run.
+        refined: name of a refined run -> column -> its peak.
+    """
+    size = _measure(peak)
+    mark = ", raw: not convergent at impacts" if peak.quantity.endswith(GROWS) else ""
+    row = [peak.name + mark, peak.unit, number(size)]
+    for others in refined.values():
+        other = _measure(others[peak.name]) if peak.name in others else np.nan
+        # adding zero makes -0 a zero
+        row += [number(other), f"{round(100.0 * (other / size - 1.0), 2) + 0.0:+g} %"]
+    return row
+
+
+def _measure(peak: Any) -> float:
+    """Return the larger magnitude of a peak's two ends; zero where they are no numbers."""
     return float(np.nan_to_num(max(abs(peak.max), abs(peak.min))))

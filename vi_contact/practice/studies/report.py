@@ -26,8 +26,8 @@ from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from .cases.library import COPY, read_copy
 from .cases.parsing import Words, read
-from .cases.table_calls import Spot, build, callee
-from .refinement import refinement
+from .cases.table_calls import Spot, build, make_callee
+from .refinement import describe_refinement
 
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
@@ -43,49 +43,62 @@ def report(
 ) -> tuple[Section, list[Path]]:
     """Write the report on a run folder, and beside it the table peaks.csv and the pictures.
 
-    Return what the report says of the discretisation error, and the paths of the files.
+    What has no data is left out.
 
-    ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly,
-    report.html. ``columns``: groups of columns of one unit, a chart each, in place of those that
-    move; ``failed``: what ``refine`` returned. What has no data is left out. InputError as of
-    ``read_run``, for a run of one row, columns that do not exist, another kind of file, .html
-    without jinja2 and plotly, and a damaged model.json.
+    Args:
+        folder: of the run.
+        out: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly,
+            report.html.
+        title: of the report; None: that of the case.
+        columns: groups of columns of one unit, a chart each, in place of those that move.
+        failed: what ``refine`` returned.
+
+    Returns:
+        What the report says of the discretisation error, and the paths of the files.
+
+    Raises:
+        InputError: as of ``read_run``, for a run of one row, columns that do not exist, another
+            kind of file, .html without jinja2 and plotly, and a damaged model.json.
     """
     folder = Path(folder)
     case = read_copy(folder)
     run = read_run(folder)
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
-    pages = (
-        [Path(out)]
-        if out is not None
-        else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]
-    )
-    if pages[0].suffix.lower() not in WRITERS:
-        raise InputError(f"'{pages[0]}' is not an .html or .pdf file: give such a name")
-    # before a picture is drawn over another one
-    if pages[0].suffix.lower() == ".html" and not can_write():
-        raise InputError(MISSING)
-    model, sketched = _model(folder, pages[0].with_name("model.png"))
-    sections, drawn = (
-        sections_of(run, model, columns),
-        draw_run(run, pages[0].parent, title=heading),
-    )
-    sections[:0] = [replace(sections.pop(0), pictures=sketched)] if model else []
-    more = [
-        _checks(folder),
-        error := refinement(run, failed or {}),
-        Section("Pictures", pictures=drawn),
-    ]
+    pages = _choose_pages(folder, out)
+
+    # The sections: what the run has told, and before the last two of them what is known beside it.
+    model, sketches = _draw_model(folder, pages[0].with_name("model.png"))
+    sections = sections_of(run, model, columns)
+    pictures = draw_run(run, pages[0].parent, title=heading)
+    if model:
+        sections[0] = replace(sections[0], pictures=sketches)
+    comparison = _describe_checks(folder)
+    error = describe_refinement(run, failed or {})
+    more = [comparison, error, Section("Pictures", pictures=pictures)]
     sections[-2:-2] = [one for one in more if one.sentences or one.tables or one.pictures]
+
     for page in pages:
-        WRITERS[page.suffix.lower()](
-            page, heading, header_facts(run), sections, f"vi_contact {__version__}"
-        )
+        write = WRITERS[page.suffix.lower()]
+        write(page, heading, header_facts(run), sections, f"vi_contact {__version__}")
     table = write_peaks(pages[0].with_name("peaks.csv"), peaks(run.history, run.columns))
-    return error, [*pages, table, *sketched, *drawn]
+    return error, [*pages, table, *sketches, *pictures]
 
 
-def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
+def _choose_pages(folder: Path, out: str | Path | None) -> list[Path]:
+    """Return the files of the report; InputError for a kind that cannot be written."""
+    if out is None:
+        kinds = ("pdf", "html") if can_write() else ("pdf",)
+        return [folder / f"report.{kind}" for kind in kinds]
+    page = Path(out)
+    if page.suffix.lower() not in WRITERS:
+        raise InputError(f"'{page}' is not an .html or .pdf file: give such a name")
+    # before a picture is drawn over another one
+    if page.suffix.lower() == ".html" and not can_write():
+        raise InputError(MISSING)
+    return [page]
+
+
+def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
     """Return what model.json says, and its sketch; nothing where there is none."""
     if not is_own(folder / MODEL):
         return {}, []
@@ -108,44 +121,42 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
 
 @checked
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
-    """Return the comparisons of a run folder.
+    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps.
 
-    There is one for each [[check]] of the case it keeps; it raises InputError without a run.
+    Raises:
+        InputError: without a run.
     """
     folder = Path(folder)
     table = read_copy(folder).get("check", [])
-    words = Words(
-        folder,
-        {Check: {name: callee(getattr(checks, name)) for name in checks.__all__}},
-        {},
-        (),
-        {},
-    )
-    made = build(
-        read(table, Check | Sequence[Check], Spot(str(folder / COPY), "", "check"), words), {}
-    )
-    each = made if isinstance(made, tuple) else (made,)
-    history = read_run(folder).history if each else {}
-    return tuple(one.compare(history) for one in each)
+    spot = Spot(str(folder / COPY), "", "check")
+    choices = {name: make_callee(getattr(checks, name)) for name in checks.__all__}
+    words = Words(folder, {Check: choices}, default={}, groups=(), short={})
+    value = build(read(table, Check | Sequence[Check], spot, words), {})
+    wanted = value if isinstance(value, tuple) else (value,)
+    history = read_run(folder).history if wanted else {}
+    return tuple(check.compare(history) for check in wanted)
 
 
-def _checks(folder: Path) -> Section:
+def _describe_checks(folder: Path) -> Section:
     """Return what the run found beside the formulas that its case names."""
-    rows = [
-        [
-            one.name,
-            one.formula,
-            ", ".join(
-                f"{name} = {number(value)} {unit}" for name, (value, unit) in one.inputs.items()
-            ),
-            number(one.expected),
-            number(one.found),
-            one.unit,
-            f"does not apply: {one.applies}" if one.applies else number(one.ratio),
-            one.source,
-        ]
-        for one in comparisons(folder)
+    rows = [_describe_comparison(comparison) for comparison in comparisons(folder)]
+    tables = [Table(HEADERS["checks"], rows)] if rows else []
+    return Section("Checks against formulas", tables=tables)
+
+
+def _describe_comparison(comparison: Comparison) -> list[str]:
+    """Return the row of a comparison."""
+    inputs = [
+        f"{name} = {number(value)} {unit}" for name, (value, unit) in comparison.inputs.items()
     ]
-    return Section(
-        "Checks against formulas", tables=[Table(HEADERS["checks"], rows)] if rows else []
-    )
+    applies = comparison.applies
+    return [
+        comparison.name,
+        comparison.formula,
+        ", ".join(inputs),
+        number(comparison.expected),
+        number(comparison.found),
+        comparison.unit,
+        f"does not apply: {applies}" if applies else number(comparison.ratio),
+        comparison.source,
+    ]

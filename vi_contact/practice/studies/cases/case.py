@@ -14,7 +14,7 @@ interface.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -49,18 +49,26 @@ from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, simulate
 from ....run.time_steps import StepPlan, step_plan
 from ...engineering.checks.comparison import Check
-from .bodies import BeamBody, Body, LayerLaw, ParticleBody, own_body, refuse_mixed, refuse_ranks
+from .bodies import (
+    BeamBody,
+    Body,
+    LayerLaw,
+    ParticleBody,
+    find_body_table,
+    refuse_mixed,
+    refuse_ranks,
+)
 from .expressions import check_axes
-from .library import base_folder, check_format, keep_copy, refuse_case_of_others
-from .own_classes import packages
-from .parsing import Words, arguments, nearest, read
-from .stage_tables import Stage, split
+from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
+from .own_classes import check_packages
+from .parsing import Words, read, read_arguments, suggest_nearest
+from .stage_tables import Stage, split_stages
 from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate, with_known_damping
-from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
+from .table_calls import Call, Callee, Group, Node, Spot, build, make_callee, needs_body, walk_nodes
 from .toml_file import read_toml, with_settings
-from .unread_choices import Part, findings, refuse_unread
-from .vocabulary import MeshFile, Parts, weight, words
+from .unread_choices import Part, find_unread, refuse_unread
+from .vocabulary import MeshFile, Parts, make_words, weight
 
 if TYPE_CHECKING:
     from ....layer import ContactLayer
@@ -72,11 +80,11 @@ TABLES: dict[str, Any] = {
     "beam": BeamBody,
     "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
-    "system": callee(assemble),
+    "system": make_callee(assemble),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
     "layer": LayerLaw,
-    "gravity": callee(weight, name="with_weight"),
+    "gravity": make_callee(weight, name="with_weight"),
     "friction": FrictionLaw,
     "impact": ImpactLaw,
     "mass": MassLaw,
@@ -85,7 +93,9 @@ TABLES: dict[str, Any] = {
     "solver": Solver,
     "escalation": Solver | Sequence[Solver],
     "run": replace(
-        callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")),
+        make_callee(
+            simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")
+        ),
         function=dict,
     ),
     "record": Recorder | Sequence[Recorder],
@@ -98,10 +108,14 @@ TABLES: dict[str, Any] = {
 class Case:
     """Hold a case file that has been read and checked; nothing is computed yet.
 
-    path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after
-    reading; nodes: the calls that its tables are; allowed: the packages whose classes it may name;
-    ready: mesh and groups, when they are; stages: of [[stage]]; nodes, and what all but ``run`` and
-    ``check`` do, are those of the last one then.
+    Attributes:
+        path: of the file.
+        tables: its content, with the settings.
+        settings: the KEY=VALUE made after reading.
+        nodes: the calls that its tables are; those of the last stage, if there are stages.
+        allowed: the packages whose classes it may name.
+        ready: mesh and groups, when they are.
+        stages: of [[stage]]. All but ``run`` and ``check`` is about the last one then.
     """
 
     path: Path
@@ -115,17 +129,13 @@ class Case:
     @property
     def out(self) -> Path | None:
         """Return the run folder of [run], if it names one."""
-        return self._plain("out")
-
-    def _plain(self, key: str) -> Any:
-        """Return a value of [run]; None where it is left out, or made of other things."""
         run = self.nodes["run"]
-        found = run.arguments.get(key) if isinstance(run, Call) else None
-        return None if isinstance(found, Call) else found
+        out = run.arguments.get("out") if isinstance(run, Call) else None
+        return None if isinstance(out, Call) else out
 
     def excitations(self, **context: Any) -> tuple[Excitation, ...]:
         """Return what shakes the body; record files are read here."""
-        return self._several("excitation", **context)
+        return self._build_tables("excitation", **context)
 
     def check(self) -> None:
         """Make everything that needs no mesh.
@@ -134,41 +144,46 @@ class Case:
         """
         for stage in self.stages[:-1]:
             stage.case.check()
+        need_mesh = ("title", "mesh", "system", "contact", "gravity")
         for table, node in self.nodes.items():
-            if table not in ("title", "mesh", "system", "contact", "gravity") and not needs_body(
-                node
-            ):
-                self._made(table)
+            if table not in need_mesh and not needs_body(node):
+                self._build_table(table)
         if not needs_body(self.nodes["run"]):
-            own = self._made("run")
-            # else as long as the excitation
-            steps = own.get("steps") if "steps" in own or "t_end" in own else 1
-            try:
-                step_plan(own["dt"], steps, own.get("t_end"))
-            except InputError as error:
-                raise InputError(f"{self.path}: [run] {error}") from None
+            self._check_steps(self._build_table("run"))
         if self.body is not None:
-            self._own_problem(self.body)
+            self._build_body_problem(self.body)
+
+    def _check_steps(self, arguments: Mapping[str, Any]) -> None:
+        """Raise InputError for arguments of [run] that make no steps."""
+        # Without steps and t_end it lasts as long as the excitation: any number of steps will do.
+        has_end = "steps" in arguments or "t_end" in arguments
+        steps = arguments.get("steps") if has_end else 1
+        try:
+            step_plan(arguments["dt"], steps, arguments.get("t_end"))
+        except InputError as error:
+            raise InputError(f"{self.path}: [run] {error}") from None
 
     def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
         """Return the contact problem; ``parts``: those of ``parts``, when they are known.
 
         Collective.
         """
-        return self._problem(parts or self.parts(comm))
+        return self._build_problem(parts or self.parts(comm))
 
     def plan(self, parts: Parts) -> StepPlan:
         """Return the base steps of the run."""
-        own = self._timed(parts)
-        return step_plan(own["dt"], own.get("steps"), own.get("t_end"))
+        arguments = self._build_run(parts)
+        return step_plan(arguments["dt"], arguments.get("steps"), arguments.get("t_end"))
 
-    def _timed(self, parts: Parts) -> dict[str, Any]:
+    def _build_run(self, parts: Parts) -> dict[str, Any]:
         """Return what [run] gives.
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation.
         """
-        own: dict[str, Any] = self._made("run", system=parts.system)
-        return own if "steps" in own or "t_end" in own else own | {"t_end": self._duration(parts)}
+        arguments: dict[str, Any] = self._build_table("run", system=parts.system)
+        if "steps" in arguments or "t_end" in arguments:
+            return arguments
+        return arguments | {"t_end": self._find_duration(parts)}
 
     def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
         """Return the columns that a run writes into history.csv; computes no step.
@@ -176,21 +191,22 @@ class Case:
         ``parts`` as above. Collective.
         """
         parts = parts or self.parts(comm)
-        problem = self._problem(parts)
-        own = self._recorders(parts)
-        recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
-        problem, _ = with_defaults(problem, self._scheme())
+        problem = self._build_problem(parts)
+        recorders = self._build_recorders(parts)
+        if recorders is None:
+            recorders = (Energy(), Contact())
+        problem, _ = with_defaults(problem, self._build_scheme())
         state = initial_state(problem)
         return frozenset(
             name
-            for one in recorders
-            for name, value in one.start(problem, state).items()
+            for recorder in (Steps(), *recorders)
+            for name, value in recorder.start(problem, state).items()
             if np.ndim(value) == 0
         )
 
-    def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
+    def _build_recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
-        return self._several("record", tags=parts.tags) if "record" in self.nodes else None
+        return self._build_tables("record", tags=parts.tags) if "record" in self.nodes else None
 
     def run(
         self,
@@ -205,12 +221,24 @@ class Case:
     ) -> Solution:
         """Compute the whole run; collective.
 
-        ``out``: the run folder, by default the one of [run], if any.
-
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight
         starts from its static equilibrium. The folder gets a copy of the case, ``case.toml``.
-        Stages run one after the other, but for those that are ``reached`` already. Raises as
-        ``simulate``.
+        Stages run one after the other.
+
+        Args:
+            comm: the ranks.
+            out: the run folder, by default the one of [run], if any.
+            restart: as of ``simulate``.
+            progress: whether to print a progress line.
+            changed: as of ``simulate``.
+            wall_time: as of ``simulate``.
+            reached: what the first stages have left, if they have run already.
+
+        Returns:
+            The solution, of the last stage.
+
+        Raises:
+            InputError: and others, as ``simulate``.
         """
         self.check()
         folder = self.out if out is None else Path(out)
@@ -240,12 +268,18 @@ class Case:
             )
 
     def _refuse_files_of_others(self, folder: Path) -> None:
-        """InputError for what the run would replace in a folder, and which no run has made."""
+        """Raise InputError for files that the run would replace and that no run has made."""
         refuse_files_of_others(folder)
         refuse_case_of_others(self.path, folder)
 
     def keep_model(self, comm: Any, parts: Parts, folder: Path | None) -> None:
-        """Write into the folder of a run, if it has one, what its model is. Collective."""
+        """Write into the folder of a run, if it has one, what its model is. Collective.
+
+        Args:
+            comm: the ranks.
+            parts: as of ``parts``.
+            folder: of the run; None: without.
+        """
         if folder is not None:
             from .description import FEW, describe, write_model  # late: it reads cases
 
@@ -255,156 +289,179 @@ class Case:
     def call(
         self, parts: Parts, folder: Path | None, state: State | None = None
     ) -> Iterator[dict[str, Any]]:
-        """Hold the run folder, with a copy of the case.
+        """Lock the run folder, keep a copy of the case there, and yield the call of ``simulate``.
 
-        With it comes what the run gives to ``simulate``. Collective.
+        Collective.
 
-        parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it
-        is known.
+        Args:
+            parts: as of ``parts``, of this case or of one with the same body.
+            folder: of the run; None: without.
+            state: the first one, at rest, when it is known.
+
+        Yields:
+            The arguments of ``simulate``.
+
+        Raises:
+            InputError: for a case with [strain_compatible], and as ``simulate``.
         """
         if "strain_compatible" in self.nodes:
             raise InputError(
                 f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and "
                 "studies"
             )
-        problem = self._problem(parts)
-        own = {name: value for name, value in self._timed(parts).items() if name != "out"}
-        solver = self._made("solver")
+        problem = self._build_problem(parts)
+        arguments = self._build_run(parts)
+        arguments.pop("out", None)
+        solver = self._build_table("solver")
         if state is None and parts.weighted:
             from ....run.static import static_equilibrium  # late: other runs need none of it
 
-            first = solver.primary if isinstance(solver, CrossChecked) else solver
-            state = static_equilibrium(problem, solver=first)
+            static_solver = solver.primary if isinstance(solver, CrossChecked) else solver
+            state = static_equilibrium(problem, solver=static_solver)
         ranks = problem.system.algebra.comm
         with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
             if folder is not None:
                 keep_copy(self.path, self.settings, folder, ranks)
-            yield own | {
+            yield arguments | {
                 "problem": problem,
-                "scheme": self._scheme(),
+                "scheme": self._build_scheme(),
                 "solver": solver,
                 "state": state,
                 "out": folder,
-                "record": self._recorders(parts),
-                "escalation": self._several("escalation"),
-                "fields": self._made("fields"),
+                "record": self._build_recorders(parts),
+                "escalation": self._build_tables("escalation"),
+                "fields": self._build_table("fields"),
                 "cross_check": solver if isinstance(solver, CrossChecked) else None,
             }
 
-    def _made(self, table: str, **context: Any) -> Any:
+    def _build_table(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""
         return build(self.nodes[table], context) if table in self.nodes else None
 
-    def _several(self, table: str, **context: Any) -> tuple[Any, ...]:
+    def _build_tables(self, table: str, **context: Any) -> tuple[Any, ...]:
         """Return what a table, or an array of tables, makes, as a tuple."""
-        made = self._made(table, **context)
-        return made if isinstance(made, tuple) else () if made is None else (made,)
+        value = self._build_table(table, **context)
+        if value is None:
+            return ()
+        return value if isinstance(value, tuple) else (value,)
 
     @cached_property
     def body(self) -> Body | None:
         """Return the body of a case without a mesh; None of one with."""
-        made: Body | None = self._made(own_body(self.nodes)) if own_body(self.nodes) else None
-        return made
+        table = find_body_table(self.nodes)
+        body: Body | None = self._build_table(table) if table else None
+        return body
 
     @cached_property
     def layer(self) -> "ContactLayer | None":
         """Return the law of the layer before the obstacle, if there is one."""
-        made: ContactLayer | None = self._made("layer")
-        return made
+        layer: ContactLayer | None = self._build_table("layer")
+        return layer
 
-    def _scheme(self) -> Scheme | None:
+    def _build_scheme(self) -> Scheme | None:
         """Return the scheme: that of the layer, or of [scheme]; None for that of ``simulate``."""
         if self.layer is not None:
             from ....layer import BoundaryLayer  # late: other runs need none of it
 
             return BoundaryLayer(law=self.layer)
-        made: Scheme | None = self._made("scheme")
-        return made
+        scheme: Scheme | None = self._build_table("scheme")
+        return scheme
 
-    def _friction(self) -> FrictionLaw:
+    def _build_friction(self) -> FrictionLaw:
         """Return the law of [friction], unless the body cannot slide."""
         slides = self.body is None or self.body.slides
-        made: FrictionLaw | None = self._made("friction") if slides else None
-        return made or Frictionless()
+        friction: FrictionLaw | None = self._build_table("friction") if slides else None
+        return friction or Frictionless()
 
-    def _own_problem(self, body: Body) -> ContactProblem:
+    def _build_body_problem(self, body: Body) -> ContactProblem:
         """Return the problem of a body without a mesh, before its excitations."""
         try:
-            return body.make(self._friction())
+            return body.make(self._build_friction())
         except InputError as error:
-            raise self.nodes[own_body(self.nodes)].spot.inside(f"{error}") from error
+            raise self.nodes[find_body_table(self.nodes)].spot.make_table_error(
+                f"{error}"
+            ) from error
 
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         if self.body is not None:
-            refuse_ranks(self.path, own_body(self.nodes), comm.size)
-            own = self._own_problem(self.body)
-            parts = Parts(own.system, own.surface, Tags(), mass=own.mass)
+            refuse_ranks(self.path, find_body_table(self.nodes), comm.size)
+            problem = self._build_body_problem(self.body)
+            parts = Parts(problem.system, problem.surface, Tags(), mass=problem.mass)
         else:
-            parts = self._meshed_parts(comm)
+            parts = self._build_meshed_parts(comm)
         if self.layer is None:
             return parts
         surface = self.layer.set_back(parts.surface)
         return replace(parts, surface=surface, mass=ConsistentMass())
 
-    def _meshed_parts(self, comm: Any) -> Parts:
+    def _build_meshed_parts(self, comm: Any) -> Parts:
         """Return the parts of a body with a mesh; collective."""
         mesh, tags = self.meshed(comm)
-        # else they need the system
-        early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])
-        shaking = {"excitations": self.excitations()} if early else {}
-        body = (
-            with_known_damping(self.nodes["system"])
-            if "strain_compatible" in self.nodes
-            else self.nodes["system"]
+        context: dict[str, Any] = {"mesh": mesh, "tags": tags}
+
+        # Sides of the ground need the excitations; these may themselves need the system.
+        excitation_is_known = "excitation" not in self.nodes or not needs_body(
+            self.nodes["excitation"]
         )
-        system = build(body, {"mesh": mesh, "tags": tags, **shaking})
-        system = (
-            self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
-        )
-        none = empty_surface(system.algebra.comm, system.space.dimension)
-        surfaces = self._several("contact", system=system, tags=tags) or (none,)
+        if excitation_is_known:
+            context["excitations"] = self.excitations()
+
+        # The body, its weight, and the contact conditions.
+        call = self.nodes["system"]
+        if "strain_compatible" in self.nodes:
+            call = with_known_damping(call)
+        system = build(call, context)
+        if "gravity" in self.nodes:
+            system = self._build_table("gravity", system=system, tags=tags)
+        no_surface = empty_surface(system.algebra.comm, system.space.dimension)
+        surfaces = self._build_tables("contact", system=system, tags=tags) or (no_surface,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
-        calls = [one for one in nodes_in(self.nodes["system"]) if isinstance(one, Call)]
+
+        # Motions that rise through the base are no inertia load as well.
+        calls = [node for node in walk_nodes(self.nodes["system"]) if isinstance(node, Call)]
         rising = any(
-            one.callee.name == "upgoing" and "motion" not in one.arguments for one in calls
+            node.callee.name == "upgoing" and "motion" not in node.arguments for node in calls
         )
         return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising)
 
     def meshed(self, comm: Any) -> tuple[Any, Tags]:
-        """Return the mesh and its groups, all those that the tables name among them."""
+        """Return the mesh and its groups, all those that the tables name among them.
+
+        Raises:
+            InputError: for a group that the mesh does not have, and an expression of a coordinate
+                beyond its dimension, in any stage.
+        """
         if self.ready is not None:
             return self.ready
-        script = self._made("mesh")
-        mesh, tags = (
-            read_mesh(script.path, comm)
-            if isinstance(script, MeshFile)
-            else build_mesh(script, comm)
-        )
+        script = self._build_table("mesh")
+        if isinstance(script, MeshFile):
+            mesh, tags = read_mesh(script.path, comm)
+        else:
+            mesh, tags = build_mesh(script, comm)
         for case in [stage.case for stage in self.stages] or [self]:
-            for table, one in (
-                (table, one) for table, node in case.nodes.items() for one in nodes_in(node)
-            ):
-                check_axes(one, mesh.geometry.dim, f"{self.path}: [{table}]")
-                if isinstance(one, Group):
-                    one.build({"tags": tags})
+            for table, node in case.nodes.items():
+                for inner in walk_nodes(node):
+                    check_axes(inner, mesh.geometry.dim, f"{self.path}: [{table}]")
+                    if isinstance(inner, Group):
+                        inner.build({"tags": tags})
         return mesh, tags
 
-    def _problem(self, parts: Parts) -> ContactProblem:
+    def _build_problem(self, parts: Parts) -> ContactProblem:
+        """Return the contact problem of these parts, with its laws and excitations."""
         return ContactProblem(
             parts.system,
             parts.surface,
-            friction=self._friction(),
-            impact=self._made("impact"),
-            mass=self._made("mass") or parts.mass,
+            friction=self._build_friction(),
+            impact=self._build_table("impact"),
+            mass=self._build_table("mass") or parts.mass,
             excitation=() if parts.moved else self.excitations(system=parts.system),
         )
 
-    def _duration(self, parts: Parts) -> float:
+    def _find_duration(self, parts: Parts) -> float:
         """Return the time until the last excitation ends [s]."""
-        longest = max(
-            (one.duration for one in self.excitations(system=parts.system)), default=math.inf
-        )
+        durations = [one.duration for one in self.excitations(system=parts.system)]
+        longest = max(durations, default=math.inf)
         if not math.isfinite(longest):
             raise InputError(
                 f"{self.path}: [run] has neither steps nor t_end, and the excitation has no end: "
@@ -416,122 +473,161 @@ class Case:
 def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
     """Read and check a case file.
 
-    ``settings`` are texts KEY=VALUE that replace values of it. ``allow`` names packages that you
-    trust: the case may name their classes as "package.module:Name", which runs code of these
-    packages.
+    Groups are looked up by ``run``.
 
-    Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a
-    table, type or key that nobody knows (with the nearest known), a missing key, a value of the
-    wrong kind. Groups are looked up by ``run``.
+    Args:
+        path: of the file.
+        settings: texts KEY=VALUE that replace values of it.
+        allow: packages that you trust: the case may name their classes as "package.module:Name",
+            which runs code of these packages.
+
+    Raises:
+        InputError: one sentence with file, table, key and remedy, for no TOML (with the line), a
+            table, type or key that nobody knows (with the nearest known), a missing key, a value of
+            the wrong kind, and a choice that nothing reads.
     """
     check("read_case", "path", path, str | Path)
     path = Path(path)
-    file = read_toml(path)
-    case = _read(path, with_settings(file, settings), settings, allow)
-    found = _unread(case)
-    if found:
-        refuse_unread(found, _unread_in(path, file, allow) if settings else [], settings)
+    tables = read_toml(path)
+    case = _read_tables(path, with_settings(tables, settings), settings, allow)
+    unread = _collect_unread(case)
+    if unread:
+        before = _collect_unread_without_settings(path, tables, allow) if settings else []
+        refuse_unread(unread, before, settings)
     return case
 
 
-def _read(
+def _read_tables(
     path: Path, tables: Mapping[str, Any], settings: Sequence[str], allow: Sequence[str]
 ) -> Case:
     """Return the case of tables that have their settings."""
-    allowed = packages(allow)
-    known = words(base_folder(path), allowed)
+    # Tables that nobody knows, that are missing, or that do not go together.
+    allowed = check_packages(allow)
+    words = make_words(find_base_folder(path), allowed)
     check_format(path, tables)
+    known_tables = ("format", *TABLES, "stage")
     for name in tables:
-        if name not in ("format", *TABLES, "stage"):
+        if name not in known_tables:
             raise InputError(
-                f"{path}: the table [{name}] is unknown: "
-                f"{nearest(name, ('format', *TABLES, 'stage'))}"
+                f"{path}: the table [{name}] is unknown: {suggest_nearest(name, known_tables)}"
             )
-    if "mesh" not in tables and not own_body(tables):
+    body = find_body_table(tables)
+    if "mesh" not in tables and not body:
         raise InputError(
             f"{path}: the table [mesh] is missing: give the mesh of the body, or [beam] or "
             "[particle] in its place"
         )
     refuse_mixed(path, tables)
+    if body:
+        _refuse_groups(_read_nodes(tables, str(path), words), body)
+
+    # The nodes of each stage, or those of the whole case.
     whole = Case(path, tables, tuple(settings), {}, allowed)
-    own = _nodes(tables, str(path), known) if own_body(tables) else {}
-    for one in (one for node in own.values() for one in nodes_in(node) if isinstance(one, Group)):
-        raise one.spot.wrong(
-            f"is '{one.name}', and [{own_body(tables)}] has no mesh with groups: leave it out"
-        )
     stages = tuple(
-        replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
-        for one in split(path, tables)
+        replace(stage, case=replace(whole, nodes=_read_nodes(stage.tables, stage.label, words)))
+        for stage in split_stages(path, tables)
     )
-    return replace(
-        whole,
-        nodes=stages[-1].case.nodes if stages else _nodes(tables, str(path), known),
-        stages=stages,
-    )
+    nodes = stages[-1].case.nodes if stages else _read_nodes(tables, str(path), words)
+    return replace(whole, nodes=nodes, stages=stages)
 
 
-def _unread(case: Case) -> list[tuple[str, str]]:
+def _refuse_groups(nodes: Mapping[str, Node], body: str) -> None:
+    """Raise InputError for a group of a mesh, in the case of a body that has none."""
+    for node in nodes.values():
+        for inner in walk_nodes(node):
+            if isinstance(inner, Group):
+                raise inner.spot.make_error(
+                    f"is '{inner.name}', and [{body}] has no mesh with groups: leave it out"
+                )
+
+
+def _collect_unread(case: Case) -> list[tuple[str, str]]:
     """Return the choices of a case that nothing reads: key and sentence of each."""
     if case.stages:
-        parts = [Part(one.label, one.tables, one.case.nodes, one.static) for one in case.stages]
+        parts = [
+            Part(stage.label, stage.tables, stage.case.nodes, stage.static) for stage in case.stages
+        ]
     else:
         parts = [Part(str(case.path), case.tables, case.nodes)]
-    return list(findings(case.path, case.tables, parts))
+    return list(find_unread(case.path, case.tables, parts))
 
 
-def _unread_in(
+def _collect_unread_without_settings(
     path: Path, tables: Mapping[str, Any], allow: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return the same of a file alone.
+    """Return the choices of the file alone that nothing reads.
 
-    There are none where it is no case without the settings that complete it.
+    The list is empty where the file is no case without the settings that complete it.
     """
     try:
-        return _unread(_read(path, tables, (), allow))
+        return _collect_unread(_read_tables(path, tables, (), allow))
     except InputError:
         return []
 
 
-def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:
-    given = {"run": {}} | ({} if own_body(tables) else {"system": {}}) | dict(tables)
+def _read_nodes(tables: Mapping[str, Any], source: str, words: Words) -> dict[str, Node]:
+    """Return the nodes of the tables of a case or stage, in the order in which they are read.
+
+    [run], and [system] of a body with a mesh, are there even if the file leaves them out.
+    """
+    defaults: dict[str, Any] = {"run": {}}
+    if not find_body_table(tables):
+        defaults["system"] = {}
+    whole = defaults | dict(tables)
     return {
-        name: _node(name, given, Spot(source, "", name), known) for name in TABLES if name in given
+        name: _read_node(name, whole, Spot(source, "", name), words)
+        for name in TABLES
+        if name in whole
     }
 
 
-def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:
-    value, asked = tables[name], TABLES[name]
-    if isinstance(asked, Callee):
+def _read_node(name: str, tables: Mapping[str, Any], spot: Spot, words: Words) -> Node:
+    """Return the node of one table; what later tables name is noted in the words."""
+    value = tables[name]
+    hint = TABLES[name]
+    if isinstance(hint, Callee):
         if not isinstance(value, dict):
-            raise spot.wrong("is not a table: write its keys below it")
-        materials = (
-            list(tables.get("material", {})) if name == "system" and "material" not in value else []
-        )
-        # those that [system] does not name: one for the whole body, or each for its cell group
-        if materials:
-            value = {
-                "material": materials[0]
-                if len(materials) == 1
-                else [[one, one] for one in materials]
-            } | value
-        return arguments(value, asked, spot, known)
-    if (
-        name == "material"
-        and isinstance(value, dict)
-        and not all(isinstance(one, dict) for one in value.values())
-    ):
-        raise spot.inside(
+            raise spot.make_error("is not a table: write its keys below it")
+        if name == "system":
+            value = _add_materials(value, tables.get("material", {}))
+        return read_arguments(value, hint, spot, words)
+    if name == "material" and isinstance(value, dict) and not _holds_tables(value):
+        raise spot.make_table_error(
             "has the keys of one material and no name: write [material.NAME], with a name of your "
             "own"
         )
-    node = read(value, asked, spot, known)
+    node = read(value, hint, spot, words)
     if name == "contact":
-        given = (
-            one.arguments
-            for one in nodes_in(node)
-            if isinstance(one, Call) and "name" in one.arguments
-        )
-        known.named[name] = {one["name"]: one.get("facets", one.get("facets1")) for one in given}
+        words.named[name] = _collect_groups_of_contact(node)
     if name == "material" and isinstance(node, dict):
-        known.named[LinearElastic] = node  # before the system names them
+        words.named[LinearElastic] = node  # before the system names them
     return node
+
+
+def _holds_tables(table: Mapping[str, Any]) -> bool:
+    """Tell whether all values of a table are tables."""
+    return all(isinstance(value, dict) for value in table.values())
+
+
+def _add_materials(system: dict[str, Any], named: Iterable[str]) -> dict[str, Any]:
+    """Return [system] with the materials of these names, where it does not name its own.
+
+    One is for the whole body, of several each for the cell group of its name.
+    """
+    if "material" in system:
+        return system
+    names = list(named)
+    if not names:
+        return system
+    materials: Any = names[0] if len(names) == 1 else [[name, name] for name in names]
+    return {"material": materials} | system
+
+
+def _collect_groups_of_contact(node: Node) -> dict[str, Node]:
+    """Return name of a [[contact]] -> its group of facets, the first one of a pair."""
+    groups: dict[str, Node] = {}
+    for call in walk_nodes(node):
+        if isinstance(call, Call) and "name" in call.arguments:
+            keys = call.arguments
+            groups[keys["name"]] = keys.get("facets", keys.get("facets1"))
+    return groups

@@ -21,7 +21,7 @@ from typing import Any
 
 from ....core.checks import shown
 from ....core.errors import InputError
-from .table_calls import Callee, Spot, callee
+from .table_calls import Callee, Spot, make_callee
 
 _WORD = "[A-Za-z][A-Za-z0-9_]{0,63}"
 _PACKAGE = re.compile(rf"{_WORD}(?:\.{_WORD}){{0,7}}")
@@ -29,112 +29,126 @@ _CLASS = re.compile(rf"({_PACKAGE.pattern}):({_WORD})")
 GROUP = "vi_contact"  # of entry points
 
 
-def packages(names: Iterable[str]) -> tuple[str, ...]:
+def check_packages(names: Iterable[str]) -> tuple[str, ...]:
     """Return the names of packages that a user allows; InputError for what is no such name."""
-    found = (names,) if isinstance(names, str) else tuple(names)
-    for name in found:
+    allowed = (names,) if isinstance(names, str) else tuple(names)
+    for name in allowed:
         if not isinstance(name, str) or not _PACKAGE.fullmatch(name):
             raise InputError(
                 f"--allow {shown(name)}: give the name of a Python package, such as mypackage"
             )
-    return found
+    return allowed
 
 
-def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spot) -> Callee:
+def find_own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spot) -> Callee:
     """Return how to call the class "package.module:Name".
 
-    It raises InputError unless it is allowed and of one of the kinds.
+    Args:
+        text: the ``type`` of a table.
+        kinds: the types that the table may make.
+        allowed: the packages whose classes may be named.
+        spot: where the table stands.
+
+    Raises:
+        InputError: unless the class is allowed and of one of the kinds.
     """
-    found = _CLASS.fullmatch(text)
-    if found is None:
-        raise spot.inside(
+    match = _CLASS.fullmatch(text)
+    if match is None:
+        raise spot.make_table_error(
             f"has the type {shown(text)}: give package.module:Name, in plain letters, digits and "
             "underscores"
         )
-    asked = [kind for kind in kinds if is_protocol(kind)]
-    if not asked:
-        raise spot.inside(
+    protocols = [kind for kind in kinds if is_protocol(kind)]
+    if not protocols:
+        raise spot.make_table_error(
             f"has the type '{text}', but accepts built-in classes only: leave it out to see them"
         )
     from importlib.metadata import entry_points  # late: it takes a while
 
-    module, name = found.groups()
-    allowed = (
-        *allowed,
-        *(one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)),
-    )
-    if not _within(module, allowed):
+    module, name = match.groups()
+    registered = [entry.value.partition(":")[0].strip() for entry in entry_points(group=GROUP)]
+    trusted = (*allowed, *registered)
+
+    # Importing a module runs it: it has to be of a trusted package.
+    if not _is_within(module, trusted):
         package = module.partition(".")[0]
-        raise spot.inside(
+        raise spot.make_table_error(
             f"has the type '{text}' of the package '{package}', and a case file imports nothing by "
             f"itself: give --allow {package} if you trust it"
         )
-    cls = _imported(module, name, spot)
+    cls = _import_class(module, name, spot)
     if not isinstance(cls, type):
-        raise spot.inside(f"has the type '{text}', which is not a class: give one")
-    if not _within(cls.__module__, allowed):
-        raise spot.inside(
+        raise spot.make_table_error(f"has the type '{text}', which is not a class: give one")
+
+    # A trusted module may have imported the class from one that is not.
+    if not _is_within(cls.__module__, trusted):
+        raise spot.make_table_error(
             f"has the type '{text}', which {cls.__module__} defines: name it there, and allow that "
             "package if you trust it"
         )
-    defects = [defect(cls, kind) for kind in asked]
+
+    # It is enough to be of one of the kinds.
+    defects = [describe_defect(cls, kind) for kind in protocols]
     if all(defects):
-        raise spot.inside(
-            f"has the type '{text}', which {defects[0]}, as {asked[0].__name__} must: see "
+        raise spot.make_table_error(
+            f"has the type '{text}', which {defects[0]}, as {protocols[0].__name__} must: see "
             "docs/reference/api.md"
         )
-    return _callee(cls, text, asked, spot)
+    return _make_callee_of_class(cls, text, protocols, spot)
 
 
-def _within(module: str, allowed: Iterable[str]) -> bool:
-    return any(module == one or module.startswith(f"{one}.") for one in allowed)
+def _is_within(module: str, packages: Iterable[str]) -> bool:
+    """Tell whether a module is one of these packages or lies below one."""
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
 
 
-def _imported(module: str, name: str, spot: Spot) -> Any:
+def _import_class(module: str, name: str, spot: Spot) -> Any:
+    """Return what a module calls by this name; InputError where it cannot be imported."""
     try:
         return getattr(import_module(module), name)
     except (Exception, SystemExit) as error:  # a module may raise anything
-        why, package = f"{type(error).__name__}: {_line(error)}", module.partition(".")[0]
+        reason = f"{type(error).__name__}: {_put_on_one_line(error)}"
         remedy = f"correct {module}, or the name"
         if isinstance(error, ModuleNotFoundError):
-            missing = (error.name or package).partition(".")[0]
+            missing = (error.name or module).partition(".")[0]
             remedy = f"correct the name, install {missing}, or set PYTHONPATH to its folder"
-        raise spot.inside(
-            f"has the type '{module}:{name}', which Python cannot import ({why}): {remedy}"
+        raise spot.make_table_error(
+            f"has the type '{module}:{name}', which Python cannot import ({reason}): {remedy}"
         ) from error
 
 
-def _line(error: BaseException) -> str:
+def _put_on_one_line(error: BaseException) -> str:
     """Return what an error says, on one line."""
     return " ".join(str(error).split())[:200]
 
 
-def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
-    """Return the call, which looks up what only objects show.
+def _make_callee_of_class(cls: type, text: str, protocols: Sequence[Any], spot: Spot) -> Callee:
+    """Return how to call a class; the call tells errors of the constructor by InputError.
 
-    It tells errors of the constructor.
+    Attributes of a protocol are looked up when an object is made, as only objects show them.
     """
 
-    def made(**given: Any) -> Any:
+    def construct(**arguments: Any) -> Any:
         try:
-            one = cls(**given)
+            value = cls(**arguments)
         except InputError:
             raise
         except (TypeError, ValueError) as error:
-            raise InputError(f"{text}: {_line(error)}") from error
-        defects = [lacks(one, kind) for kind in asked if not defect(cls, kind)]
-        if all(defects):
+            raise InputError(f"{text}: {_put_on_one_line(error)}") from error
+        fitting = [kind for kind in protocols if not describe_defect(cls, kind)]
+        lacks = [describe_lack(value, kind) for kind in fitting]
+        if all(lacks):
             raise InputError(
-                f"{text} {defects[0]}, as {asked[0].__name__} must: see docs/reference/api.md"
+                f"{text} {lacks[0]}, as {protocols[0].__name__} must: see docs/reference/api.md"
             )
-        return one
+        return value
 
     try:
-        return replace(callee(cls, name=text, given=()), function=made)
+        return replace(make_callee(cls, name=text, supplied=()), function=construct)
     except Exception as error:  # type hints are evaluated
-        raise spot.inside(
-            f"has the type '{text}', whose arguments cannot be read ({_line(error)}): correct the "
-            "type hints of its constructor"
+        raise spot.make_table_error(
+            f"has the type '{text}', whose arguments cannot be read ({_put_on_one_line(error)}): "
+            "correct the type hints of its constructor"
         ) from error
 
 
@@ -143,60 +157,65 @@ def is_protocol(kind: Any) -> bool:
     return bool(getattr(kind, "_is_protocol", False))
 
 
-def defect(cls: type, kind: Any) -> str:
+def describe_defect(cls: type, kind: Any) -> str:
     """Return what a class lacks to be of this kind, "has no method …".
 
     It is empty when it lacks nothing.
     """
     if not is_protocol(kind):
         return "" if issubclass(cls, kind) else f"is no {kind.__name__}"
-    methods = dict(_asked(kind, isfunction))
-    missing = [name for name in methods if not callable(_plain(cls, name))]
+    methods = dict(_list_members(kind, isfunction))
+    missing = [name for name in methods if not callable(_find_function(cls, name))]
     if missing:
         return f"has no method {', '.join(missing)}"
-    wrong = [
-        f"{name}{_shown(asked)}" for name, asked in methods.items() if not _takes(cls, name, asked)
+    unfit = [
+        f"{name}{_describe_parameters(method)}"
+        for name, method in methods.items()
+        if not _takes_arguments(cls, name, method)
     ]
-    return f"cannot be called as {', '.join(wrong)}" if wrong else ""
+    return f"cannot be called as {', '.join(unfit)}" if unfit else ""
 
 
-def lacks(value: object, kind: Any) -> str:
+def describe_lack(value: object, kind: Any) -> str:
     """Return the attributes of a protocol that an object of a fitting class lacks.
 
     It reads "has no …", and is empty when it lacks none.
     """
-    missing = [
-        name
-        for name, _ in _asked(kind, lambda one: isinstance(one, property))
-        if not hasattr(value, name)
-    ]
+    properties = _list_members(kind, lambda member: isinstance(member, property))
+    missing = [name for name, _ in properties if not hasattr(value, name)]
     return f"has no {', '.join(missing)}" if missing else ""
 
 
-def _asked(kind: Any, wanted: Callable[[Any], bool]) -> Iterator[tuple[str, Any]]:
+def _list_members(kind: Any, is_wanted: Callable[[Any], bool]) -> Iterator[tuple[str, Any]]:
     """Yield the public members of a protocol and of those it extends."""
-    for base in kind.__mro__:
-        for name, value in vars(base).items() if is_protocol(base) else ():
-            if wanted(value) and (name == "__call__" or not name.startswith("_")):
-                yield name, value
+    for protocol in filter(is_protocol, kind.__mro__):
+        for name, member in vars(protocol).items():
+            if is_wanted(member) and (name == "__call__" or not name.startswith("_")):
+                yield name, member
 
 
-def _plain(cls: type, name: str) -> Any:
+def _find_function(cls: type, name: str) -> Any:
     """Return the function behind a method; None where there is none."""
-    found = next((vars(base)[name] for base in cls.__mro__ if name in vars(base)), None)
-    return getattr(found, "__func__", found)
+    for base in cls.__mro__:
+        if name in vars(base):
+            member = vars(base)[name]
+            return getattr(member, "__func__", member)
+    return None
 
 
-def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
+def _takes_arguments(cls: type, name: str, method: Callable[..., Any]) -> bool:
     """Return whether a method of a class can be called with the arguments of the protocol's."""
-    parameters = list(signature(asked).parameters.values())
+    parameters = list(signature(method).parameters.values())
     if isinstance(getattr_static(cls, name), staticmethod):
         parameters = parameters[1:]
-    named = {one.name: one for one in parameters if one.kind is Parameter.KEYWORD_ONLY}
+    by_keyword = {
+        parameter.name: parameter
+        for parameter in parameters
+        if parameter.kind is Parameter.KEYWORD_ONLY
+    }
+    by_position = [parameter for parameter in parameters if parameter.name not in by_keyword]
     try:
-        signature(_plain(cls, name)).bind(
-            *(one for one in parameters if one.name not in named), **named
-        )
+        signature(_find_function(cls, name)).bind(*by_position, **by_keyword)
     except TypeError:
         return False
     except (ValueError, NameError):
@@ -205,6 +224,6 @@ def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
     return True
 
 
-def _shown(asked: Callable[..., Any]) -> str:
+def _describe_parameters(method: Callable[..., Any]) -> str:
     """Return the parameters of a method without types: "(problem, state, dt)"."""
-    return f"({', '.join(list(signature(asked).parameters)[1:])})"
+    return f"({', '.join(list(signature(method).parameters)[1:])})"

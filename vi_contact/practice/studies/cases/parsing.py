@@ -13,9 +13,9 @@ from ....core.arguments import members_of
 from ....core.checks import SHOWN, shown
 from ....core.errors import InputError
 from ....core.renamed import WORDS
-from .own_classes import own_class
-from .quantities import FIELD, HISTORY, Expression, list_node, text_node
-from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
+from .own_classes import find_own_class
+from .quantities import FIELD, HISTORY, Expression, read_field, read_quantity
+from .table_calls import GROUP, Call, Callee, Group, Node, Spot, make_callee
 
 log = logging.getLogger(__name__)
 
@@ -24,10 +24,15 @@ log = logging.getLogger(__name__)
 class Words:
     """Say what names mean.
 
-    choices: of every type that tables can make, by the word after ``type``; default: where it may
-    be left out; groups: types that are named groups of the mesh; short: the one key that a plain
-    text stands for; allowed: the packages whose classes may be named; named: nodes by type and
-    name; by "contact" the groups of contact tables.
+    Attributes:
+        folder: where relative paths begin.
+        choices: of every type that tables can make, by the word after ``type``.
+        default: the word of a type where ``type`` may be left out.
+        groups: types that are named groups of the mesh.
+        short: the one key of a type that a plain text stands for.
+        allowed: the packages whose classes may be named.
+        named: nodes by type and name; by "contact" the groups of contact tables. It grows while a
+            case is read.
     """
 
     folder: Path
@@ -42,63 +47,83 @@ class Words:
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     """Return the node of a value for a parameter with this hint.
 
-    InputError when it does not fit.
+    Args:
+        value: of the file.
+        hint: type of the parameter.
+        spot: where the value stands.
+        words: what names mean.
+
+    Raises:
+        InputError: for a value that does not fit.
     """
     members = members_of(hint)
     # a text is the path then, and belongs to the case file's folder
     if any(is_path(member) for member in members):
         members = [member for member in members if member is not str]
     if isinstance(value, dict):
-        return _table(value, members, spot, words)
+        return _read_table(value, members, spot, words)
     if isinstance(value, list):
-        field = list_node(value, members, spot)
-        return _list(value, members, spot, words) if field is None else field
-    # a group, or such a name
+        field = read_field(value, members, spot)
+        return _read_list(value, members, spot, words) if field is None else field
+    # a group, or the name of a contact table
     if {str, *words.groups} & {*members} > {str} and value in words.named.get("contact", ()):
         return replace(words.named["contact"][value], alias=value, spot=spot)
     for member in members:
-        node = _scalar(value, member, spot, words)
+        node = _read_scalar(value, member, spot, words)
         if node is not None:
             return node
     if HISTORY in members and isinstance(value, int | float) and not isinstance(value, bool):
         value = repr(float(value))  # the same at all times
-    text = text_node(value, members, spot) if isinstance(value, str) else None
-    if text is not None:
-        return text
-    raise spot.wrong(f"is {_shown(value)}: give {_expected(members, words)}")
+    quantity = read_quantity(value, members, spot) if isinstance(value, str) else None
+    if quantity is not None:
+        return quantity
+    raise spot.make_error(f"is {_show(value)}: give {_describe_all(members, words)}")
 
 
-def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words) -> Call:
-    """Return the call of this function with the keys of the table."""
-    given = {key: value for key, value in table.items() if key != "type"}
-    for key in given:
+def read_arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words) -> Call:
+    """Return the call of a function with the keys of a table.
+
+    Args:
+        table: of the file; its key ``type`` has led to the function.
+        target: the function.
+        spot: where the table stands.
+        words: what names mean.
+
+    Raises:
+        InputError: for a key that the function does not have, one that it needs and that is
+            missing, and a value that does not fit.
+    """
+    values = {key: value for key, value in table.items() if key != "type"}
+    for key in values:
         if key not in target.hints:
-            raise spot.inside(
-                f"has the unknown key '{key}' for {target.name}: {nearest(key, target.hints)}"
-            )
-    missing = sorted(target.required - set(given))
+            nearest = suggest_nearest(key, target.hints)
+            raise spot.make_table_error(f"has the unknown key '{key}' for {target.name}: {nearest}")
+    missing = sorted(target.required - set(values))
     if missing:
-        raise spot.inside(f"lacks the key '{missing[0]}', which {target.name} needs: give it")
+        raise spot.make_table_error(
+            f"lacks the key '{missing[0]}', which {target.name} needs: give it"
+        )
     nodes = {
-        key: read(value, target.hints[key], spot.at(key, target.unit(key)), words)
-        for key, value in given.items()
+        key: read(value, target.hints[key], spot.go_to_key(key, target.unit(key)), words)
+        for key, value in values.items()
     }
     return Call(target, nodes, spot)
 
 
-def nearest(word: Any, known: Iterable[str]) -> str:
+def suggest_nearest(word: Any, known: Iterable[str]) -> str:
     """Return the rest of a sentence about a word nobody knows."""
     names = sorted(known) if isinstance(known, frozenset) else list(known)
     if not names:
         return "leave it out, as there are none"
-    near = get_close_matches(str(word), names, n=3, cutoff=0.5)
     renamed = WORDS.get(str(word))
     if renamed in names:
         return f"it is now {renamed}"
-    return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
+    near = get_close_matches(str(word), names, n=3, cutoff=0.5)
+    question = f"did you mean {' or '.join(near)}? " if near else ""
+    return f"{question}Known: {', '.join(names)}"
 
 
-def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
+def _read_scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
     """Return the node, or None where the value is nothing of this type."""
     if member in (Any, object):
         return value
@@ -116,16 +141,17 @@ def _read_text(value: str, member: Any, spot: Spot, words: Words) -> Node | None
     if member in words.groups:
         return Group(value, member, spot)
     if member in words.named:
-        if value not in words.named[member]:
-            raise spot.wrong(
-                f"names '{value}', which does not exist: {nearest(value, words.named[member])}"
+        named = words.named[member]
+        if value not in named:
+            raise spot.make_error(
+                f"names '{value}', which does not exist: {suggest_nearest(value, named)}"
             )
-        return words.named[member][value]
+        return named[value]
     if member in words.short:
-        return _table({words.short[member]: value}, [member], spot, words)
+        return _read_table({words.short[member]: value}, [member], spot, words)
     if is_path(member):
         if not value.strip():
-            raise spot.wrong("is empty: give the path of a file or folder")
+            raise spot.make_error("is empty: give the path of a file or folder")
         return words.folder / value
     return value if member is str else None
 
@@ -136,19 +162,23 @@ def is_path(member: Any) -> bool:
     return isinstance(origin, type) and issubclass(origin, os.PathLike)
 
 
-def _list(value: list[Any], members: list[Any], spot: Spot, words: Words) -> Node:
-    wrong: InputError | None = None
+def _read_list(value: list[Any], members: list[Any], spot: Spot, words: Words) -> Node:
+    """Return the nodes of a list, of the first type that it fits.
+
+    Where it fits none, the error is that of the first list.
+    """
+    first_error: InputError | None = None
     for member in members:
         if is_list(member):
             try:
-                return _items(value, get_args(member), get_origin(member) is tuple, spot, words)
+                return _read_entries(value, member, spot, words)
             except InputError as error:
-                wrong = wrong or error
-    if wrong is not None:
-        raise wrong
+                first_error = first_error or error
+    if first_error is not None:
+        raise first_error
     if any(member in (Any, object) for member in members):
         return value
-    raise spot.wrong(f"is a list: give {_expected(members, words)}")
+    raise spot.make_error(f"is a list: give {_describe_all(members, words)}")
 
 
 def is_list(member: Any) -> bool:
@@ -156,39 +186,43 @@ def is_list(member: Any) -> bool:
     return get_origin(member) in (tuple, list, Sequence)
 
 
-def _items(
-    value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, words: Words
-) -> tuple[Node, ...]:
-    if not fixed or kinds[-1] is Ellipsis:
-        kinds = (kinds[0],) * len(value)
+def _read_entries(value: list[Any], member: Any, spot: Spot, words: Words) -> tuple[Node, ...]:
+    """Return the nodes of a list for one type; InputError for another number of entries."""
+    kinds = get_args(member)
+    if get_origin(member) is not tuple or kinds[-1] is Ellipsis:
+        kinds = (kinds[0],) * len(value)  # any number of entries, all of one type
     elif len(kinds) != len(value):
-        raise spot.wrong(f"has {len(value)} entries: give {len(kinds)}")
+        raise spot.make_error(f"has {len(value)} entries: give {len(kinds)}")
     pairs = enumerate(zip(value, kinds, strict=True), start=1)
-    return tuple(read(one, kind, spot.entry(number), words) for number, (one, kind) in pairs)
+    return tuple(
+        read(entry, kind, spot.go_to_entry(number), words) for number, (entry, kind) in pairs
+    )
 
 
-def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
-    found: list[Any] = [one for one in (choices_of(member, words) for member in members) if one]
-    if found:
-        # in which words come in the order of ``found``, and are looked up one by one
-        choices = ChainMap(*found[::-1])
-        word = value.get(
-            "type",
-            next((words.default[member] for member in members if member in words.default), None),
-        )
+def _read_table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
+    """Return the call that a table is, or the nodes of a table of names."""
+    choices_of_members = [find_choices(member, words) for member in members]
+    callable_choices: list[Any] = [choices for choices in choices_of_members if choices]
+    if callable_choices:
+        # A ChainMap has words in the order of the list, and looks them up one by one.
+        choices = ChainMap(*callable_choices[::-1])
+        defaults = [words.default[member] for member in members if member in words.default]
+        word = value.get("type", defaults[0] if defaults else None)
         if word is None and len(choices) == 1:
             word = next(iter(choices))
-        return arguments(value, _chosen(word, choices, members, spot, words), spot, words)
+        target = _choose(word, choices, members, spot, words)
+        return read_arguments(value, target, spot, words)
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]
             return {
-                key: read(one, kind, spot.at(key, spot.unit), words) for key, one in value.items()
+                key: read(entry, kind, spot.go_to_key(key, spot.unit), words)
+                for key, entry in value.items()
             }
-    raise spot.wrong(f"is a table: give {_expected(members, words)}")
+    raise spot.make_error(f"is a table: give {_describe_all(members, words)}")
 
 
-def _chosen(
+def _choose(
     word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot: Spot, words: Words
 ) -> Callee:
     """Return what the ``type`` of a table calls.
@@ -196,19 +230,22 @@ def _chosen(
     It is one of the choices, or a class of others of these kinds.
     """
     if isinstance(word, str) and ":" in word:
-        return own_class(word, kinds, words.allowed, spot)
+        return find_own_class(word, kinds, words.allowed, spot)
     if word is None:
-        raise spot.inside(f"has no type: give type = one of {', '.join(choices)}")
+        raise spot.make_table_error(f"has no type: give type = one of {', '.join(choices)}")
     renamed = WORDS.get(str(word))
     if renamed is not None and word not in choices and renamed in choices:
-        log.warning("%s", spot.inside(f"type {_shown(word)} is now {_shown(renamed)}: write that"))
+        warning = spot.make_table_error(f"type {_show(word)} is now {_show(renamed)}: write that")
+        log.warning("%s", warning)
         return choices[renamed]
     if not isinstance(word, str) or word not in choices:
-        raise spot.inside(f"has the unknown type {_shown(word)}: {nearest(word, choices)}")
+        raise spot.make_table_error(
+            f"has the unknown type {_show(word)}: {suggest_nearest(word, choices)}"
+        )
     return choices[word]
 
 
-def choices_of(member: Any, words: Words) -> Mapping[str, Callee]:
+def find_choices(member: Any, words: Words) -> Mapping[str, Callee]:
     """Return what a table may make for this type.
 
     It is as listed, or an object of the value class itself.
@@ -216,37 +253,39 @@ def choices_of(member: Any, words: Words) -> Mapping[str, Callee]:
     if member in words.choices:
         return words.choices[member]
     if isinstance(member, type) and is_dataclass(member) and member not in words.groups:
-        return {member.__name__: callee(member)}
+        return {member.__name__: make_callee(member)}
     return {}
 
 
-def _shown(value: Any) -> str:
+def _show(value: Any) -> str:
     """Return a value as in the file."""
     if isinstance(value, bool):
         return str(value).lower()
     return f"'{value[:SHOWN]}'" if isinstance(value, str) else shown(value)
 
 
-_EXPECTED = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
+_SCALARS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
 
 
-def _expected(members: Sequence[Any], words: Words) -> str:
-    """Return what would fit."""
-    found = [one for member in members for one in _describe(member, members, words)]
-    if not found or any(get_origin(member) is Callable or member is Callable for member in members):
-        found.append("a function, which only the Python interface takes")
-    return " or ".join(dict.fromkeys(found))
+def _describe_all(members: Sequence[Any], words: Words) -> str:
+    """Return what would fit one of these types."""
+    phrases = [phrase for member in members for phrase in _describe(member, members, words)]
+    takes_functions = any(Callable in (member, get_origin(member)) for member in members)
+    if takes_functions or not phrases:
+        phrases.append("a function, which only the Python interface takes")
+    return " or ".join(dict.fromkeys(phrases))
 
 
 def _describe(member: Any, members: Sequence[Any], words: Words) -> list[str]:
     """Return what would fit one type of these."""
-    if member in _EXPECTED:
-        return [_EXPECTED[member]]
+    if member in _SCALARS:
+        return [_SCALARS[member]]
     if member in words.groups:
         return [f"the name of {GROUP[member.__name__]}"]
     if is_path(member):
         return ["the path of a file"]
-    if choices := choices_of(member, words):
+    choices = find_choices(member, words)
+    if choices:
         table = f"a table with type = one of {', '.join(choices)}"
         named = words.named.get(member)
         return [table, f"one of the names {', '.join(named)}"] if named else [table]
@@ -261,10 +300,10 @@ def _describe(member: Any, members: Sequence[Any], words: Words) -> list[str]:
 
 def _describe_list(member: Any, words: Words) -> str:
     """Return the kind of list, with that of its entries where they are numbers or texts."""
-    inner = [one for one in get_args(member) if one is not Ellipsis]
-    if not _EXPECTED.get(inner[0]):
+    kind = get_args(member)[0]
+    if not _SCALARS.get(kind):
         return "a list"
-    return f"a list of {_expected(inner[:1], words).removeprefix('a ')}s"
+    return f"a list of {_describe_all([kind], words).removeprefix('a ')}s"
 
 
 def _describe_expression(member: Any, members: Sequence[Any]) -> str:

@@ -17,120 +17,156 @@ from ....core.errors import InputError
 from .expressions import LENGTH, Expression, Places
 from .table_calls import Spot
 
-FIELD, AT_START, HISTORY = (
-    Callable[[Array, float], Array],
-    Callable[[Array], Array],
-    Callable[[float], float],
-)
-"""Functions of points and time, of points, of the time, for which expressions may stand."""
+# Types of functions for which expressions may stand.
+FIELD = Callable[[Array, float], Array]  # of points and the time
+AT_START = Callable[[Array], Array]  # of points
+HISTORY = Callable[[float], float]  # of the time
 Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
-_NUMBER, _NAME = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", "[A-Za-zµμ°%]+"
+_NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_NAME = "[A-Za-zµμ°%]+"  # of a unit
 _VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
 _FACTOR = re.compile(rf"([*·/]?)(?:(?<!\s)\s+)?(1(?=\s*/|$)|{_NAME})(?:\^?(-?[0-9])|([²³]))?\s*")
 _TABLES = tomllib.loads(files(__package__).joinpath("units.toml").read_text(encoding="utf-8"))
 _UNITS = _TABLES["alone"] | {
-    start + name: [factor * unit[0], *unit[1:]]
-    for start, factor in _TABLES["prefixes"].items()
+    prefix + name: [factor * unit[0], *unit[1:]]
+    for prefix, factor in _TABLES["prefixes"].items()
     for name, unit in _TABLES["with_prefix"].items()
 }
 
 
-def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
+def read_quantity(text: str, members: Sequence[Any], spot: Spot) -> Any:
     """Return the number or function that a text stands for.
 
-    It is None where a key of these types takes neither.
+    Args:
+        text: of the file.
+        members: the types that the key takes.
+        spot: where the text stands, with the unit of the key.
 
-    InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not
-    finite or whole.
+    Returns:
+        A number in the unit of the key, an expression, or None where a key of these types takes
+        neither.
+
+    Raises:
+        InputError: for what is no arithmetic, a unit of another dimension than that of the key, and
+            a value that is not finite, or not whole where things are counted.
     """
-    one_value = float in members or not any(
-        get_origin(member) in (tuple, list, Sequence) for member in members
-    )
-    kinds = ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t"))
-    kind, letters = next((one for one in kinds if one[0] in members and one_value), (None, ""))
+    kind, letters = _select_function(members)
     if kind is None and float not in members and int not in members:
         return None
-    expression = _expression(text, letters, spot)
+    expression = _read_expression(text, letters, spot)
+
+    # Arithmetic without variables is a number, unless the key takes functions only.
     if kind is None or (float in members and not expression.used):
         value = float(expression())
         if not math.isfinite(value) or (float not in members and value != int(value)):
-            raise spot.wrong(
+            raise spot.make_error(
                 f"is {shown(text)}, which is {value:g}: give a finite number, a whole one of things"
             )
         return value if float in members else int(value)
     return Places(expression) if kind == FIELD else expression
 
 
-def list_node(values: list[Any], members: Sequence[Any], spot: Spot) -> Places | None:
+def _select_function(members: Sequence[Any]) -> tuple[Any, str]:
+    """Return the type of function that one text stands for, and its variables.
+
+    It is (None, "") where there is none. A key that takes lists and no number asks for a vector,
+    for which ``read_field`` reads a text for each component.
+    """
+    takes_lists = any(get_origin(member) in (tuple, list, Sequence) for member in members)
+    if takes_lists and float not in members:
+        return None, ""
+    for kind, letters in ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t")):
+        if kind in members:
+            return kind, letters
+    return None, ""
+
+
+def read_field(values: list[Any], members: Sequence[Any], spot: Spot) -> Places | None:
     """Return the vector field that a list stands for.
 
-    It is None where none is asked for or nothing in it has variables.
+    Args:
+        values: of the file, numbers and texts.
+        members: the types that the key takes.
+        spot: where the list stands, with the unit of the key.
+
+    Returns:
+        None where no field is asked for, and where nothing in the list has variables.
     """
-    letters = (
-        "xyzt"
-        if FIELD in members
-        else "xyz"
-        if AT_START in members and spot.unit in ("m", "m/s")
-        else ""
-    )
-    if not letters or float in members or not any(isinstance(one, str) for one in values):
+    letters = ""
+    if FIELD in members:
+        letters = "xyzt"
+    elif AT_START in members and spot.unit in ("m", "m/s"):
+        letters = "xyz"
+    has_texts = any(isinstance(value, str) for value in values)
+    if not letters or float in members or not has_texts:
         return None
     texts = [
-        one if isinstance(one, str) else repr(one)
-        for one in values
-        if isinstance(one, str | int | float)
+        value if isinstance(value, str) else repr(value)
+        for value in values
+        if isinstance(value, str | int | float)
     ]
-    found = tuple(
-        _expression(one, letters, spot.entry(number)) for number, one in enumerate(texts, start=1)
+    components = tuple(
+        _read_expression(text, letters, spot.go_to_entry(number))
+        for number, text in enumerate(texts, start=1)
     )
-    return Places(found) if len(found) == len(values) and any(one.used for one in found) else None
+    if len(components) < len(values) or not any(component.used for component in components):
+        return None
+    return Places(components)
 
 
-def _expression(text: str, letters: str, spot: Spot) -> Expression:
+def _read_expression(text: str, letters: str, spot: Spot) -> Expression:
     """Return the arithmetic of a text, or the number with a unit that it is.
 
     The number is in the unit of the key.
     """
-    found = _VALUE.fullmatch(text.rstrip()) if len(text) <= LENGTH else None
+    match = _VALUE.fullmatch(text.rstrip()) if len(text) <= LENGTH else None
     try:
-        if found is None or found[2] in tuple(letters):
+        # "2 x" is arithmetic of a variable, and no number of a unit x.
+        if match is None or match[2] in tuple(letters):
             return Expression(text, letters)
+        number, unit = match.groups()
         if spot.unit is None:
-            raise InputError(f"no unit is known for it here: leave {shown(found[2])} out")
-        (factor, dimension), (own, asked) = _unit(found[2]), _unit(spot.unit)
-        if dimension != asked:
+            raise InputError(f"no unit is known for it here: leave {shown(unit)} out")
+        factor, dimension = _read_unit(unit)
+        own_factor, own_dimension = _read_unit(spot.unit)
+        if dimension != own_dimension:
             proper = "% or as a plain number" if spot.unit == "1" else spot.unit
-            raise InputError(f"{shown(found[2])} is not a unit of it: give it in {proper}")
-        return Expression(repr(float(found[1]) * (factor / own)))
+            raise InputError(f"{shown(unit)} is not a unit of it: give it in {proper}")
+        return Expression(repr(float(number) * (factor / own_factor)))
     except InputError as error:
-        arithmetic = f" of {', '.join(letters)}" if letters else ""
-        ask = (
-            f"give a number, one with its unit, or arithmetic{arithmetic}; "
-            if found is None
-            else ""
-        )
-        raise spot.wrong(f"is {shown(text)}: {ask}{error}") from None
+        variables = f" of {', '.join(letters)}" if letters else ""
+        remedy = ""
+        if match is None:
+            remedy = f"give a number, one with its unit, or arithmetic{variables}; "
+        raise spot.make_error(f"is {shown(text)}: {remedy}{error}") from None
 
 
-def _unit(text: str) -> tuple[float, Dimension]:
+def _read_unit(text: str) -> tuple[float, Dimension]:
     """Return the factor to SI units and the dimension of a product.
 
     After a "/" all divides up to the next "*".
     """
-    size, place, below = 1.0, 0, False
+    size = 1.0
     total: Dimension = (0, 0, 0, 0)
-    while place < len(text):
-        found = _FACTOR.match(text, place)
-        if found is None:
+    below = False  # whether factors divide
+    position = 0
+    while position < len(text):
+        match = _FACTOR.match(text, position)
+        if match is None:
             raise InputError(f"{shown(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
-        sign, name, digits, raised = found.groups()
+        sign, name, digits, raised = match.groups()
+
+        # The power of this factor, from "2", "^2" or "²"; negative below a "/".
         below = sign == "/" or (below and not sign)
-        power = (int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)) * (-1 if below else 1)
+        power = int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)
+        if below:
+            power = -power
         if name not in _UNITS:
             known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
             raise InputError(f"{shown(name)} is not a unit here: there are {known}, kPa, mm")
+
         factor, *dimension = _UNITS[name]
         size *= factor**power
         total = tuple(a + power * b for a, b in zip(total, dimension, strict=True))
-        place = found.end()
+        position = match.end()
     return size, total

@@ -11,12 +11,12 @@ from typing import Any
 
 from ....core.checks import shown
 from ....core.errors import InputError
-from .bodies import own_body
-from .parsing import nearest
-from .quantities import text_node
+from .bodies import find_body_table
+from .parsing import suggest_nearest
+from .quantities import read_quantity
 from .stage_tables import refuse_own
 from .table_calls import Spot
-from .toml_file import toml_value, with_settings
+from .toml_file import format_value, with_settings
 
 # of a layer shaken sideways
 ROLLERS = [{"facets": side, "components": [1]} for side in ("left_side", "right_side")]
@@ -29,10 +29,17 @@ IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")
 
 @dataclass(frozen=True)
 class ShortOptions:
-    """Hold what people change most.
+    """Hold what people change most; None: as the case says.
 
-    motion: record files joined by commas, the first one horizontal, the last one of two vertical;
-    scale: a factor on what shakes; solver, scheme: names of case files; None: as the case says.
+    Attributes:
+        motion: record files joined by commas, the first one horizontal, the last one of two
+            vertical.
+        scale: a factor on what shakes.
+        dt: the time step [s].
+        steps: their number.
+        solver: its name in case files.
+        scheme: its name in case files.
+        cross_check: whether another solver accompanies every step.
     """
 
     motion: str | None = None
@@ -48,60 +55,61 @@ class ShortOptions:
 
         They are those that replace, then those ``given``, then those that change the result.
 
-        InputError for an option that the case has no use for.
+        Args:
+            tables: of the case.
+            given: settings KEY=VALUE that the user has written.
+
+        Raises:
+            InputError: for an option that the case has no use for.
         """
-        first = [*self._motion(tables), *self._step(), *self._methods(tables)]
+        first = [
+            *self._replace_motion(tables),
+            *self._replace_steps(),
+            *self._replace_methods(tables),
+        ]
         after = with_settings(dict(tables), [*first, *given])
-        last = [*self._scale(after), *self._cross_check(after)]
+        last = [*self._multiply_scale(after), *self._add_cross_check(after)]
         for setting in (*first, *last):
             refuse_own(tables, setting, "a short option")
         return [*first, *given, *last]
 
-    def _motion(self, tables: Mapping[str, Any]) -> list[str]:
+    def _replace_motion(self, tables: Mapping[str, Any]) -> list[str]:
         """Replace what shakes by records; the run lasts as long as they do."""
         if self.motion is None:
             return []
         files = self.motion.split(",")
-        before = _tables(tables.get("excitation"))
+        before = _list_tables(tables.get("excitation"))
         direction = before[0].get("direction") if before else None
-        axes = len(direction) if isinstance(direction, list) else _axes(tables)
+        axes = len(direction) if isinstance(direction, list) else _count_axes(tables)
         if not all(files) or len(files) > 2:
             raise InputError(
                 f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
             )
+
+        # The first record goes along the first axis, the second along the last one.
         motions: list[dict[str, Any]] = []
         for number, file in enumerate(files):
-            old = (
-                before[number]
-                if number < len(before) and before[number].get("type") == "GroundMotion"
-                else {}
-            )
-            record, axis = old.get("record"), 0 if number == 0 else axes - 1
-            motions.append(
-                {"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]}
-                | old
-                | {
-                    "record": (
-                        {}
-                        if not isinstance(record, dict) or record.get("type") == "synthetic"
-                        else record
-                    )
-                    | {"path": str(Path(file).absolute())}
-                }
-            )
-        found = [f"excitation={toml_value(motions)}"]
-        system = next(iter(_tables(tables.get("system"))), {})
+            axis = 0 if number == 0 else axes - 1
+            old = before[number] if number < len(before) else {}
+            motions.append(_put_record(old, str(Path(file).absolute()), axis, axes))
+        settings = [f"excitation={format_value(motions)}"]
+
+        # Recorded motions have an inertia load, and a vertical one cannot shake a layer on rollers.
+        system = next(iter(_list_tables(tables.get("system"))), {})
         if system.get("base_inertia") is False:
-            found.append("system.base_inertia=true")
+            settings.append("system.base_inertia=true")
         if len(files) == 2 and system.get("prescribed") == ROLLERS:
-            found += TIED
-        return [*found, "run.steps=", "run.t_end="]
+            settings += TIED
+        return [*settings, "run.steps=", "run.t_end="]
 
-    def _step(self) -> list[str]:
-        found = [] if self.dt is None else [f"run.dt={self.dt!r}"]
-        return found if self.steps is None else [*found, f"run.steps={self.steps}", "run.t_end="]
+    def _replace_steps(self) -> list[str]:
+        """Replace the time step and the number of steps."""
+        settings = [] if self.dt is None else [f"run.dt={self.dt!r}"]
+        if self.steps is not None:
+            settings += [f"run.steps={self.steps}", "run.t_end="]
+        return settings
 
-    def _methods(self, tables: Mapping[str, Any]) -> list[str]:
+    def _replace_methods(self, tables: Mapping[str, Any]) -> list[str]:
         """Replace scheme and solver.
 
         Schemes that need no impact law run without the one of the case.
@@ -113,53 +121,56 @@ class ShortOptions:
         from ....solvers.volume.route import Method
 
         # late: it needs the finite elements, which not every case does
-        from .vocabulary import names_of
+        from .vocabulary import list_names
 
-        found = []
+        settings = []
         if self.scheme is not None:
-            found.append(
-                f"scheme={_named('scheme', self.scheme, dict.fromkeys(names_of(Scheme), ()))}"
-            )
+            schemes: dict[str, Sequence[str]] = dict.fromkeys(list_names(Scheme), ())
+            settings.append(f"scheme={_name_method('scheme', self.scheme, schemes)}")
             if "impact" in tables and self.scheme not in IMPULSIVE and ":" not in self.scheme:
-                found.append("impact=")
+                settings.append("impact=")
         if self.solver is not None:
-            methods = {
+            solvers = {
                 "Automatic": (),
-                "Condensed": names_of(SmallMethod),
+                "Condensed": list_names(SmallMethod),
                 "Iterative": (),
-                "Volume": names_of(Method),
+                "Volume": list_names(Method),
             }
-            found.append(f"solver={_named('solver', self.solver, methods)}")
-        return found
+            settings.append(f"solver={_name_method('solver', self.solver, solvers)}")
+        return settings
 
-    def _scale(self, tables: Mapping[str, Any]) -> list[str]:
+    def _multiply_scale(self, tables: Mapping[str, Any]) -> list[str]:
+        """Multiply the scale of every record, and the amplitude of all else that shakes."""
         if self.scale is None:
             return []
-        shaking = tables.get("excitation")
-        found = []
-        for number, one in enumerate(_tables(shaking), start=1):
-            key, unit = (
-                ("scale", "1") if one.get("type") == "GroundMotion" else ("amplitude", "m/s2")
-            )
-            value = one.get(key, 1.0 if key == "scale" else None)
+        excitation = tables.get("excitation")
+        settings = []
+        for number, table in enumerate(_list_tables(excitation), start=1):
+            if table.get("type") == "GroundMotion":
+                key = "scale"
+                unit = "1"
+                value = table.get(key, 1.0)
+            else:
+                key = "amplitude"
+                unit = "m/s2"
+                value = table.get(key)
             if isinstance(value, str):
-                value = text_node(
-                    value, [float], Spot("--scale", f"excitation[{number}]", key, unit)
-                )
+                spot = Spot("--scale", f"excitation[{number}]", key, unit)
+                value = read_quantity(value, [float], spot)
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise InputError(
                     f"--scale: [excitation] {number} has no amplitude to scale: change its own "
                     "numbers"
                 )
-            place = f"excitation.{number}" if isinstance(shaking, list) else "excitation"
-            found.append(f"{place}.{key}={value * self.scale!r}")
-        if not found:
+            place = f"excitation.{number}" if isinstance(excitation, list) else "excitation"
+            settings.append(f"{place}.{key}={value * self.scale!r}")
+        if not settings:
             raise InputError(
                 "the case cannot use --scale, as nothing shakes it: leave it out, or give --motion"
             )
-        return found
+        return settings
 
-    def _cross_check(self, tables: Mapping[str, Any]) -> list[str]:
+    def _add_cross_check(self, tables: Mapping[str, Any]) -> list[str]:
         """Let the other route accompany every step.
 
         It is the one to which the case escalates first, or the condensed one.
@@ -169,36 +180,61 @@ class ShortOptions:
         solver = tables.get("solver", {"type": "Condensed"})
         if not isinstance(solver, dict) or solver.get("type") == "CrossChecked":
             return []
-        routes = [
-            one for one in _tables(tables.get("escalation")) if one.get("type") == "Volume"
-        ] or [REFERENCE]
-        other = routes[0] if solver.get("type") == "Condensed" else {"type": "Condensed"}
-        return [
-            f"solver={toml_value({'type': 'CrossChecked', 'primary': solver, 'others': [other]})}"
-        ]
+        other: dict[str, Any] = {"type": "Condensed"}
+        if solver.get("type") == "Condensed":
+            escalation = _list_tables(tables.get("escalation"))
+            routes = [table for table in escalation if table.get("type") == "Volume"]
+            other = routes[0] if routes else REFERENCE
+        both = {"type": "CrossChecked", "primary": solver, "others": [other]}
+        return [f"solver={format_value(both)}"]
 
 
-def _axes(tables: Mapping[str, Any]) -> int:
+def _put_record(old: dict[str, Any], path: str, axis: int, axes: int) -> dict[str, Any]:
+    """Return the table of a ground motion with the record of a file.
+
+    Keys of the motion that it replaces stay, but for those of a synthetic record.
+
+    Args:
+        old: the table of the excitation that is replaced, or {}.
+        path: of the record.
+        axis: along which it shakes.
+        axes: dimension of the body.
+    """
+    if old.get("type") != "GroundMotion":
+        old = {}
+    motion = {"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old
+    record = old.get("record")
+    if not isinstance(record, dict) or record.get("type") == "synthetic":
+        record = {}
+    return motion | {"record": record | {"path": path}}
+
+
+def _count_axes(tables: Mapping[str, Any]) -> int:
     """Return the dimension of a body, as far as its tables tell: one of a rod and a particle."""
-    body = next(iter(_tables(tables.get(own_body(tables)))), {})
+    body = next(iter(_list_tables(tables.get(find_body_table(tables)))), {})
     return 1 if "particle" in tables or body.get("type") == "rod_problem" else 2
 
 
-def _tables(value: Any) -> list[dict[str, Any]]:
+def _list_tables(value: Any) -> list[dict[str, Any]]:
     """Return a table, or the tables of a list."""
-    return [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, dict)]
+    values = value if isinstance(value, list) else [value]
+    return [table for table in values if isinstance(table, dict)]
 
 
-def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
+def _name_method(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
     """Return the table of one of the keys, or of a method's own, as TOML.
 
     A class of others has a colon.
+
+    Args:
+        kind: "scheme" or "solver", for the sentence.
+        name: what the user has written.
+        methods: scheme or solver -> the names of its own methods.
     """
     for owner, names in methods.items():
         if name in names:
-            return toml_value({"type": owner, "method": {"type": name}})
+            return format_value({"type": owner, "method": {"type": name}})
     if name not in methods and ":" not in name:
-        raise InputError(
-            f"unknown {kind} {shown(name)}: {nearest(name, [*methods, *chain(*methods.values())])}"
-        )
-    return toml_value({"type": name})
+        known = [*methods, *chain(*methods.values())]
+        raise InputError(f"unknown {kind} {shown(name)}: {suggest_nearest(name, known)}")
+    return format_value({"type": name})

@@ -12,7 +12,7 @@ from typing import Any
 
 from ....core.checks import flag, shown
 from ....core.errors import InputError
-from .parsing import nearest
+from .parsing import suggest_nearest
 
 BY_KEY = ("system", "run")
 WHOLE = (
@@ -39,10 +39,13 @@ _NAME = re.compile(r"\w{1,40}", re.ASCII)
 class Stage:
     """Hold what a stage is.
 
-    It has its tables, with those of the case, and the ``Case`` that is made of them.
-
-    label: how sentences name it; release: reactions of supports that it does without go on as
-    forces.
+    Attributes:
+        label: how sentences name it.
+        name: of the file, which its run folder has, too.
+        static: it finds an equilibrium, and does not march.
+        release: reactions of supports that it does without go on as forces.
+        tables: its own, with those of the case.
+        case: the ``Case`` that is made of them.
     """
 
     label: str
@@ -53,78 +56,100 @@ class Stage:
     case: Any = None
 
 
-def split(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
+def split_stages(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
     """Return the stages of a case, none without [[stage]]; InputError for wrong keys and values."""
     if "stage" not in tables:
         return []
-    given = tables["stage"]
-    if not isinstance(given, list) or not given or not all(isinstance(one, dict) for one in given):
+    own_tables = tables["stage"]
+    is_list = isinstance(own_tables, list) and bool(own_tables)
+    if not is_list or not all(isinstance(own, dict) for own in own_tables):
         raise InputError(
             f"{path}: [stage] is not a list of tables: write [[stage]] above the keys of each stage"
         )
     stages = [
-        _stage(f"{path}: [[stage]] {number}", one, tables)
-        for number, one in enumerate(given, start=1)
+        _read_stage(f"{path}: [[stage]] {number}", own, tables)
+        for number, own in enumerate(own_tables, start=1)
     ]
     if stages[0].release:
         raise InputError(
             f"{stages[0].label} has release = true, and is the first stage: leave it out"
         )
-    for before, one in pairwise(stages):
+    for before, stage in pairwise(stages):
         for key in ("contact", "friction"):
-            if not one.static and one.tables.get(key) != before.tables.get(key):
+            if not stage.static and stage.tables.get(key) != before.tables.get(key):
                 raise InputError(
-                    f"{one.label} has another [{key}] than the stage before it, and would jump at "
-                    "t = 0: give both the same, or put a static stage with this one between them"
+                    f"{stage.label} has another [{key}] than the stage before it, and would jump "
+                    "at t = 0: give both the same, or put a static stage with this one between them"
                 )
     return stages
 
 
-def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> Stage:
-    for key in given:
+def _read_stage(label: str, own: Mapping[str, Any], tables: Mapping[str, Any]) -> Stage:
+    """Return a stage.
+
+    Args:
+        label: how sentences begin.
+        own: the table [[stage]].
+        tables: of the case.
+
+    Raises:
+        InputError: for a key that no stage has or that a static one has no use for, and for a value
+            that does not fit.
+    """
+    for key in own:
         if key not in KEYS:
-            raise InputError(f"{where} has the unknown key '{key}': {nearest(key, KEYS)}")
-    name, kind, release = given.get("name", ""), given.get("type"), given.get("release", False)
+            raise InputError(f"{label} has the unknown key '{key}': {suggest_nearest(key, KEYS)}")
+    name = own.get("name", "")
+    kind = own.get("type")
+    release = own.get("release", False)
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InputError(f"{where} has name = {shown(name)}: give letters, digits and underscores")
+        raise InputError(f"{label} has name = {shown(name)}: give letters, digits and underscores")
     if kind not in ("static", "dynamic"):
-        raise InputError(f'{where} has type = {shown(kind)}: give "static" or "dynamic"')
-    flag(where, "release", release)
+        raise InputError(f'{label} has type = {shown(kind)}: give "static" or "dynamic"')
+    flag(label, "release", release)
     whole = {key: value for key, value in tables.items() if key != "stage"}
-    for key in (key for key in BY_KEY if key in given):
-        if not isinstance(given[key], dict) or not isinstance(whole.get(key, {}), dict):
-            raise InputError(
-                f"{where}: {key} is {shown(given[key])}: give a table, here and in the case"
-            )
-        # one of them ends a run
-        lasts = {"steps", "t_end"} if {"steps", "t_end"} & given[key].keys() else set()
-        whole[key] = {
-            name: one for name, one in whole.get(key, {}).items() if name not in lasts
-        } | given[key]
-    if "out" in given.get("run", {}):
+    for key in BY_KEY:
+        if key in own:
+            whole[key] = _replace_keys(label, key, whole.get(key, {}), own[key])
+    if "out" in own.get("run", {}):
         raise InputError(
-            f"{where}: run has the key 'out', which all stages share: give it in [run]"
+            f"{label}: run has the key 'out', which all stages share: give it in [run]"
         )
     if kind == "static":
-        vain = [key for key in OF_MOTION if key in given] + [
-            f"run.{key}" for key in given.get("run", {}) if key != "tolerance"
-        ]
-        if vain:
-            raise InputError(
-                f"{where} is static and cannot use {vain[0]}: leave it out, or move it to a "
-                "dynamic one"
-            )
-        whole["run"] = {
-            key: one for key, one in whole.get("run", {}).items() if key in ("tolerance", "out")
-        } | AT_REST
-    whole |= {key: given[key] for key in WHOLE if key in given}
-    return Stage(f"{where} '{name}'", name, kind == "static", release, whole)
+        _refuse_motion(label, own)
+        run = whole.get("run", {})
+        whole["run"] = {key: run[key] for key in run if key in ("tolerance", "out")} | AT_REST
+    whole |= {key: own[key] for key in WHOLE if key in own}
+    return Stage(f"{label} '{name}'", name, kind == "static", release, whole)
+
+
+def _replace_keys(label: str, key: str, table: Any, own: Any) -> dict[str, Any]:
+    """Return [system] or [run] of the case, with the keys that a stage replaces."""
+    if not isinstance(own, dict) or not isinstance(table, dict):
+        raise InputError(f"{label}: {key} is {shown(own)}: give a table, here and in the case")
+    # One of these ends a run: a stage that gives one does without the other of the case.
+    ends = {"steps", "t_end"}
+    replaced = ends if ends & own.keys() else set()
+    return {name: value for name, value in table.items() if name not in replaced} | own
+
+
+def _refuse_motion(label: str, own: Mapping[str, Any]) -> None:
+    """Raise InputError for keys that a static stage has no use for."""
+    run_keys = [f"run.{key}" for key in own.get("run", {}) if key != "tolerance"]
+    vain = [key for key in OF_MOTION if key in own] + run_keys
+    if vain:
+        raise InputError(
+            f"{label} is static and cannot use {vain[0]}: leave it out, or move it to a dynamic one"
+        )
 
 
 def refuse_own(tables: Mapping[str, Any], key: str, asked: str) -> None:
-    """Raise InputError where something asks for another table of the case.
+    """Raise InputError where something changes a table which the last stage replaces.
 
-    That is where the last stage has one of its own.
+    Args:
+        tables: of the case.
+        key: a table, or a setting KEY=VALUE of it.
+        asked: what changes it, the first words of the sentence.
     """
     stages = tables.get("stage")
     table = key.partition(".")[0].partition("=")[0]

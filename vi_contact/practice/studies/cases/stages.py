@@ -45,10 +45,16 @@ from .vocabulary import Parts
 
 @dataclass(frozen=True)
 class Reached:
-    """Hold what so many stages leave.
+    """Hold what the stages that have run leave to the next one.
 
-    They leave mesh and groups, problem and state of the last one, which is at rest or not, the
-    force of all supports released so far [N], and the problems of the stages before it.
+    Attributes:
+        number: of the stages that have run.
+        meshed: mesh and groups, of all stages.
+        problem: of the last one of them; None before the first stage.
+        state: in which it ended.
+        static: whether it was static, and its state is at rest.
+        force: of all supports released so far [N].
+        earlier: the problems of the stages before it.
     """
 
     number: int
@@ -60,20 +66,23 @@ class Reached:
     earlier: tuple[ContactProblem, ...] = ()
 
 
-def leading(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
-    """Return what runs of a case share that differ in their excitations.
+def run_leading_stages(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
+    """Run the stages that runs of a case share when they differ in their excitations.
 
-    It is (what the static stages leave that come before all others but the last; parts of the next
-    stage; its first state, None to be found). Collective.
+    These are the static stages that come before all others, but for the last stage. Collective.
+
+    Returns:
+        What they leave, None without stages; the parts of the next stage; its first state, None to
+        be found.
     """
     if not case.stages:
         return None, case.parts(comm), None
+    options = {"progress": False, "fields": None}
     reached = Reached(0, case.meshed(comm))
     while reached.number < len(case.stages) - 1 and case.stages[reached.number].static:
-        reached, _ = _made(
-            case.stages[reached.number], reached, comm, None, {"progress": False, "fields": None}
-        )
-    return reached, *_entered(case.stages[reached.number], reached, comm)[1:]
+        reached, _ = _run_stage(case.stages[reached.number], reached, comm, None, options)
+    _, parts, state = _enter(case.stages[reached.number], reached, comm)
+    return reached, parts, state
 
 
 def run_stages(
@@ -85,53 +94,91 @@ def run_stages(
     reached: Reached | None,
     **options: Any,
 ) -> Solution:
-    """Run those stages of a case that are not reached yet; the solution of the last one.
+    """Run those stages of a case that are not reached yet; collective.
 
-    Collective.
+    Args:
+        case: a ``Case`` with stages.
+        comm: the ranks.
+        out: the run folder; None: without.
+        restart: True to go on in the run folder, or the folder of another run of the case.
+        reached: what the first stages have left; None: run all.
+        options: other arguments of ``simulate``.
+
+    Returns:
+        The solution of the last stage.
+
+    Raises:
+        InputError: and others, as ``simulate``.
     """
-    ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
-    inner = [
-        Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)
-    ] + [Path()]
-    source, before = out if restart is True else Path(restart) if restart else None, ""
+    ranks = MpiComm(comm)
+    reached = reached or Reached(0, case.meshed(comm))
+    numbered = enumerate(case.stages[:-1], start=1)
+    folders = [*(Path(STAGES) / f"{number}_{stage.name}" for number, stage in numbered), Path()]
+    source = _find_source(out, restart)
     with lock_folder(ranks, None if out is None else run_folder(ranks, out)):
-        if (place := source or out) is not None:
-            on_root(ranks, partial(_tidy, place, inner, keep=source is not None))
-        for stage, folder in list(zip(stages, inner, strict=True))[reached.number :]:
+        place = source or out
+        if place is not None:
+            on_root(ranks, partial(_tidy, place, folders, keep=source is not None))
+
+        # ``before`` has a line for each stage so far: checksum and steps of what it left.
+        before = ""
+        for stage, folder in list(zip(case.stages, folders, strict=True))[reached.number :]:
+            # A stage that began where those before it now end goes on; any other begins anew, but
+            # for the first one, of which ``simulate`` says what is wrong with its folder.
             again = None if source is None else source / folder
-            found = ranks.bcast(on_root(ranks, partial(_follows, again, before)))
-            if before and out is not None and not found:
+            follows = ranks.bcast(on_root(ranks, partial(_follows, again, before)))
+            if before and out is not None and not follows:
                 on_root(ranks, partial(_begin, out, folder, before))
-            more = {"restart": again if found or stage is stages[0] and again else False}
-            reached, solution = _made(
-                stage, reached, comm, None if out is None else out / folder, options | more
-            )
-            place = out or (source if found else None)
-            left = (
-                None if place is None else on_root(ranks, partial(state_checksum, place / folder))
-            )
-            before += f"{left} {solution.state.k}\n"
+            goes_on = follows or (stage is case.stages[0] and again is not None)
+            stage_options = options | {"restart": again if goes_on else False}
+            stage_out = None if out is None else out / folder
+            reached, solution = _run_stage(stage, reached, comm, stage_out, stage_options)
+
+            # What it left, for the stages after it.
+            place = out or (source if follows else None)
+            checksum = None
+            if place is not None:
+                checksum = on_root(ranks, partial(state_checksum, place / folder))
+            before += f"{checksum} {solution.state.k}\n"
     return solution
 
 
-def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
-    """Clear the folders of a new run.
+def _find_source(out: Path | None, restart: bool | str | Path) -> Path | None:
+    """Return the folder of the run to go on with; None for a new run."""
+    if restart is True:
+        return out
+    return Path(restart) if restart else None
 
-    Runs in the folders of stages that are none any more are removed; with ``keep``, they are
-    refused. Folders and files that no run has made are left alone.
+
+def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
+    """Clear the folders of a new run, or refuse those that do not fit to one that goes on.
+
+    Folders and files that no run has made are left alone.
+
+    Args:
+        out: the run folder.
+        stages: the folders of the stages in it.
+        keep: whether the run goes on.
+
+    Raises:
+        InputError: with ``keep``, for runs in the folders of stages that are none any more. Without
+            it they are removed.
     """
     place = inner_folder(out, STAGES)
     names = sorted(os.listdir(place)) if place.is_dir() else []
-    found = [Path(STAGES) / name for name in names if name[0].isdecimal() and "_" in name]
-    old = [one for one in found if one not in stages and is_marked(inner_folder(out, *one.parts))]
-    if keep and old:
-        raise InputError(
-            f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and "
-            "order, or start a new run, which removes it"
-        )
-    for folder in () if keep else old:
+    folders = [Path(STAGES) / name for name in names if name[0].isdecimal() and "_" in name]
+    others = [folder for folder in folders if folder not in stages]
+    old = [folder for folder in others if is_marked(inner_folder(out, *folder.parts))]
+    if keep:
+        if old:
+            raise InputError(
+                f"'{out / old[0]}' belongs to no stage of the case: give stages their old names "
+                "and order, or start a new run, which removes it"
+            )
+        return
+    for folder in old:
         remove_run(out / folder)
-    for folder in () if keep else stages:
+    for folder in stages:
         clear(inner_folder(out, *folder.parts))
 
 
@@ -142,7 +189,9 @@ def _follows(folder: Path | None, before: str) -> bool:
     """
     if folder is None or not is_own(folder / CHECKPOINT):
         return False
-    return not before or is_own(folder / FOLLOWS) and read_text(folder / FOLLOWS) == before
+    if not before:
+        return True
+    return is_own(folder / FOLLOWS) and read_text(folder / FOLLOWS) == before
 
 
 def _begin(out: Path, folder: Path, before: str) -> None:
@@ -153,43 +202,72 @@ def _begin(out: Path, folder: Path, before: str) -> None:
     write_atomically(place / FOLLOWS, before.encode())
 
 
-def _made(
+def _run_stage(
     stage: Stage, reached: Reached, comm: Any, folder: Path | None, options: dict[str, Any]
 ) -> tuple[Reached, Solution]:
-    """Run a stage, or go on with it."""
-    reached, parts, state = _entered(stage, reached, comm)
-    if stage.static and options.get("restart"):  # it has been solved
+    """Run a stage, or go on with it.
+
+    Args:
+        stage: the next one.
+        reached: what the stages before it leave.
+        comm: the ranks.
+        folder: of its run; None: without.
+        options: arguments of ``simulate`` that come before those of the case.
+
+    Returns:
+        What the stages including this one leave, and its solution.
+    """
+    reached, parts, state = _enter(stage, reached, comm)
+    restart = options.get("restart")
+    if stage.static and restart:  # it has been solved
         state = initial_state(stage.case.problem(comm, parts))
     with stage.case.call(parts, folder, state) as call:
         stage.case.keep_model(comm, parts, folder)
-        solution = simulate(**call | options | ({"state": None} if options.get("restart") else {}))
-    earlier = reached.earlier if reached.problem is None else (*reached.earlier, reached.problem)
-    return replace(
+        arguments = call | options
+        if restart:
+            arguments["state"] = None  # the checkpoint has it
+        solution = simulate(**arguments)
+    earlier = reached.earlier
+    if reached.problem is not None:
+        earlier = (*earlier, reached.problem)
+    after = replace(
         reached,
         number=reached.number + 1,
         problem=call["problem"],
         state=solution.state,
         static=stage.static,
         earlier=earlier,
-    ), solution
+    )
+    return after, solution
 
 
-def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, State | None]:
-    """Return (reached, parts, first state) of a stage.
+def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, State | None]:
+    """Find where a stage begins; collective.
 
-    ``reached`` has the force of all released supports; the parts begin where the stages before have
-    left the body; the first state is None if it has to be found.
+    Returns:
+        ``reached``, with the force of all released supports; the parts of the stage, which begin
+        where the stages before have left the body; its first state, None if it has to be found.
+
+    Raises:
+        InputError: where other supports need a static stage before, and where a support is removed
+            that carries something.
     """
-    before, state = reached.problem, reached.state
+    before = reached.problem
+    state = reached.state
     parts: Parts = replace(stage.case, ready=reached.meshed).parts(comm)
-    parts = replace(parts, weighted=True, moved=True) if stage.static else parts
+    if stage.static:
+        parts = replace(parts, weighted=True, moved=True)
     if before is None or state is None:
         return reached, parts, None
     problem: ContactProblem = stage.case.problem(comm, parts)
     try:
         if same_supports(before, problem) and (stage.static or not reached.static):
-            u, v = before.cartesian(state.u), before.cartesian(state.v)
-            begun, first = started(problem, u, 0.0 * v if stage.static else v, state, reached.force)
+            # Displacements pass on, and velocities to a stage that marches.
+            u = before.cartesian(state.u)
+            v = before.cartesian(state.v)
+            if stage.static:
+                v = 0.0 * v
+            begun, first = started(problem, u, v, state, reached.force)
         elif reached.static:
             begun, first = release(before, state, problem, earlier=reached.earlier)
         else:
@@ -206,8 +284,5 @@ def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts,
             )
     except InputError as error:
         raise InputError(f"{stage.label}: {error}") from error
-    return (
-        replace(reached, force=force),
-        replace(parts, system=begun.system),
-        None if stage.static else first,
-    )
+    begun_parts = replace(parts, system=begun.system)
+    return replace(reached, force=force), begun_parts, None if stage.static else first

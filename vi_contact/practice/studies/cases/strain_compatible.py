@@ -25,11 +25,12 @@ from ....run.files.folder import lock_folder, move_run, remove_if_empty, remove_
 from ....run.recorders import Contact, Energy
 from ....run.simulate import Solution
 from ...soil.strain_compatible import strain_compatible
-from .table_calls import Call, build, callee, nodes_in
+from .table_calls import Call, build, make_callee, walk_nodes
 
 PLACE = "iterations"  # in the run folder
+# [strain_compatible] as the arguments of the function: ``iterate`` adds mesh, materials and runs.
 CALL = replace(
-    callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), given=()),
+    make_callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), supplied=()),
     function=dict,
 )
 
@@ -37,19 +38,66 @@ CALL = replace(
 def iterate(
     case: Any, comm: Any, folder: Path | None, *, restart: bool | str | Path, **options: Any
 ) -> Solution:
-    """Run a case with [strain_compatible] until it is; the solution of the last run. Collective."""
-    spot, ranks, numbers, given = (
-        f"{case.path}: [strain_compatible]",
-        MpiComm(comm),
-        count(),
-        case.nodes["system"],
-    )
+    """Run a case with [strain_compatible] until its soil is so; collective.
+
+    Args:
+        case: a ``Case``.
+        comm: the ranks.
+        folder: of the run; None: without.
+        restart: as of ``Case.run``; only False will do.
+        options: other arguments of ``Case.run``.
+
+    Returns:
+        The solution of the last run.
+
+    Raises:
+        InputError: for a restart, another damping than ``DampingRatio``, and a last stage that is
+            static.
+    """
+    spot = f"{case.path}: [strain_compatible]"
+    system = case.nodes["system"]
+    _refuse_unfit(case, system, spot, restart)
+    ranks = MpiComm(comm)
+    numbers = count()  # of the runs that have begun
+    mesh, tags = case.meshed(comm)
+
+    def run(material: Any, strain: Any) -> Any:
+        """Compute the whole case with these materials, and record the strains of the last stage."""
+        if folder is not None:
+            on_root(ranks, partial(_set_aside, folder, next(numbers)))
+        stages = []
+        for stage in case.stages:
+            recorders = (strain,) if stage is case.stages[-1] else ()
+            inner = _soften(stage.case, material, recorders, (mesh, tags))
+            stages.append(replace(stage, case=inner))
+        softened = _soften(case, material, (strain,), (mesh, tags))
+        return replace(softened, stages=tuple(stages)).run(comm, out=folder, **options)
+
+    material = build(system.arguments.get("material", ()), {"tags": tags})
+    arguments = build(case.nodes["strain_compatible"], {"tags": tags})
+    with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
+        try:
+            iteration = strain_compatible(mesh, material, run=run, **arguments)
+        except ViContactError:
+            # DIR shall not look like the run that was asked for.
+            number = 0 if folder is None else next(numbers)
+            if folder is not None and number > 0:
+                on_root(ranks, partial(_set_aside, folder, number))
+            raise
+        if folder is not None:
+            changes = to_json({"changes": iteration.changes}).encode()
+            on_root(ranks, partial(write_atomically, folder / "strain_compatible.json", changes))
+        return iteration.solution
+
+
+def _refuse_unfit(case: Any, system: Call, spot: str, restart: bool | str | Path) -> None:
+    """Raise InputError where strains cannot be iterated."""
     if restart:
         raise InputError(
             f"{spot} begins with the soil at small strains and cannot be continued: run it from "
             "the start"
         )
-    damping = given.arguments.get("damping")
+    damping = system.arguments.get("damping")
     if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
         raise InputError(
             f"{spot} gives every cell its damping ratio: give [system.damping] type = "
@@ -59,44 +107,25 @@ def iterate(
         raise InputError(
             f"{spot} uses the strains of the last stage, which is static: give a dynamic one"
         )
-    mesh, tags = case.meshed(comm)
 
-    def softened(one: Any, material: Any, *strain: Any) -> Any:
-        own = one.nodes.get("record", (Energy(), Contact()))
-        nodes = {name: node for name, node in one.nodes.items() if name != "strain_compatible"}
-        nodes["system"] = replace(
-            nodes["system"], arguments=nodes["system"].arguments | {"material": material}
-        )
-        nodes["record"] = (*(own if isinstance(own, tuple) else (own,)), *strain)
-        return replace(one, nodes=nodes, ready=(mesh, tags))
 
-    def run(material: Any, strain: Any) -> Any:
-        if folder is not None:
-            on_root(ranks, partial(_set_aside, folder, next(numbers)))
-        stages = tuple(
-            replace(
-                stage,
-                case=softened(stage.case, material, *[strain][stage is not case.stages[-1] :]),
-            )
-            for stage in case.stages
-        )
-        return replace(softened(case, material, strain), stages=stages).run(
-            comm, out=folder, **options
-        )
+def _soften(case: Any, material: Any, strain: tuple[Any, ...], ready: tuple[Any, Any]) -> Any:
+    """Return a case with other materials and more recorders.
 
-    material = build(given.arguments.get("material", ()), {"tags": tags})
-    asked = build(case.nodes["strain_compatible"], {"tags": tags})
-    with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
-        try:
-            found = strain_compatible(mesh, material, run=run, **asked)
-        except ViContactError:  # DIR shall not look like the run that was asked for
-            if folder is not None and (number := next(numbers)):
-                on_root(ranks, partial(_set_aside, folder, number))
-            raise
-        if folder is not None:
-            told = to_json({"changes": found.changes}).encode()
-            on_root(ranks, partial(write_atomically, folder / "strain_compatible.json", told))
-        return found.solution
+    Args:
+        case: the whole one, or that of a stage.
+        material: the softened materials.
+        strain: recorders of strains.
+        ready: mesh and groups.
+    """
+    system = case.nodes["system"]
+    recorders = case.nodes.get("record", (Energy(), Contact()))
+    if not isinstance(recorders, tuple):
+        recorders = (recorders,)
+    nodes = {name: node for name, node in case.nodes.items() if name != "strain_compatible"}
+    nodes["system"] = replace(system, arguments=system.arguments | {"material": material})
+    nodes["record"] = (*recorders, *strain)
+    return replace(case, nodes=nodes, ready=ready)
 
 
 def with_known_damping(system: Call) -> Call:
@@ -104,17 +133,22 @@ def with_known_damping(system: Call) -> Call:
 
     That is where no material has a ratio, as curves give them, run by run.
     """
-    ratios = [one for one in nodes_in(system) if isinstance(one, Call) and one.arguments.get("xi")]
-    known = {name: node for name, node in system.arguments.items() if name != "damping" or ratios}
-    return replace(system, arguments=known)
+    calls = [node for node in walk_nodes(system) if isinstance(node, Call)]
+    if any(call.arguments.get("xi") for call in calls):
+        return system
+    arguments = {name: node for name, node in system.arguments.items() if name != "damping"}
+    return replace(system, arguments=arguments)
 
 
 def _set_aside(folder: Path, number: int) -> None:
     """Move the run in this folder into one inside of it.
 
-    Before the first run, runs of an earlier time there are removed.
+    Before the first run, runs of an earlier time there are removed. Files of others stay where they
+    are.
 
-    Files of others stay where they are.
+    Args:
+        folder: of the run.
+        number: of runs that have been made; 0 before the first one.
     """
     if number == 0:
         _remove_earlier(inner_folder(folder, PLACE))

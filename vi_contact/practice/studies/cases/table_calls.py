@@ -22,47 +22,61 @@ from ....core.errors import InputError
 from ....core.quantities import Quantity, quantities
 
 Context = Mapping[str, Any]
-Node = (
-    Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself
-)
-GIVEN = ("mesh", "system", "excitations")  # parameters that the context supplies
+# What has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself.
+Node = Any
+SUPPLIED = ("mesh", "system", "excitations")  # parameters that the context supplies
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Say where in the file: str() is "[system.damping] alpha"."""
+    """Say where in the file: str() is "[system.damping] alpha".
+
+    Attributes:
+        file: the path, or what else the sentence begins with.
+        table: the path of the table, its names joined by dots.
+        key: the key in this table.
+        unit: of the key, where it is known.
+    """
 
     file: str
     table: str = ""
     key: str = ""
-    unit: str | None = None  # of the key, where it is known
+    unit: str | None = None
 
     def __str__(self) -> str:
         return f"[{self.table}] {self.key}".strip() if self.table else f"[{self.key}]"
 
-    def at(self, key: str, unit: str | None = None) -> "Spot":
+    def go_to_key(self, key: str, unit: str | None = None) -> "Spot":
         """Return the spot of a key of the table that is here."""
-        return Spot(self.file, self._here(), key, unit)
+        return Spot(self.file, self._join_names(), key, unit)
 
-    def entry(self, number: int) -> "Spot":
+    def go_to_entry(self, number: int) -> "Spot":
         """Return the spot of an entry of the list that is here, counted from 1."""
         return Spot(self.file, self.table, f"{self.key}[{number}]", self.unit)
 
-    def _here(self) -> str:
-        return f"{self.table}.{self.key}" if self.table and self.key else self.table or self.key
+    def _join_names(self) -> str:
+        """Return the path of the table that is here, "system.damping"."""
+        return ".".join(name for name in (self.table, self.key) if name)
 
-    def wrong(self, text: str) -> InputError:
+    def make_error(self, text: str) -> InputError:
         """Return the error of what is wrong here; ``text`` continues the sentence."""
         return InputError(f"{self.file}: {self} {text}")
 
-    def inside(self, text: str) -> InputError:
+    def make_table_error(self, text: str) -> InputError:
         """Return the error of what is wrong with the table that is here."""
-        return InputError(f"{self.file}: [{self._here()}] {text}")
+        return InputError(f"{self.file}: [{self._join_names()}] {text}")
 
 
 @dataclass(frozen=True)
 class Group:
-    """Name a group of the mesh; ``alias``: another name that it goes by."""
+    """Name a group of the mesh.
+
+    Attributes:
+        name: as the mesh has it.
+        kind: ``Facets`` or ``Cells``.
+        spot: where the file names it.
+        alias: another name that it goes by.
+    """
 
     name: str
     kind: type
@@ -72,27 +86,28 @@ class Group:
     def build(self, context: Context) -> Any:
         """Return the group of the mesh."""
         try:
-            found = context["tags"][self.name]
+            group = context["tags"][self.name]
         except InputError as error:
-            raise self.spot.wrong(f"is '{self.name}', but the {error}") from None
-        if not isinstance(found, self.kind):
-            raise self.spot.wrong(
-                f"is '{self.name}', {GROUP[type(found).__name__]}: {self._remedy(found)}"
+            raise self.spot.make_error(f"is '{self.name}', but the {error}") from None
+        fits = isinstance(group, self.kind)
+        if not fits:
+            raise self.spot.make_error(
+                f"is '{self.name}', {GROUP[type(group).__name__]}: {self._propose_remedy(group)}"
             )
-        return replace(context["tags"][self.name], name=self.alias) if self.alias else found
+        return replace(group, name=self.alias) if self.alias else group
 
-    def _remedy(self, found: Any) -> str:
-        """Give the other kind.
+    def _propose_remedy(self, group: Any) -> str:
+        """Return the remedy for a group of the other kind.
 
         Where a boundary was saved without the body it bounds, the remedy is to save the body too.
         """
-        way = f"give the name of {GROUP[self.kind.__name__]}"
-        dim = found.mesh.topology.dim
+        remedy = f"give the name of {GROUP[self.kind.__name__]}"
+        dim = group.mesh.topology.dim
         if self.kind.__name__ == "Cells" or dim > 2:
-            return way
+            return remedy
         body = "Physical Volume" if dim == 2 else "Physical Surface"
         return (
-            f"{way}, or, if it bounds the body, the mesh has no {dim + 1}D cells: add a {body} "
+            f"{remedy}, or, if it bounds the body, the mesh has no {dim + 1}D cells: add a {body} "
             "in Gmsh"
         )
 
@@ -104,52 +119,64 @@ GROUP = {"Facets": "a boundary group", "Cells": "a cell group"}
 class Callee:
     """Describe a function that tables may call.
 
-    It has what the annotations of its parameters say, those it needs, and those that are supplied.
+    Attributes:
+        name: the word of the file that calls it.
+        function: what is called.
+        quantities: parameter that a file may give -> what its annotation says.
+        required: parameters that a file must give.
+        supplied: parameters that the context supplies.
     """
 
     name: str
     function: Callable[..., Any]
-    said: Mapping[str, Quantity]
+    quantities: Mapping[str, Quantity]
     required: frozenset[str] = frozenset()
-    given: tuple[str, ...] = ()
+    supplied: tuple[str, ...] = ()
 
     @cached_property
     def hints(self) -> Mapping[str, Any]:
         """Return the types of its parameters."""
-        return {key: one.kind for key, one in self.said.items()}
+        return {key: quantity.kind for key, quantity in self.quantities.items()}
 
     def unit(self, key: str) -> str | None:
         """Return the unit of a parameter, as one types it; None where it has none."""
-        found = self.said[key].unit
-        return None if found is None else found.typed
+        unit = self.quantities[key].unit
+        return None if unit is None else unit.typed
 
 
-def callee(
+def make_callee(
     function: Callable[..., Any],
     *,
     name: str = "",
     only: Sequence[str] = (),
-    given: Sequence[str] = GIVEN,
+    supplied: Sequence[str] = SUPPLIED,
 ) -> Callee:
     """Return how to call a function or class.
 
-    ``only`` is what a file may give; parameters ``given`` are supplied.
+    Args:
+        function: what a table calls.
+        name: the word of the file for it; "" for its own name.
+        only: the parameters that a file may give; empty for all.
+        supplied: the parameters that the context supplies, if the function has them.
     """
+    # A plain class has its annotations at __init__, a dataclass at its fields.
     plain_class = isinstance(function, type) and not is_dataclass(function)
-    said = quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
-    found = signature(function).parameters
+    quantity_of = quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
+
+    # Parameters that collect others, such as *args, have no key.
+    collecting = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
     parameters = {
-        key: one
-        for key, one in found.items()
-        if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+        key: parameter
+        for key, parameter in signature(function).parameters.items()
+        if parameter.kind not in collecting
     }
-    settable = [one for one in parameters if one not in given and (not only or one in only)]
+    settable = [key for key in parameters if key not in supplied and (not only or key in only)]
     return Callee(
         name or getattr(function, "__name__", ""),
         function,
-        {one: said.get(one, Quantity(Any)) for one in settable},
-        frozenset(one for one in settable if parameters[one].default is Parameter.empty),
-        tuple(one for one in parameters if one in given),
+        {key: quantity_of.get(key, Quantity(Any)) for key in settable},
+        frozenset(key for key in settable if parameters[key].default is Parameter.empty),
+        tuple(key for key in parameters if key in supplied),
     )
 
 
@@ -163,24 +190,24 @@ class Call:
 
     def build(self, context: Context) -> Any:
         """Return what the call makes."""
-        lacking = [name for name in self.callee.given if name not in context]
+        lacking = [name for name in self.callee.supplied if name not in context]
         if lacking:
-            raise self.spot.inside(
+            raise self.spot.make_table_error(
                 f"{self.callee.name} needs the {lacking[0]}, still unknown here: give numbers"
             )
-        supplied = {name: context[name] for name in self.callee.given}
+        supplied = {name: context[name] for name in self.callee.supplied}
         arguments = build(self.arguments, context)
         try:
             return self.callee.function(**supplied, **arguments)
         except InputError as error:
-            raise self.spot.inside(f"{error}") from error
+            raise self.spot.make_table_error(f"{error}") from error
 
 
 def needs_body(node: Node) -> bool:
     """Return whether groups of the mesh are named in it, or the assembled system is asked for."""
     return any(
-        isinstance(one, Group) or (isinstance(one, Call) and "system" in one.callee.given)
-        for one in nodes_in(node)
+        isinstance(one, Group) or (isinstance(one, Call) and "system" in one.callee.supplied)
+        for one in walk_nodes(node)
     )
 
 
@@ -189,15 +216,18 @@ def build(node: Node, context: Context) -> Any:
     if isinstance(node, Group | Call):
         return node.build(context)
     if isinstance(node, dict):
-        return {name: build(one, context) for name, one in node.items()}
-    return tuple(build(one, context) for one in node) if isinstance(node, tuple) else node
+        return {name: build(value, context) for name, value in node.items()}
+    if isinstance(node, tuple):
+        return tuple(build(entry, context) for entry in node)
+    return node
 
 
-def nodes_in(node: Node) -> Iterator[Node]:
+def walk_nodes(node: Node) -> Iterator[Node]:
     """Yield the node and all nodes in it."""
     yield node
     inside = node.arguments if isinstance(node, Call) else node
-    for one in (
-        inside.values() if isinstance(inside, dict) else inside if isinstance(inside, tuple) else ()
-    ):
-        yield from nodes_in(one)
+    if isinstance(inside, dict):
+        inside = tuple(inside.values())
+    if isinstance(inside, tuple):
+        for inner in inside:
+            yield from walk_nodes(inner)

@@ -11,14 +11,14 @@ file: this was asked for, and the file is in order.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError
-from .bodies import OWN
+from .bodies import BODY_TABLES
 from .stage_tables import OF_MOTION, WHOLE
-from .table_calls import Call, Node, nodes_in
+from .table_calls import Call, Node, walk_nodes
 
 RATIO_LAW = "DampingRatio"
 BLIND_TO_RATIOS = (
@@ -47,7 +47,11 @@ Finding = tuple[str, str]  # the key that is in vain, and the sentence
 class Part:
     """Hold a stage, or the whole of a case without stages.
 
-    label: how sentences begin; tables and nodes: its tables, and the calls that they are.
+    Attributes:
+        label: how sentences begin.
+        tables: its tables.
+        nodes: the calls that they are.
+        static: whether it is a static stage.
     """
 
     label: str
@@ -55,11 +59,11 @@ class Part:
     nodes: Mapping[str, Node]
     static: bool = False
 
-    def calls(self, table: str) -> list[Call]:
+    def list_calls(self, table: str) -> list[Call]:
         """Return the calls that a table, or an array of tables, makes itself; those in them not."""
-        made = self.nodes.get(table, ())
-        every = made if isinstance(made, tuple) else (made,)
-        return [one for one in every if isinstance(one, Call)]
+        node = self.nodes.get(table, ())
+        entries = node if isinstance(node, tuple) else (node,)
+        return [entry for entry in entries if isinstance(entry, Call)]
 
     @property
     def system(self) -> Mapping[str, Node]:
@@ -70,65 +74,76 @@ class Part:
         return arguments
 
 
-def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
+def find_unread(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield all choices without effect.
 
-    tables: of the file, with its stages; parts: the stages in their order, or the one whole
-    case.
+    Args:
+        path: of the case file.
+        tables: of the file, with its stages.
+        parts: the stages in their order, or the one whole case.
+
+    Yields:
+        The key that is in vain, and the sentence.
     """
-    yield from _materials(path, tables, parts)
+    yield from _find_unused_materials(path, tables, parts)
     for part in parts:
-        yield from _ratios(part)
-        yield from _without_contact(part)
-        yield from _of_solvers(part)
-        yield from _twice(part)
-        yield from _recorded_weight(part)
-    yield from _start(parts)
-    yield from _ground(path, parts)
+        yield from _find_vain_ratios(part)
+        yield from _find_vain_contact_laws(part)
+        yield from _find_vain_solvers(part)
+        yield from _find_doubles(part)
+        yield from _find_vain_recorders(part)
+    yield from _find_lost_initial_values(parts)
+    yield from _find_vain_inertia(path, parts)
     if "stage" in tables:
-        yield from _replaced(path, tables)
-        yield from _released(path, tables)
+        yield from _find_replaced_tables(path, tables)
+        yield from _find_vain_releases(path, tables)
 
 
-def left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
+def find_left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
     """Yield a sentence for each table that waits for a motion in a case of static stages.
 
     These are no mistake, as one looks at the weight alone before the motion is added: they are
     told.
     """
     stages = tables.get("stage", ())
-    if stages and all(one.get("type") == "static" for one in stages):
-        for key in (one for one in OF_MOTION if one in tables):
-            yield f"[{key}] of {path} is for motions and is not read, as every [[stage]] is static"
+    if stages and all(stage.get("type") == "static" for stage in stages):
+        for key in OF_MOTION:
+            if key in tables:
+                yield (
+                    f"[{key}] of {path} is for motions and is not read, as every [[stage]] is "
+                    "static"
+                )
 
 
 def refuse_unread(
-    found: Sequence[Finding], before: Sequence[Finding], settings: Sequence[str]
+    unread: Sequence[Finding], before: Sequence[Finding], settings: Sequence[str]
 ) -> None:
     """Raise InputError with the first finding that settings of other tables have not made.
 
-    before: findings in the file without its settings; none where the file alone is no case.
+    Args:
+        unread: findings in the file with its settings.
+        before: findings in the file without them; none where the file alone is no case.
+        settings: the KEY=VALUE made after reading.
     """
-    already = {key for key, _ in before}
-    asked = {setting.partition("=")[0].strip().partition(".")[0] for setting in settings}
-    for key, sentence in found:
-        if not settings or key in already or key.partition(".")[0] in asked:
+    keys_before = {key for key, _ in before}
+    keys_of_settings = [setting.partition("=")[0].strip() for setting in settings]
+    tables_of_settings = {key.partition(".")[0] for key in keys_of_settings}
+    for key, sentence in unread:
+        table = key.partition(".")[0]
+        if not settings or key in keys_before or table in tables_of_settings:
             raise InputError(sentence)
 
 
-def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> Iterator[Finding]:
+def _find_unused_materials(
+    path: Path, tables: Mapping[str, Any], parts: Sequence[Part]
+) -> Iterator[Finding]:
     """Yield materials that no stage's [system] names.
 
     They are for cells or for what is behind a boundary.
     """
     named = tables.get("material")
     for name in named if isinstance(named, Mapping) else ():
-        users = [
-            part
-            for part in parts
-            if any(one is part.nodes["material"][name] for one in nodes_in(part.nodes["system"]))
-        ]
-        if not users:
+        if not any(_names_material(part, name) for part in parts):
             yield (
                 f"material.{name}",
                 (
@@ -138,13 +153,20 @@ def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> 
             )
 
 
-def _ratios(part: Part) -> Iterator[Finding]:
+def _names_material(part: Part, name: str) -> bool:
+    """Tell whether [system] names a material: the same object is in both."""
+    material = part.nodes["material"][name]
+    return any(node is material for node in walk_nodes(part.nodes["system"]))
+
+
+def _find_vain_ratios(part: Part) -> Iterator[Finding]:
     """Yield the law of damping ratios without a ratio, and ratios without the law."""
     law = part.system.get("damping")
     word = law.callee.name if isinstance(law, Call) else "NoDamping"
-    used = [one for one in nodes_in(part.system.get("material", ())) if isinstance(one, Call)]
+    material = part.system.get("material", ())
+    used = {id(node) for node in walk_nodes(material) if isinstance(node, Call)}
     named = part.nodes.get("material", {})
-    names = [name for name, one in named.items() if any(one is other for other in used)]
+    names = [name for name, node in named.items() if id(node) in used]
     damped = [name for name in names if named[name].arguments.get("xi")]
     if word == RATIO_LAW and names and not damped and "strain_compatible" not in part.nodes:
         yield (
@@ -167,18 +189,18 @@ def _ratios(part: Part) -> Iterator[Finding]:
         )
 
 
-def _without_contact(part: Part) -> Iterator[Finding]:
+def _find_vain_contact_laws(part: Part) -> Iterator[Finding]:
     """Yield laws of contact where there is none.
 
     It yields them too where there is none that they act on, or another before them.
     """
-    surfaces = [one for key in ("contact", *OWN) for one in part.calls(key)]
-    yield from _without_slip(part)
+    surfaces = [call for key in ("contact", *BODY_TABLES) for call in part.list_calls(key)]
+    yield from _find_friction_without_slip(part)
     for table, happens in OF_CONTACT.items():
-        laws = part.calls(table)
-        # may change all masses
-        own = table == "mass" and laws and laws[0].callee.name not in MASSES
-        if laws and not surfaces and not own:
+        laws = part.list_calls(table)
+        # A law of masses of others may change all masses.
+        changes_all = table == "mass" and bool(laws) and laws[0].callee.name not in MASSES
+        if laws and not surfaces and not changes_all:
             yield (
                 table,
                 (
@@ -186,7 +208,8 @@ def _without_contact(part: Part) -> Iterator[Finding]:
                     "[[contact]]: give the contact, or leave it out"
                 ),
             )
-    if part.calls("impact") and surfaces and all("springs" in one.arguments for one in surfaces):
+    on_springs = bool(surfaces) and all("springs" in call.arguments for call in surfaces)
+    if part.list_calls("impact") and on_springs:
         yield (
             "impact",
             (
@@ -203,7 +226,9 @@ def _without_contact(part: Part) -> Iterator[Finding]:
                 "[[contact]]: give the contact, or the step alone"
             ),
         )
-    if part.calls("mass") and any("mass" in one.arguments for one in part.calls("scheme")):
+    if part.list_calls("mass") and any(
+        "mass" in call.arguments for call in part.list_calls("scheme")
+    ):
         yield (
             "scheme.mass",
             (
@@ -213,10 +238,10 @@ def _without_contact(part: Part) -> Iterator[Finding]:
         )
 
 
-def _without_slip(part: Part) -> Iterator[Finding]:
+def _find_friction_without_slip(part: Part) -> Iterator[Finding]:
     """Yield friction of a body that cannot slide."""
-    for body in (one for key in OWN for one in part.calls(key)):
-        if part.calls("friction") and body.callee.name in STRAIGHT:
+    for body in (call for key in BODY_TABLES for call in part.list_calls(key)):
+        if part.list_calls("friction") and body.callee.name in STRAIGHT:
             yield (
                 "friction",
                 (
@@ -226,30 +251,39 @@ def _without_slip(part: Part) -> Iterator[Finding]:
             )
 
 
-def _of_solvers(part: Part) -> Iterator[Finding]:
+def _find_vain_solvers(part: Part) -> Iterator[Finding]:
     """Yield methods for steps that the case does not have, and solvers that have failed before."""
-    laws = [one.callee.name for one in part.calls("friction") if one.callee.name != "Frictionless"]
-    rubs = laws[0] if laws else ""
+    laws = [call.callee.name for call in part.list_calls("friction")]
+    friction = next((law for law in laws if law != "Frictionless"), "")
     for table in ("solver", "escalation"):
-        for one in (one for one in part.calls(table) if one.callee.name == "Condensed"):
-            yield from _of_condensed(part.label, table, one.arguments, rubs)
-    for one, other in combinations([*part.calls("solver"), *part.calls("escalation")], 2):
-        if one == other:
+        for call in part.list_calls(table):
+            if call.callee.name == "Condensed":
+                yield from _find_vain_keys_of_condensed(part.label, table, call.arguments, friction)
+    for earlier, later in combinations(
+        [*part.list_calls("solver"), *part.list_calls("escalation")], 2
+    ):
+        if earlier == later:
             yield (
                 "escalation",
                 (
-                    f"{part.label}: [[escalation]] names {other.callee.name} with the same keys as "
+                    f"{part.label}: [[escalation]] names {later.callee.name} with the same keys as "
                     "the solver before it, which has failed by then: leave it out, or change a key"
                 ),
             )
 
 
-def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -> Iterator[Finding]:
+def _find_vain_keys_of_condensed(
+    label: str, table: str, keys: Mapping[str, Node], friction: str
+) -> Iterator[Finding]:
     """Yield keys of the condensed solver without effect.
 
-    ``rubs`` is the law of friction, or empty.
+    Args:
+        label: how sentences begin.
+        table: "solver" or "escalation".
+        keys: of the solver.
+        friction: the law of friction; "" without.
     """
-    if rubs and "method" in keys:
+    if friction and "method" in keys:
         yield (
             table,
             (
@@ -257,32 +291,33 @@ def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -
                 "given: give friction_method in its place, or leave it out"
             ),
         )
-    for key in (one for one in ("friction_method", "rates") if one in keys and not rubs):
-        yield (
-            table,
-            (
-                f"{label}: [{table}] {key} is for contact with friction, and there is no "
-                "[friction]: give the friction, or leave it out"
-            ),
-        )
-    if "rates" in keys and rubs in WITHOUT_RATES:
+    for key in ("friction_method", "rates"):
+        if key in keys and not friction:
+            yield (
+                table,
+                (
+                    f"{label}: [{table}] {key} is for contact with friction, and there is no "
+                    "[friction]: give the friction, or leave it out"
+                ),
+            )
+    if "rates" in keys and friction in WITHOUT_RATES:
         yield (
             table,
             (
                 f"{label}: [{table}] rates is for friction that depends on the slip rate, and "
-                f"{rubs} does not: leave it out"
+                f"{friction} does not: leave it out"
             ),
         )
 
 
-def _twice(part: Part) -> Iterator[Finding]:
+def _find_doubles(part: Part) -> Iterator[Finding]:
     """Yield the same load, dashpots or excitation, word for word."""
     system = part.tables.get("system", {})
     lists = {f"system.{key}": system.get(key) for key in ("loads", "dashpots")}
     lists["excitation"] = part.tables.get("excitation")
-    for key, given in lists.items():
-        for one, other in combinations(given if isinstance(given, list) else (), 2):
-            if one == other:
+    for key, tables in lists.items():
+        for first, second in combinations(tables if isinstance(tables, list) else (), 2):
+            if first == second:
                 yield (
                     key,
                     (
@@ -292,23 +327,23 @@ def _twice(part: Part) -> Iterator[Finding]:
                 )
 
 
-def _recorded_weight(part: Part) -> Iterator[Finding]:
+def _find_vain_recorders(part: Part) -> Iterator[Finding]:
     """Yield recorders that take off a weight which the body does not have."""
-    loads = [one for one in nodes_in(part.system.get("loads", ())) if isinstance(one, Call)]
-    if part.calls("gravity") or any(one.callee.name == "BodyForce" for one in loads):
+    loads = [node for node in walk_nodes(part.system.get("loads", ())) if isinstance(node, Call)]
+    if part.list_calls("gravity") or any(load.callee.name == "BodyForce" for load in loads):
         return
-    for one in part.calls("record"):
-        if "gravity" in one.arguments:
+    for recorder in part.list_calls("record"):
+        if "gravity" in recorder.arguments:
             yield (
                 "record",
                 (
-                    f"{part.label}: [[record]] {one.callee.name} has gravity, and the body has no "
-                    "weight: give [gravity], or leave it out"
+                    f"{part.label}: [[record]] {recorder.callee.name} has gravity, and the body "
+                    "has no weight: give [gravity], or leave it out"
                 ),
             )
 
 
-def _start(parts: Sequence[Part]) -> Iterator[Finding]:
+def _find_lost_initial_values(parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield initial values that a static equilibrium, or the stage before, takes away."""
     first, *later = parts
     weighted = "[gravity]" if "gravity" in first.nodes else ""
@@ -322,20 +357,22 @@ def _start(parts: Sequence[Part]) -> Iterator[Finding]:
             ),
         )
     for part in later:
-        for key in (one for one in AT_START if one in part.system and one not in first.system):
-            yield (
-                f"system.{key}",
-                (
-                    f"{part.label}: system has {key}, and a stage begins where the stage before "
-                    "has left the body: give it in the first stage, or leave it out"
-                ),
-            )
+        for key in AT_START:
+            if key in part.system and key not in first.system:
+                yield (
+                    f"system.{key}",
+                    (
+                        f"{part.label}: system has {key}, and a stage begins where the stage "
+                        "before has left the body: give it in the first stage, or leave it out"
+                    ),
+                )
 
 
-def _ground(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
+def _find_vain_inertia(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield masses of held nodes that no ground motion and no weight accelerates."""
-    given = any("base_inertia" in part.system for part in parts)
-    if given and not any(part.calls("excitation") or part.calls("gravity") for part in parts):
+    has_inertia = any("base_inertia" in part.system for part in parts)
+    accelerated = any(part.list_calls("excitation") or part.list_calls("gravity") for part in parts)
+    if has_inertia and not accelerated:
         yield (
             "system.base_inertia",
             (
@@ -345,13 +382,15 @@ def _ground(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
         )
 
 
-def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
+def _find_replaced_tables(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield tables of the case, and keys of its [system], that no stage takes over."""
     stages = tables["stage"]
-    moving = [one for one in stages if one.get("type") == "dynamic"]
-    for key in (one for one in WHOLE if one in tables):
+    moving = [stage for stage in stages if stage.get("type") == "dynamic"]
+    for key in WHOLE:
+        if key not in tables:
+            continue
         readers = moving if key in OF_MOTION else stages
-        if readers and all(one.get(key) for one in readers):  # excitation = [] takes it away
+        if readers and all(stage.get(key) for stage in readers):  # excitation = [] takes it away
             yield (
                 key,
                 (
@@ -361,7 +400,7 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
             )
     own = tables.get("system")
     for key in own if isinstance(own, Mapping) else ():
-        if all(key in one.get("system", {}) for one in stages):
+        if all(key in stage.get("system", {}) for stage in stages):
             yield (
                 f"system.{key}",
                 (
@@ -371,13 +410,12 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
             )
 
 
-def _released(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
+def _find_vain_releases(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield stages that release supports and have all those of the stage before."""
     stages = tables["stage"]
-    systems = [{**tables.get("system", {}), **one.get("system", {})} for one in stages]
-    held = [[one.get(key) for key in SUPPORTS] for one in systems]
-    for before, own, stage in zip(held, held[1:], stages[1:], strict=False):
-        if stage.get("release") is True and before == own:
+    supports = [_list_supports(tables.get("system", {}) | own.get("system", {})) for own in stages]
+    for (before, after), stage in zip(pairwise(supports), stages[1:], strict=True):
+        if stage.get("release") is True and before == after:
             yield (
                 "stage",
                 (
@@ -385,3 +423,8 @@ def _released(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
                     "of the stage before it: leave it out, or change the supports"
                 ),
             )
+
+
+def _list_supports(system: Mapping[str, Any]) -> list[Any]:
+    """Return what holds the body, of each kind."""
+    return [system.get(key) for key in SUPPORTS]

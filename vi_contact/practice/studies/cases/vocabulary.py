@@ -60,9 +60,9 @@ from ...soil import SoilCurves, UpgoingVelocity
 from . import bodies
 from .bodies import BeamBody, LayerLaw, ParticleBody
 from .expressions import Expression, Places
-from .own_classes import defect, is_protocol
+from .own_classes import describe_defect, is_protocol
 from .parsing import Words
-from .table_calls import Callee, callee
+from .table_calls import Callee, make_callee
 
 _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
     core: (Obstacle, FrictionLaw),
@@ -108,11 +108,21 @@ def record(
     largest: Annotated[float, Unit("m/s²")] = LARGEST_PEAK,
     processing: "ground_motion.Processing | None" = None,
 ) -> Record:
-    """Read a record, ``read_record``, then apply ``processing``."""
-    found = ground_motion.read_record(
+    """Read a record, ``read_record``, then apply ``processing``.
+
+    Args:
+        path: of the file.
+        units: of its numbers, where the file does not state them.
+        dt: its time step [s], where the file does not state one.
+        resample_dt: time step [s] to which it is brought; None: its own.
+        channel: which component of a file that holds several, a number from 1 or a name.
+        largest: the greatest peak that is believed [m/s²].
+        processing: what is done to it; None: nothing.
+    """
+    record = ground_motion.read_record(
         path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest
     )
-    return found if processing is None else processing(found)
+    return record if processing is None else processing(record)
 
 
 def surface(
@@ -130,16 +140,26 @@ def surface(
 ) -> ContactSurface:
     """Make a ``contact_surface``.
 
-    ``held`` makes it bilateral everywhere; it rests on ``springs`` if given; with
-    ``frictionless_corners`` there is no friction in corners; ``hinges`` are those of bodies that
-    share nodes; ``name`` is that of it as ``part`` of recorders.
+    Args:
+        system: of the body.
+        facets: the part of its boundary.
+        obstacle: what it may touch; None: ``Touching()``.
+        points: (k, d) [m]; only the nodes nearest to them have conditions; None: all have.
+        feature_angle: angle [rad]; facets that turn by less from one another are one smooth face.
+        held: makes it bilateral everywhere.
+        springs: foundation modulus [Pa/m] of the springs on which it rests; None: without.
+        frictionless_corners: whether nodes with several conditions slide freely over their faces.
+        hinges: whether the body may hang together with another one by nodes of this boundary.
+        name: of the surface, as ``part`` of recorders.
     """
-    found = fem.contact_surface(
+    result = fem.contact_surface(
         system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle, hinges=hinges
     )
-    found = found if springs is None else found.on_springs(springs)
-    found = found.with_frictionless_corners() if frictionless_corners else found
-    return found.bilateral_everywhere() if held else found
+    if springs is not None:
+        result = result.on_springs(springs)
+    if frictionless_corners:
+        result = result.with_frictionless_corners()
+    return result.bilateral_everywhere() if held else result
 
 
 def pair(
@@ -155,8 +175,21 @@ def pair(
     hinges: bool = False,
     name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``."""
-    found = fem.contact_pair(
+    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``.
+
+    Args:
+        system: of the bodies.
+        facets1: side 1, whose nodes have the conditions.
+        facets2: side 2.
+        matching: how side 1 finds side 2; None: ``NodeToNode()``.
+        points: as of ``surface``.
+        feature_angle: as of ``surface``.
+        held: as of ``surface``.
+        frictionless_corners: as of ``surface``.
+        hinges: as of ``surface``.
+        name: as of ``surface``.
+    """
+    result = fem.contact_pair(
         system,
         facets1,
         facets2,
@@ -165,8 +198,9 @@ def pair(
         feature_angle=feature_angle,
         hinges=hinges,
     )
-    found = found.with_frictionless_corners() if frictionless_corners else found
-    return found.bilateral_everywhere() if held else found
+    if frictionless_corners:
+        result = result.with_frictionless_corners()
+    return result.bilateral_everywhere() if held else result
 
 
 def weight(
@@ -178,7 +212,11 @@ def weight(
 ) -> SemiDiscreteSystem:
     """Return the system ``with_weight``.
 
-    ``cells`` is a group of whole bodies, which alone have weight.
+    Args:
+        system: without weight.
+        acceleration: of gravity [m/s²].
+        direction: (d,) in which it acts; None: downwards.
+        cells: a group of whole bodies, which alone have weight; None: all have.
     """
     bodies = None if cells is None else fem.bodies_of(system, cells)
     return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
@@ -191,7 +229,14 @@ def first_mode_harmonic(
     ratio: Annotated[float, RATIO] = 0.5,
     direction: Annotated[tuple[float, ...], RATIO] = (1.0, 0.0),
 ) -> laws.Harmonic:
-    """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
+    """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact.
+
+    Args:
+        system: of the body.
+        amplitude: of the acceleration [m/s²].
+        ratio: of the two frequencies [-].
+        direction: (d,) of the acceleration.
+    """
     return laws.Harmonic(
         amplitude, ratio * engineering.lowest_frequency(system), direction=direction
     )
@@ -209,12 +254,22 @@ def heterogeneous(
     rho: Annotated[float | Expression, Unit("kg/m³")],
     xi: Annotated[float | Expression, RATIO] = 0.0,
 ) -> Heterogeneous:
-    """Make a heterogeneous material."""
+    """Make a heterogeneous material.
 
-    def of(value: float | Expression) -> Any:
-        return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
+    Args:
+        E: Young's modulus [Pa], a number or an expression of x, y, z [m], as all of these.
+        nu: Poisson's ratio [-].
+        rho: density [kg/m³].
+        xi: damping ratio [-].
+    """
 
-    return Heterogeneous(of(E), of(nu), of(rho), of(xi))
+    def make_field(value: float | Expression) -> Any:
+        if not isinstance(value, Expression):
+            return value
+        places = Places(value)
+        return lambda x: places(x.T)  # finite elements give coordinates as (3, k)
+
+    return Heterogeneous(make_field(E), make_field(nu), make_field(rho), make_field(xi))
 
 
 def analytic_gap(function: Annotated[Expression, Unit("m")]) -> core.AnalyticGap:
@@ -228,7 +283,14 @@ def resultants(
     normal: tuple[float, ...] | None = None,
     part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
 ) -> run.Resultants:
-    """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
+    """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box.
+
+    Args:
+        name: of the columns.
+        centre: (d,) point of reference [m]; None: as of ``Resultants``.
+        normal: (d,) direction of N towards the support; None: the mean contact direction.
+        part: of the contact; None: all of it.
+    """
     return run.Resultants(name, centre, normal=normal, part=part)
 
 
@@ -243,6 +305,13 @@ def upgoing(
     """Return ``soil.upgoing`` of a motion, or of the run's excitations.
 
     These then come up through the base alone.
+
+    Args:
+        excitations: of the run.
+        motion: another motion; None: the excitations.
+        direction: (d,) of a record.
+        dt: step of the integration [s]; None: that of the record.
+        outcrop: whether the motion is that of an outcrop; False: it is upgoing already.
     """
     return soil.upgoing(
         excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop
@@ -257,7 +326,15 @@ def compliant_base(
     normal: float = 1.0,
     tangential: float = 1.0,
 ) -> CompliantBase:
-    """Make a ``fem.CompliantBase``."""
+    """Make a ``fem.CompliantBase``.
+
+    Args:
+        facets: the base.
+        motion: t [s] -> velocity (d,) [m/s] of the upgoing wave.
+        material: of the half-space below; None: of the cells at the base.
+        normal: factor of rho c_P [-].
+        tangential: factor of rho c_S [-].
+    """
     return CompliantBase(facets, material, normal, tangential, motion=motion)
 
 
@@ -270,18 +347,31 @@ def free_field(
     normal: float = 1.0,
     tangential: float = 1.0,
 ) -> "soil.FreeField":
-    """Make a free-field side on the base of the run's excitations, or a compliant one."""
-    foot = excitations if base is None else base
-    return soil.FreeField(facets, material, normal, tangential, base=foot)
+    """Make a free-field side on the base of the run's excitations, or a compliant one.
+
+    Args:
+        excitations: of the run.
+        facets: the side.
+        base: the compliant base on which its column stands; None: that of the excitations.
+        material: of the dashpots; None: of the cells at the side.
+        normal: factor of rho c_P [-].
+        tangential: factor of rho c_S [-].
+    """
+    column_base = excitations if base is None else base
+    return soil.FreeField(facets, material, normal, tangential, base=column_base)
 
 
 @dataclass(frozen=True)
 class Parts:
     """Hold what a problem is made of.
 
-    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium;
-    moved: the excitations come up through its base, and are no inertia load; mass: the law of a
-    body without a mesh, or with a layer.
+    Attributes:
+        system: the equations.
+        surface: the contact conditions.
+        tags: groups of the mesh.
+        weighted: it carries its weight, and starts from its equilibrium.
+        moved: the excitations come up through its base, and are no inertia load.
+        mass: the law of a body without a mesh, or with a layer.
     """
 
     system: SemiDiscreteSystem
@@ -324,48 +414,48 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
 }
 
 
-def names_of(kind: Any) -> tuple[str, ...]:
-    """Return the words for things of a kind: ``names_of(Scheme)`` are the schemes."""
-    return tuple(_choices()[kind])
+def list_names(kind: Any) -> tuple[str, ...]:
+    """Return the words for things of a kind: ``list_names(Scheme)`` are the schemes."""
+    return tuple(_gather_choices()[kind])
 
 
 @cache
-def _choices() -> Mapping[Any, Mapping[str, Callee]]:
+def _gather_choices() -> Mapping[Any, Mapping[str, Callee]]:
     """Return kind -> word -> what it calls."""
-    of_rooms = (kind for kinds in _KINDS.values() for kind in kinds)
-    return MappingProxyType({kind: _Listed(kind) for kind in (*of_rooms, *_FUNCTIONS)})
+    kinds_of_rooms = (kind for kinds in _KINDS.values() for kind in kinds)
+    return MappingProxyType({kind: _Choices(kind) for kind in (*kinds_of_rooms, *_FUNCTIONS)})
 
 
-class _Listed(Mapping[str, Callee]):
+class _Choices(Mapping[str, Callee]):
     """Find the words for a kind, each when it is asked for.
 
     Most are of modules that a case does not need.
     """
 
     def __init__(self, kind: Any) -> None:
-        self._kind, self._rooms = kind, [room for room, kinds in _KINDS.items() if kind in kinds]
+        self._kind = kind
+        self._rooms = [room for room, kinds in _KINDS.items() if kind in kinds]
 
-    def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
+    def _find(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
         """Return what words with these names before the dot call; of all if it is None."""
-        found: dict[str, Callee] = {}
+        choices: dict[str, Callee] = {}
         for room in self._rooms:
-            own = (
-                room.__all__ if names is None else [name for name in names if name in room.__all__]
-            )
-            found |= {one.name: one for one in _callees(room, self._kind, own)}
-        functions = _FUNCTIONS.get(self._kind, {}).items()
-        return found | {
-            name: callee(one(), name=name)
-            for name, one in functions
-            if names is None or name in names
-        }
+            classes = room.__all__
+            if names is not None:
+                classes = [name for name in names if name in room.__all__]
+            for target in _make_callees(room, self._kind, classes):
+                choices[target.name] = target
+        for name, load in _FUNCTIONS.get(self._kind, {}).items():
+            if names is None or name in names:
+                choices[name] = make_callee(load(), name=name)
+        return choices
 
     @cached_property
     def _all(self) -> dict[str, Callee]:
-        return self._found()
+        return self._find()
 
     def __getitem__(self, word: str) -> Callee:
-        return self._found([word.partition(".")[0]])[word]
+        return self._find([word.partition(".")[0]])[word]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._all)
@@ -377,29 +467,36 @@ class _Listed(Mapping[str, Callee]):
         return True  # without looking
 
 
-def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
+def _make_callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Callee]:
     """Yield the classes of these names that are of this kind.
 
     Named constructors are among them; none needs functions.
     """
     for cls in (getattr(room, name) for name in names):
-        if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
-            made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
-            yield from (
-                one
-                for one in made
-                if not any(get_origin(one.hints[name]) is Callable for name in one.required)
-            )
+        if not isinstance(cls, type) or is_protocol(cls) or describe_defect(cls, kind):
+            continue
+        targets = [
+            make_callee(function, name=function.__qualname__)
+            for function in (cls, *_list_constructors(cls))
+        ]
+        yield from (target for target in targets if not _needs_function(target))
 
 
-def _constructors(cls: type) -> Iterator[Any]:
+def _needs_function(target: Callee) -> bool:
+    """Tell whether a parameter without a default is a function, which no file can give."""
+    return any(get_origin(target.hints[name]) is Callable for name in target.required)
+
+
+def _list_constructors(cls: type) -> Iterator[Any]:
     """Yield the classmethods that return an object of the class."""
-    for name, one in vars(cls).items():
-        if isinstance(one, classmethod) and get_type_hints(one.__func__).get("return") is cls:
-            yield getattr(cls, name)
+    for name, member in vars(cls).items():
+        if isinstance(member, classmethod):
+            returned = get_type_hints(member.__func__).get("return")
+            if returned is cls:
+                yield getattr(cls, name)
 
 
-def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
+def make_words(folder: Path, allowed: Sequence[str] = ()) -> Words:
     """Return the words of a case file in this folder.
 
     Its relative paths begin there; ``allowed`` are others' packages.
@@ -414,5 +511,5 @@ def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
         LayerLaw: "contact_layer",
     }
     return Words(
-        folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
+        folder, _gather_choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
     )

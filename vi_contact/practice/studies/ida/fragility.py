@@ -27,7 +27,7 @@ from scipy.special import log_ndtr, ndtr
 from ....core.algebra import Array
 from ....core.arguments import checked
 from ....core.errors import InputError
-from .measures import Demand, demand
+from .measures import Demand, read_demand
 
 NORMAL = 1.959963984540054  # 95 % of the normal distribution lie within so many standard deviations
 SAME = 1e-9  # of two intensities: they are those of records that were scaled to one
@@ -35,54 +35,68 @@ SAME = 1e-9  # of two intensities: they are those of records that were scaled to
 LEAST = 0.01
 
 
-def limit(text: str) -> tuple[Demand, float]:
+def read_limit(text: str) -> tuple[Demand, float]:
     """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column.
 
-    InputError for others.
-
     It is passed by a demand at the value or above, for the way "min" at it or below.
+
+    Raises:
+        InputError: for other texts.
     """
-    name, _, value = text.partition("=")
+    name, _, number = text.partition("=")
     try:
-        found = float(value)
+        value = float(number)
     except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
+        value = math.nan
+    if not math.isfinite(value):
         raise InputError(
             f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such "
             "as contact_max_slip:max=0.05"
         )
-    return demand(name), found
+    return read_demand(name), value
 
 
-def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
-    """Return (records, 2) values of the column ``level`` at which limits are passed.
-
-    Between these two each record first passes a limit.
+def bracket_capacities(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
+    """Return the intensities between which each record first passes a limit.
 
     Of a record count the runs below its first failed one; one without any is left out.
+
+    Args:
+        rows: of ida.csv.
+        text: the limit, "COLUMN:WAY=VALUE".
+        level: the column of the intensity.
+
+    Returns:
+        (records, 2): the highest intensity that does not pass, or 0, and the lowest that does, or
+        infinity.
     """
-    (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
-    for row in sorted(
-        (row for row in rows if row[level] is not None), key=lambda row: float(row[level])
-    ):
-        record, value = row["record"], row[one.name]
+    demand, limit = read_limit(text)
+    brackets: dict[str, tuple[float, float]] = {}
+    ended = set()  # records whose bracket is known, or of which a run has failed
+    known = [row for row in rows if row[level] is not None]
+    for row in sorted(known, key=lambda row: float(row[level])):
+        record = row["record"]
+        value = row[demand.name]
         if record in ended or row["status"] != "finished" or not math.isfinite(value):
             ended.add(record)
-        elif value <= most if one.way == "min" else value >= most:
-            found[record] = found.get(record, (0.0, math.inf))[0], row[level]
+        elif value <= limit if demand.way == "min" else value >= limit:
+            below, _ = brackets.get(record, (0.0, math.inf))
+            brackets[record] = (below, row[level])
             ended.add(record)
         else:
-            found[record] = row[level], math.inf
-    return np.array(list(found.values())).reshape(-1, 2)
+            brackets[record] = (row[level], math.inf)
+    return np.array(list(brackets.values())).reshape(-1, 2)
 
 
 @dataclass(frozen=True)
 class Fragility:
     """Hold a fitted curve.
 
-    It has the median theta (unit of the intensity), dispersion beta [-], covariance (2, 2) of their
-    logarithms, and the brackets (records, 2) that it was fitted to.
+    Attributes:
+        theta: median, in the unit of the intensity.
+        beta: dispersion [-].
+        covariance: (2, 2) of the logarithms of both.
+        brackets: (records, 2) intensities that it was fitted to.
     """
 
     theta: float
@@ -106,9 +120,14 @@ class Fragility:
 
 @checked
 def fragility_curve(brackets: Array) -> Fragility:
-    """Return the fragility of brackets (records, 2).
+    """Return the fragility of brackets, by maximum likelihood.
 
-    InputError where they do not tell median and dispersion.
+    Args:
+        brackets: (records, 2) intensities between which each record first passes the limit: the
+            lower one 0 where already the lowest run passes, the upper one infinite where none does.
+
+    Raises:
+        InputError: where they do not tell median and dispersion.
     """
     brackets = np.asarray(brackets, dtype=float)
     if brackets.ndim != 2 or brackets.shape[1] != 2:
@@ -116,19 +135,28 @@ def fragility_curve(brackets: Array) -> Fragility:
             f"fragility_curve: brackets has shape {brackets.shape}; give two intensities for each "
             "record"
         )
-    low, high = np.max(brackets[:, 0], initial=0.0), np.min(brackets[:, 1], initial=math.inf)
+
+    # Where one intensity lies in all brackets, every dispersion down to zero fits.
+    low = np.max(brackets[:, 0], initial=0.0)
+    high = np.min(brackets[:, 1], initial=math.inf)
     if low <= high * (1.0 + SAME):
         raise InputError(
             f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe "
             f"all at one intensity from {low:g} to {high:g}: give other or closer levels, or more "
             "records"
         )
+
+    # Logarithms, shifted and scaled so that the unknowns p are of the size of one.
     with np.errstate(divide="ignore"):
         x = np.log(brackets)
-    centre, spread = np.mean(seen := x[np.isfinite(x)]), np.std(seen)
+    levels = x[np.isfinite(x)]
+    centre = np.mean(levels)
+    spread = np.std(levels)
     x = (x - centre) / spread
+
+    # The largest likelihood over p = (1/beta, ln(theta)/beta), in which -ln L is convex.
     p = minimize(
-        lambda p: [-one for one in _likelihood(p, x)[:2]],
+        lambda p: _negate(_compute_likelihood(p, x)),
         [1.0, 0.0],
         jac=True,
         method="L-BFGS-B",
@@ -140,25 +168,41 @@ def fragility_curve(brackets: Array) -> Fragility:
             "more levels, or more records"
         )
     for _ in range(3):  # of Newton, from digits that are enough to all of them
-        _, slope, bend = _likelihood(p, x)
+        _, slope, bend = _compute_likelihood(p, x)
         p = p - np.linalg.solve(bend, slope)
-    beta, median = spread / p[0], spread * p[1] / p[0]
-    by = np.array([[-median, spread], [-1.0, 0.0]]) / p[0]  # derivatives of ln theta and ln beta
-    return Fragility(
-        float(np.exp(centre + median)), float(beta), by @ np.linalg.inv(-bend) @ by.T, brackets
-    )
+
+    # Back to theta and beta, and the covariance of their logarithms by the inverse of -d²lnL/dp².
+    beta = spread / p[0]
+    median = spread * p[1] / p[0]  # ln theta - centre
+    derivatives = np.array([[-median, spread], [-1.0, 0.0]]) / p[0]  # of ln theta, ln beta by p
+    covariance = derivatives @ np.linalg.inv(-bend) @ derivatives.T
+    return Fragility(float(np.exp(centre + median)), float(beta), covariance, brackets)
 
 
-def _likelihood(p: Array, x: Array) -> tuple[float, Array, Array]:
-    """Return ln L at p = (1/beta, ln(theta)/beta), and its derivatives.
+def _negate(likelihood: tuple[float, Array, Array]) -> list[Any]:
+    """Return -ln L and its first derivatives, which the minimisation takes."""
+    value, slope, _ = likelihood
+    return [-value, -slope]
 
-    These are the first and second ones; x are brackets of ln capacity.
+
+def _compute_likelihood(p: Array, x: Array) -> tuple[float, Array, Array]:
+    """Return ln L at p = (1/beta, ln(theta)/beta), and its first and second derivatives.
+
+    Args:
+        p: (2,).
+        x: (records, 2) brackets of ln capacity, infinite where they are open.
     """
+    # z = (x - ln theta) / beta is linear in p, with the derivatives ``sides``; open ends stay.
     known = np.isfinite(x)
     sides = np.stack([np.where(known, x, 0.0), -np.ones_like(x)], axis=-1)
     z = np.where(known, sides @ p, x)
-    a, b = log_ndtr(np.where(z[:, :1] > 0.0, -z[:, ::-1], z).T)  # in the tail that has digits
+
+    # ln[Phi(b) - Phi(a)] = ln Phi(b) + ln(1 - Phi(a)/Phi(b)). For a > 0 both are turned round, to
+    # the tail that has digits: Phi(b) - Phi(a) = Phi(-a) - Phi(-b).
+    a, b = log_ndtr(np.where(z[:, :1] > 0.0, -z[:, ::-1], z).T)
     logs = b + np.log(-np.expm1(a - b))
+
+    # Derivatives by z are -+ phi(z)/[Phi(b) - Phi(a)], and phi' = -z phi.
     weights = [-1.0, 1.0] * np.exp(-0.5 * z**2 - 0.5 * math.log(2.0 * math.pi) - logs[:, None])
     slopes = np.einsum("ie,iep->ip", weights, sides)
     bends = np.einsum("ie,iep,ieq->pq", np.where(known, z, 0.0) * weights, sides, sides)

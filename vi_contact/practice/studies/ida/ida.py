@@ -33,17 +33,24 @@ from ....run.wall_time import WallTime
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ..cases.case import Case, read_case
 from ..cases.description import describe
-from ..cases.parsing import nearest
-from .fragility import fragility_curve, limit, passing
-from .measures import Demand, Intensity, demand, fractiles, intensity
-from .processes import executed, refuse_mpirun
-from .runs import ROW, OneRun, Row, Shaking, read_json, read_row, shakings
+from ..cases.parsing import suggest_nearest
+from .fragility import bracket_capacities, fragility_curve, read_limit
+from .measures import Demand, Intensity, compute_fractiles, read_demand, read_intensity
+from .processes import execute_runs, refuse_mpirun
+from .runs import ROW, OneRun, Row, Shaking, gather_shakings, read_json, read_row
 
 Units = dict[str, tuple[str, str]]
 SECONDS = 30.0  # between two lines about the time left
-SHARES = (0.16, 0.50, 0.84)
-TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
+SHARES = (0.16, 0.50, 0.84)  # of the records below the curves of the figure
+
+# Files and folders of a study.
+TABLE = "ida.csv"
+COLUMNS = "columns.json"
+FIGURE = "ida.png"
+STUDY = "ida.json"
+RUNS = "runs"
 FRAGILITY = "fragility.csv"
+
 # Columns of ida.csv before and after the intensity and the demands: column -> (unit, meaning).
 _FIRST_COLUMNS: Units = {
     "record": ("-", "name of the record"),
@@ -68,14 +75,20 @@ _LAST_COLUMNS: Units = {
 class IDA:
     """Say what an incremental dynamic analysis runs, and what it tells of the runs.
 
-    case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one
-    file per GroundMotion of the case, for each record; its name is that of its first file. scales:
-    factors on the motion as the case prepares it; or levels: values of the intensity, in its unit.
-    intensity: "pga", "pgv", "pgd", "sa:T", "sa:T1" (T1 as ``vi-contact run --check`` tells it),
-    "arias", "cav", "housner", of the first motion. demands: "COLUMN" or "COLUMN:max", ":min",
-    ":absmax", ":last" of history.csv. limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
-    Raises InputError for other words, no motions, two of one name, not exactly one of scales and
-    levels.
+    Args:
+        case: shaken by GroundMotions alone, whose record files are replaced.
+        motions: a file, or one file per GroundMotion of the case, for each record; its name is that
+            of its first file.
+        demands: "COLUMN" or "COLUMN:max", ":min", ":absmax", ":last" of history.csv.
+        scales: factors on the motion as the case prepares it.
+        levels: in place of scales, values of the intensity, in its unit.
+        intensity: "pga", "pgv", "pgd", "sa:T", "sa:T1" (T1 as ``vi-contact run --check`` tells it),
+            "arias", "cav", "housner", of the first motion.
+        limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
+
+    Raises:
+        InputError: for other words, no motions, two of one name, not exactly one of scales and
+            levels.
     """
 
     case: Case
@@ -99,47 +112,56 @@ class IDA:
             raise InputError(
                 "demands is empty: give a column of history.csv, such as contact_uplift:max"
             )
-        _ = self.measure, self.wanted, self.shakings
+        # Words and files that are wrong are told now, and not by a run.
+        _ = self.measure
+        _ = self.wanted
+        _ = self.shakings
 
     @cached_property
     def measure(self) -> Intensity:
         """Return the intensity measure."""
-        return intensity(self.intensity, self._first_period)
+        return read_intensity(self.intensity, self._find_first_period)
 
-    def _first_period(self) -> float:
+    def _find_first_period(self) -> float:
+        """Return T1 of the case with the first record [s]; zero where it has no periods."""
         settings = (*self.case.settings, *self.shakings[0].settings(self.case))
-        model = describe(read_case(self.case.path, settings, allow=self.case.allowed), alone())
+        case = read_case(self.case.path, settings, allow=self.case.allowed)
+        model = describe(case, alone())
         return float(next(iter(model.get("periods", ())), 0.0))
 
     @property
     def wanted(self) -> list[Demand]:
         """Return the demand parameters, those of the limits among them."""
-        return list(
-            dict.fromkeys((*map(demand, self.demands), *(limit(text)[0] for text in self.limits)))
-        )
+        demands = [read_demand(text) for text in self.demands]
+        demands += [read_limit(text)[0] for text in self.limits]
+        return list(dict.fromkeys(demands))
 
     @property
     def shakings(self) -> list[Shaking]:
         """Return the motions by name."""
-        return shakings(self.case, self.motions)
+        return gather_shakings(self.case, self.motions)
 
     def runs(self, out: Path) -> list[OneRun]:
         """Return every record at every scale, record by record."""
-        return [
-            self._run(out, one, value)
-            for one in self.shakings
-            for value in (*self.scales, *self.levels)
-        ]
+        values = (*self.scales, *self.levels)
+        return [self._make_run(out, one, value) for one in self.shakings for value in values]
 
-    def _run(self, out: Path, shaking: Shaking, value: float) -> OneRun:
-        folder = out / RUNS / f"{shaking.name}_{self.measure.name if self.levels else 'x'}{value!r}"
+    def _make_run(self, out: Path, shaking: Shaking, value: float) -> OneRun:
+        """Return the run of a record at a scale or level; one that cannot run tells why.
+
+        Args:
+            out: the folder of the study.
+            shaking: the record.
+            value: the scale, or the level.
+        """
+        kind = self.measure.name if self.levels else "x"
+        folder = out / RUNS / f"{shaking.name}_{kind}{value!r}"
         try:
             record = shaking.record(self.case)
             factor = self.measure.scale(record, value) if self.levels else value
         except InputError as error:
-            return OneRun(
-                self.case, shaking, math.nan if self.levels else value, folder, str(error)
-            )
+            unknown = math.nan if self.levels else value
+            return OneRun(self.case, shaking, unknown, folder, str(error))
         return OneRun(self.case, shaking, factor, folder)
 
 
@@ -154,9 +176,7 @@ def run_ida(
     say: Callable[[str], None] = print,
     wall_time: str | None = None,
 ) -> list[Row]:
-    """Make the runs that have not finished yet, and table and figure of all.
-
-    The table and figure are of all that are in ``out``. Return its rows.
+    """Make the runs that have not finished yet, and table and figure of all that are in ``out``.
 
     Eight runs share a process and, where the body serves all excitations, its assembly and every
     pass over its matrices (``simulate_many``). What a run cannot do is told in its row, and the
@@ -175,11 +195,14 @@ def run_ida(
         wall_time: as of ``simulate``: every run gets what is left of it, and ends with a checkpoint
             before it is over.
 
+    Returns:
+        The rows of the table.
+
     Raises:
         InputError: a folder of another study, or in which the same part runs, a part or number of
             jobs that makes no sense, inside mpirun.
-        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to
-            go on.
+        KeyboardInterrupt: after the runs have been told to stop. Call again to go on.
+        OutOfTime: likewise.
     """
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
@@ -187,45 +210,68 @@ def run_ida(
             f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for "
             "i/n"
         )
-    out, end = Path(out), WallTime(wall_time)
-    _claim(study, out)
-    with lock_folder(SerialComm(), out, LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"):
+    out = Path(out)
+    end = WallTime(wall_time)
+    _claim_folder(study, out)
+    lock = LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"
+    with lock_folder(SerialComm(), out, lock):
         every = study.runs(out)
         mine = every[part[0] - 1 :: part[1]]
-        left = [run for run in mine if run.done() is None]
+        left = [run for run in mine if run.read_finished() is None]
         if left:
             _check_demands(study)
         say(
             f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished already"
         )
-        number, begin = 0, time.monotonic()
-        told = begin
-        for found in executed(left, jobs, launch, end):
-            now = time.monotonic()
-            if isinstance(found, float):
-                if now > told + SECONDS and found > 0.0:
-                    told = now
-                    seconds = int((now - begin) / found * (len(left) - found))
-                    say(
-                        f"{100.0 * found / len(left):.0f} % of the steps are done, "
-                        f"{timedelta(seconds=seconds)} left"
-                    )
-                continue
-            number, told = number + 1, now
-            _tell(study, out)
-            scale = (
-                "?"
-                if found["scale"] is None or math.isnan(found["scale"])
-                else f"{found['scale']:g}"
-            )
-            say(
-                f"[{number}/{len(left)}] {found['record']} x {scale}: {found['status']}"
-                + (f": {found['reason']}" if found["reason"] else "")
-            )
-        rows = _tell(study, out, draw=True)
+        progress = _Progress(len(left), say)
+        for news in execute_runs(left, jobs, launch, end):
+            if isinstance(news, float):
+                progress.tell_time_left(news)
+            else:
+                _write_table(study, out)
+                progress.tell_row(news)
+        rows = _write_table(study, out, draw=True)
         if study.limits:
-            _fragilities(study, out, rows, say)
+            _write_fragilities(study, out, rows, say)
         return rows
+
+
+class _Progress:
+    """Tell of the runs that end, and now and then of the time that is left.
+
+    Args:
+        count: of the runs.
+        say: takes a line.
+    """
+
+    def __init__(self, count: int, say: Callable[[str], None]) -> None:
+        self._count = count
+        self._say = say
+        self._number = 0  # of runs that have ended
+        self._begin = time.monotonic()
+        self._last = self._begin  # when the last line was said
+
+    def tell_time_left(self, done: float) -> None:
+        """Say the time that is left, SECONDS after the last line; ``done``: runs and parts of."""
+        now = time.monotonic()
+        if now > self._last + SECONDS and done > 0.0:
+            self._last = now
+            seconds = int((now - self._begin) / done * (self._count - done))
+            self._say(
+                f"{100.0 * done / self._count:.0f} % of the steps are done, "
+                f"{timedelta(seconds=seconds)} left"
+            )
+
+    def tell_row(self, row: Row) -> None:
+        """Say how a run has ended."""
+        self._last = time.monotonic()
+        self._number += 1
+        scale = row["scale"]
+        factor = "?" if scale is None or math.isnan(scale) else f"{scale:g}"
+        reason = f": {row['reason']}" if row["reason"] else ""
+        self._say(
+            f"[{self._number}/{self._count}] {row['record']} x {factor}: {row['status']}{reason}"
+        )
 
 
 def _check_demands(study: IDA) -> None:
@@ -237,52 +283,41 @@ def _check_demands(study: IDA) -> None:
         written = study.case.columns(alone())
     except InputError:
         return  # every run will say it, in its row
-    for one in study.wanted:
-        if one.column not in written:
+    for demand in study.wanted:
+        if demand.column not in written:
             raise InputError(
-                f"demand '{one.column}': the runs record no such column: "
-                f"{nearest(one.column, written)}"
+                f"demand '{demand.column}': the runs record no such column: "
+                f"{suggest_nearest(demand.column, written)}"
             )
 
 
-def _claim(study: IDA, out: Path) -> None:
+def _claim_folder(study: IDA, out: Path) -> None:
     """Note in the folder whose it is.
 
-    It raises InputError when the folder is another study's.
+    Raises:
+        InputError: for the folder of another study, and for files that no study has made.
     """
     case = _digest(to_json(study.case.tables).encode())
-    records = {
-        one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()]
-        for one in study.shakings
-    }
+    records = {shaking.name: _digest_files(shaking) for shaking in study.shakings}
     old = read_json(out / STUDY)
     if old is None:
-        if is_own(out / STUDY):
-            raise InputError(
-                f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, "
-                "or move this one away"
-            )
-        for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
-            if os.path.lexists(out / name):
-                raise InputError(
-                    f"'{out / name}' is not of a study of vi_contact, which would replace it "
-                    f"(there is no whole {STUDY} in '{out}'): choose another folder, or move the "
-                    "file"
-                )
+        _refuse_files_of_others(out)
     else:
-        kept = old.get("records")
-        if not isinstance(kept, dict) or "case" not in old:
+        old_records = old.get("records")
+        if not isinstance(old_records, dict) or "case" not in old:
             raise InputError(
                 f"'{out / STUDY}' is damaged: restore it, choose another folder, or delete this one"
             )
-        changed = [name for name, digests in records.items() if kept.get(name, digests) != digests]
+        changed = [
+            name for name, digests in records.items() if old_records.get(name, digests) != digests
+        ]
         if old["case"] != case or changed:
-            what = f"the record '{changed[0]}'" if changed else "the case"
+            subject = f"the record '{changed[0]}'" if changed else "the case"
             raise InputError(
-                f"'{out}' holds runs from before {what} was changed: choose another folder, or "
+                f"'{out}' holds runs from before {subject} was changed: choose another folder, or "
                 "delete it"
             )
-        records = kept | records
+        records = old_records | records
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_atomically(out / STUDY, to_json({"case": case, "records": records}).encode())
@@ -292,90 +327,135 @@ def _claim(study: IDA, out: Path) -> None:
         ) from None
 
 
+def _refuse_files_of_others(out: Path) -> None:
+    """Raise InputError for files that a study would replace, in a folder that is of none."""
+    if is_own(out / STUDY):
+        raise InputError(
+            f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, "
+            "or move this one away"
+        )
+    for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
+        if os.path.lexists(out / name):
+            raise InputError(
+                f"'{out / name}' is not of a study of vi_contact, which would replace it "
+                f"(there is no whole {STUDY} in '{out}'): choose another folder, or move the "
+                "file"
+            )
+
+
+def _digest_files(shaking: Shaking) -> list[str]:
+    """Return the checksums of the files of a record; a file that is missing is told by its runs."""
+    return [_digest(path.read_bytes()) for path in shaking.files if path.is_file()]
+
+
 def _digest(data: bytes) -> str:
+    """Return the checksum of a file."""
     return hashlib.sha256(data).hexdigest()
 
 
-def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
+def _write_table(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
     """Write table and units of all runs in the folder, and draw the figure."""
-    rows, units = _tabulated(study.case, inner_folder(out, RUNS), study.measure, study.wanted)
-    described = {
-        name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()
-    }
+    rows, units = _tabulate(study.case, inner_folder(out, RUNS), study.measure, study.wanted)
+    columns = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()}
     write_csv(out / TABLE, list(units), (list(row.values()) for row in rows))
-    write_atomically(out / COLUMNS, to_json(described).encode())
+    write_atomically(out / COLUMNS, to_json(columns).encode())
     if draw and any(row["status"] == "finished" for row in rows):
         panels = [
-            _panel(rows, study.measure.name, one.name, units[one.name]) for one in study.wanted
+            _make_panel(rows, study.measure.name, demand.name, units[demand.name])
+            for demand in study.wanted
         ]
         plot_ida(panels, out / FIGURE, unit=study.measure.unit, intensity=study.measure.meaning)
     return rows
 
 
-def _tabulated(
+def _tabulate(
     case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]
 ) -> tuple[list[Row], Units]:
-    """Return (rows by record and scale, column -> (unit, meaning)) of ended runs.
+    """Return the rows of all runs in the folder that have ended, and what their columns mean.
 
-    They are all runs in the folder that have ended; it is None for what a run has not measured.
-    InputError when a finished run has no such column.
+    Args:
+        case: of the study.
+        out: the folder of its runs.
+        measure: of the intensity.
+        demands: on the structure.
+
+    Returns:
+        Rows by record and scale, with None for what a run has not measured, and column -> (unit,
+        meaning).
+
+    Raises:
+        InputError: where a finished run has no column of a demand.
     """
-    folders = [out / name for name in sorted(os.listdir(out))] if out.is_dir() else []
-    own = [one for one in folders if one.is_dir() and not one.is_symlink()]
-    found = [(one, row) for one in own if (row := read_row(one / ROW)) is not None]
-    found.sort(
-        key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"])
-    )
-    units: Units = _FIRST_COLUMNS | {
-        measure.name: (measure.unit, f"{measure.meaning} of the scaled motion")
-    }
-    units |= {one.name: ("", one.meaning) for one in demands} | _LAST_COLUMNS
+    units: Units = dict(_FIRST_COLUMNS)
+    units[measure.name] = (measure.unit, f"{measure.meaning} of the scaled motion")
+    units |= {demand.name: ("", demand.meaning) for demand in demands} | _LAST_COLUMNS
     rows = []
-    for folder, row in found:
-        measured: Row = {measure.name: None} | {one.name: None for one in demands}
-        shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
+    for folder, row in _read_rows(out):
+        measured: Row = {measure.name: None} | {demand.name: None for demand in demands}
         if row["scale"] is not None:
+            # The intensity is that of the unscaled motion, times a power of the scale.
+            shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
             with suppress(InputError):
-                measured[measure.name] = (
-                    measure.of(shaking.record(case)) * row["scale"] ** measure.degree
-                )
+                unscaled = measure.compute(shaking.record(case))
+                measured[measure.name] = unscaled * row["scale"] ** measure.degree
         if row["status"] == "finished":
-            history, of_column = _history(folder, tuple(one.column for one in demands))
-            for one in demands:
-                measured[one.name] = one.of(history)
-                units[one.name] = (
-                    of_column[one.column][0],
-                    f"{one.meaning}: {of_column[one.column][1]}",
-                )
+            history, columns = _read_history(folder, tuple(demand.column for demand in demands))
+            for demand in demands:
+                measured[demand.name] = demand.compute(history)
+                unit, meaning = columns[demand.column]
+                units[demand.name] = (unit, f"{demand.meaning}: {meaning}")
         rows.append({name: measured.get(name, row.get(name)) for name in units})
     return rows, units
 
 
-@cache
-def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], Units]:
-    """Return the wanted columns of a finished run, read once.
+def _read_rows(out: Path) -> list[tuple[Path, Row]]:
+    """Return folder and row of the runs that have ended, by record and scale."""
+    folders = [out / name for name in sorted(os.listdir(out))] if out.is_dir() else []
+    rows: list[tuple[Path, Row]] = []
+    for folder in folders:
+        if folder.is_dir() and not folder.is_symlink():
+            row = read_row(folder / ROW)
+            if row is not None:
+                rows.append((folder, row))
+    rows.sort(key=lambda entry: _make_sort_key(entry[1]))
+    return rows
 
-    Where one of them is missing, it returns all names.
+
+def _make_sort_key(row: Row) -> tuple[str, float]:
+    """Return by what rows are sorted; those without a scale are the last of their record."""
+    return row["record"], math.inf if row["scale"] is None else row["scale"]
+
+
+@cache
+def _read_history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], Units]:
+    """Return the wanted columns of a finished run, read once, and what its columns mean.
+
+    Where one of them is missing, it returns all, whose names the error tells.
     """
     run = read_run(folder)
     numbers = {name: values for name, values in run.history.items() if np.ndim(values) == 1}
-    kept = {name: numbers[name] for name in wanted if name in numbers}
-    return (kept if len(kept) == len(set(wanted)) else numbers), dict(run.columns)
+    selected = {name: numbers[name] for name in wanted if name in numbers}
+    complete = len(selected) == len(set(wanted))
+    return selected if complete else numbers, dict(run.columns)
 
 
-def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str], None]) -> None:
+def _write_fragilities(
+    study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str], None]
+) -> None:
     """Fit, write and draw the curves of the limits, and say each.
 
     Where none can be fitted, it says why.
     """
-    found, table, measure = {}, [], study.measure
+    measure = study.measure
+    curves = {}
+    table = []
     for text in study.limits:
         try:
-            fit = fragility_curve(passing(rows, text, measure.name))
+            fit = fragility_curve(bracket_capacities(rows, text, measure.name))
         except InputError as error:
             say(f"fragility of {text}: {error}")
             continue
-        found[text] = fit.probability, fit.brackets
+        curves[text] = (fit.probability, fit.brackets)
         table.append(
             [text, fit.theta, *fit.intervals[0], fit.beta, *fit.intervals[1], len(fit.brackets)]
         )
@@ -394,17 +474,24 @@ def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str]
         "records",
     ]
     write_csv(out / FRAGILITY, names, table)
-    if found:
+    if curves:
         plot_fragility(
-            found,
+            curves,
             (out / FRAGILITY).with_suffix(".png"),
             unit=measure.unit,
             intensity=measure.meaning,
         )
 
 
-def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> DemandPanel:
-    """Return what one demand shows."""
+def _make_panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> DemandPanel:
+    """Return what the figure shows of one demand.
+
+    Args:
+        rows: of the table.
+        level: the column of the intensity.
+        name: the column of the demand.
+        column: unit and meaning of the demand.
+    """
     curves: dict[str, tuple[Array, Array]] = {}
     failed: list[float] = []
     known = sorted(
@@ -412,14 +499,11 @@ def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) 
     )
     for record in dict.fromkeys(row["record"] for row in rows):
         own = [row for row in known if row["record"] == record]
-        good = [
-            (row[level], row[name])
-            for row in own
-            if row["status"] == "finished" and math.isfinite(row[name])
-        ]
+        finished = [row for row in own if row["status"] == "finished"]
+        points = [(row[level], row[name]) for row in finished if math.isfinite(row[name])]
+        levels, values = np.array(points).reshape(-1, 2).T
+        curves[record] = (levels, values)
         failed += [row[level] for row in own if row["status"] != "finished"]
-        levels, values = np.array(good).reshape(-1, 2).T
-        curves[record] = levels, values
-    return DemandPanel(
-        column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed)
-    )
+    unit, meaning = column
+    title = meaning.partition(":")[0]
+    return DemandPanel(title, unit, curves, *compute_fractiles(curves, SHARES), tuple(failed))

@@ -24,20 +24,29 @@ _WAYS: dict[str, tuple[Callable[[Array], float], str]] = {
 
 @dataclass(frozen=True)
 class Intensity:
-    """Define an intensity measure: of(record) in ``unit``; a motion times f has f**degree of it."""
+    """Define an intensity measure; a motion times f has f**degree of it.
+
+    Attributes:
+        name: of its column.
+        unit: of its values.
+        meaning: in words.
+        degree: power of the scale in it [-].
+        compute: record -> value in ``unit``.
+    """
 
     name: str
     unit: str
     meaning: str
     degree: int
-    of: Callable[[Record], float]
+    compute: Callable[[Record], float]
 
     def scale(self, record: Record, level: float) -> float:
         """Return the factor that brings the record to this level.
 
-        It raises InputError unless both are positive.
+        Raises:
+            InputError: unless both are positive.
         """
-        value = self.of(record)
+        value = self.compute(record)
         if not (level > 0.0 and value > 0.0):
             raise InputError(
                 f"level {level:g} of {self.name}: the record has {value:g}; give levels above "
@@ -47,8 +56,8 @@ class Intensity:
 
 
 _MEASURES = {
-    one.name: one
-    for one in (
+    measure.name: measure
+    for measure in (
         Intensity("pga", "m/s²", "peak ground acceleration", 1, pga),
         Intensity("pgv", "m/s", "peak ground velocity", 1, pgv),
         Intensity("pgd", "m", "peak ground displacement", 1, pgd),
@@ -59,7 +68,7 @@ _MEASURES = {
 }
 
 
-def _seconds(text: str) -> float:
+def _read_seconds(text: str) -> float:
     """Return the number in a text; zero where there is none."""
     try:
         return float(text)
@@ -67,7 +76,7 @@ def _seconds(text: str) -> float:
         return 0.0
 
 
-def intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
+def read_intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
     """Return the measure of a word.
 
     Words are pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %), and
@@ -75,9 +84,10 @@ def intensity(text: str, first_period: Callable[[], float] | None = None) -> Int
     """
     word, _, period = text.partition(":")
     if word == "sa":
-        seconds = (
-            first_period() if period == "T1" and first_period is not None else _seconds(period)
-        )
+        if period == "T1" and first_period is not None:
+            seconds = first_period()
+        else:
+            seconds = _read_seconds(period)
         if not 0.0 < seconds < np.inf:
             raise InputError(
                 f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5"
@@ -98,6 +108,10 @@ class Demand:
     """Define a demand parameter: a column of history.csv and what of it counts.
 
     Values that are not a number do not.
+
+    Attributes:
+        column: of history.csv.
+        way: "max", "min", "absmax" or "last".
     """
 
     column: str
@@ -113,7 +127,7 @@ class Demand:
         """Return it in words."""
         return f"{_WAYS[self.way][1]} {self.column}"
 
-    def of(self, history: Mapping[str, Array]) -> float:
+    def compute(self, history: Mapping[str, Array]) -> float:
         """Return the value of a run; InputError for a column it has not recorded."""
         if self.column not in history:
             known = ", ".join(history)
@@ -123,7 +137,7 @@ class Demand:
         return _WAYS[self.way][0](np.asarray(history[self.column], dtype=float))
 
 
-def demand(text: str) -> Demand:
+def read_demand(text: str) -> Demand:
     """Return the demand of a word.
 
     It is "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last".
@@ -136,24 +150,32 @@ def demand(text: str) -> Demand:
     return Demand(column, way or "absmax")
 
 
-def fractiles(
+def compute_fractiles(
     curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]
 ) -> tuple[Array, Array]:
-    """Return (levels (n,), demands (n, shares)).
+    """Return fractiles over the records of the demand at equal intensity.
 
-    They are fractiles over the records of the demand at equal intensity.
+    Levels are those of all records in the range that every record covers (Vamvatsikos and Cornell,
+    Earthquake Engng Struct. Dyn. 31, 2002, section 5).
 
-    curves: record -> (intensities, demands), straight lines between them; the levels are those of
-    all records in the range that every record covers (Vamvatsikos and Cornell, Earthquake Engng
-    Struct. Dyn. 31, 2002, section 5). Empty for fewer than two records and where ranges do not
-    overlap.
+    Args:
+        curves: record -> (intensities, demands), straight lines between them.
+        shares: of the records below the fractiles.
+
+    Returns:
+        (levels (n,), demands (n, shares)); empty for fewer than two records and where ranges do not
+        overlap.
     """
     full = [(im[np.argsort(im)], edp[np.argsort(im)]) for im, edp in curves.values() if len(im)]
     if len(full) < 2:
         return np.zeros(0), np.zeros((0, len(shares)))
-    low, high = max(im[0] for im, _ in full), min(im[-1] for im, _ in full)
+
+    # Levels in the common range; those that round-off puts beside its ends are moved to them.
+    low = max(im[0] for im, _ in full)
+    high = min(im[-1] for im, _ in full)
     every = np.unique(np.concatenate([im for im, _ in full]))
     slack = 1e-9 * high
     levels = np.clip(every[(every >= low - slack) & (every <= high + slack)], low, max(low, high))
-    found = np.array([np.interp(levels, im, edp) for im, edp in full])
-    return levels, np.quantile(found, shares, axis=0).T
+
+    demands = np.array([np.interp(levels, im, edp) for im, edp in full])
+    return levels, np.quantile(demands, shares, axis=0).T

@@ -33,42 +33,60 @@ AGAIN = "ended the study: give the same command again to go on"
 _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")
 
 
-def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
-    """Return the command of these runs.
+def build_command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
+    """Return the command of these runs; each begins from its checkpoint if there is one.
 
-    Each begins from its checkpoint if there is one; it raises OutOfTime without wall time left.
+    Args:
+        runs: of one case.
+        launch: words in front, such as ("mpirun", "-n", "4").
+        end: of the wall time.
+
+    Raises:
+        OutOfTime: without wall time left.
     """
-    case, folders = runs[0].case, [one.folder for one in runs]
-    asked = {
+    case = runs[0].case
+    folders = [run.folder for run in runs]
+    request = {
         "case": str(case.path),
         "allow": case.allowed,
-        "settings": [one.settings for one in runs],
+        "settings": [run.settings for run in runs],
         "folders": [*map(str, folders)],
-        "restart": [is_own(one / CHECKPOINT) for one in folders],
+        "restart": [is_own(folder / CHECKPOINT) for folder in folders],
         "wall_time": None,
     }
     if end.text is not None:
-        if (left := int(end.left - ASIDE)) < 1:
+        left = int(end.left - ASIDE)
+        if left < 1:
             raise OutOfTime(f"{end.words} {AGAIN}")
-        asked["wall_time"] = f"{left // 60}:{left % 60:02d}"
-    return [*launch, sys.executable, "-m", "vi_contact.practice.cli.batch", json.dumps(asked)]
+        request["wall_time"] = f"{left // 60}:{left % 60:02d}"
+    return [*launch, sys.executable, "-m", "vi_contact.practice.cli.batch", json.dumps(request)]
 
 
-def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> subprocess.Popen[str]:
-    """Start them, in the environment without what MPI of this process may have put there."""
+def start_process(
+    runs: Sequence[OneRun], launch: Sequence[str], end: WallTime
+) -> subprocess.Popen[str]:
+    """Start the process of these runs, and remove what tells how they ended before.
+
+    Args:
+        runs: of one case.
+        launch: words in front of the command.
+        end: of the wall time.
+
+    Raises:
+        InputError: for words in front that are no program.
+        OutOfTime: without wall time left.
+    """
+    # The package of this process, and one thread, unless the user has asked for more.
     package = str(Path(__file__).resolve().parents[2])
-    way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = (
-        {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        | dict(os.environ)
-        | {"PYTHONPATH": way}
-    )
-    words = command(runs, launch, end)
-    for one in runs:
-        if read_row(one.folder / ROW) is not None:
-            remove(one.folder / ROW)
-        if is_marked(one.folder):
-            remove(one.folder / SUMMARY)
+    search_path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+    threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment = threads | dict(os.environ) | {"PYTHONPATH": search_path}
+    words = build_command(runs, launch, end)
+    for run in runs:
+        if read_row(run.folder / ROW) is not None:
+            remove(run.folder / ROW)
+        if is_marked(run.folder):
+            remove(run.folder / SUMMARY)
     try:
         return subprocess.Popen(
             words,
@@ -91,53 +109,72 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
 class Processes:
     """Keep the processes that go on, until they are all told to stop.
 
-    ``shares``: runs that each has made.
+    Several threads use it, each for one process at a time.
+
+    Attributes:
+        shares: process -> runs, and parts of runs, that it has made.
     """
 
     def __init__(self, launch: Sequence[str], end: WallTime) -> None:
-        self._launch, self._end = launch, end
-        self._stopped, self._lock = threading.Event(), threading.Lock()
+        self._launch = launch
+        self._end = end
+        self._stopped = threading.Event()
+        self._lock = threading.Lock()  # of what goes on, so that none begins after the stop
         self._going: set[subprocess.Popen[str]] = set()
         self.shares: dict[subprocess.Popen[str], float] = {}
 
-    def rows(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
+    def execute(self, runs: Sequence[OneRun]) -> Iterator[Row | None]:
         """Yield the row of each run as it ends, None when more is done.
 
         What a dead process has left is run one by one.
         """
         for _ in range(ATTEMPTS):
-            process, left = self._started(runs), list(runs)
-            said = yield from self._follow(process, runs, left)
+            process = self._start(runs)
+            left = list(runs)
+            other_lines = yield from self._follow(process, runs, left)
             self._forget(process)
             self.shares[process] = len(runs) - len(left)
             if process.returncode == os.EX_TEMPFAIL:
                 raise OutOfTime(f"{self._end.words} {AGAIN}")
             runs = left
-            if not left or process.returncode <= 0 or said:
+            # Only a process that fails without a word is tried again.
+            if not left or process.returncode <= 0 or other_lines:
                 break
         if len(runs) > 1:
-            for one in runs:
-                yield from self.rows([one])
+            for run in runs:
+                yield from self.execute([run])
         elif runs:
-            yield runs[0].keep("".join(said), process.returncode)
+            yield runs[0].keep("".join(other_lines), process.returncode)
 
     def _follow(
         self, process: subprocess.Popen[str], runs: Sequence[OneRun], left: list[OneRun]
     ) -> Generator[Row | None, None, list[str]]:
-        """Yield what a process tells, take runs that end from those left, return other lines."""
-        said = []
+        """Yield what a process tells, until it ends.
+
+        Args:
+            process: of the runs.
+            runs: in the order in which it numbers them.
+            left: the same; those that end are taken from it.
+
+        Yields:
+            The row of a run that ends; None when more is done.
+
+        Returns:
+            All other lines.
+        """
+        other_lines = []
         for line in process.stdout or ():
-            found = _read(line)
-            if "ended" in found:
-                one = runs[found["ended"]]
-                left.remove(one)
-                yield one.keep(found["said"], found["status"])
-            elif "share" in found:
-                self.shares[process] = found["share"] * len(runs)
+            news = _read_news(line)
+            if "ended" in news:
+                run = runs[news["ended"]]
+                left.remove(run)
+                yield run.keep(news["said"], news["status"])
+            elif "share" in news:
+                self.shares[process] = news["share"] * len(runs)
                 yield None
             else:
-                said.append(line)
-        return said
+                other_lines.append(line)
+        return other_lines
 
     def _forget(self, process: subprocess.Popen[str]) -> None:
         """Wait for the end of a process; KeyboardInterrupt where all were told to stop."""
@@ -147,11 +184,12 @@ class Processes:
             if self._stopped.is_set():
                 raise KeyboardInterrupt
 
-    def _started(self, runs: Sequence[OneRun]) -> subprocess.Popen[str]:
+    def _start(self, runs: Sequence[OneRun]) -> subprocess.Popen[str]:
+        """Start the process of these runs; KeyboardInterrupt where all were told to stop."""
         with self._lock:
             if self._stopped.is_set():
                 raise KeyboardInterrupt
-            process = started(runs, self._launch, self._end)
+            process = start_process(runs, self._launch, self._end)
             self._going.add(process)
         return process
 
@@ -159,61 +197,76 @@ class Processes:
         """Stop those that go on; none begins any more."""
         with self._lock:
             self._stopped.set()
-            left = list(self._going)
-        _stop(left)
+            going = list(self._going)
+        _stop(going)
 
 
-def executed(
+def execute_runs(
     runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime
 ) -> Iterator[Row | float]:
-    """Run them in so many processes at a time, and yield the row of each when it ends.
+    """Run processes, so many at a time, and yield the row of each run when it ends.
 
-    Between rows it yields how many have been made, with parts of runs. Left early, it stops those
-    that go on; OutOfTime when one has ended with its status.
+    Left early, it stops those that go on.
+
+    Args:
+        runs: of one case.
+        jobs: processes at the same time.
+        launch: words in front of their command; each run has a process of its own then.
+        end: of the wall time.
+
+    Yields:
+        Rows, and between them how many runs have been made, with parts of runs.
+
+    Raises:
+        OutOfTime: when a process has ended with its status.
     """
-    processes, told = Processes(launch, end), SimpleQueue[Row | BaseException | float]()
+    processes = Processes(launch, end)
+    news = SimpleQueue[Row | BaseException | float]()  # from the threads that follow processes
 
     def make(batch: Sequence[OneRun]) -> None:
         try:
-            for row in processes.rows(batch):
+            for row in processes.execute(batch):
                 # The sum of now, as others go on before it is read.
-                told.put(float(sum(list(processes.shares.values()))) if row is None else row)
+                news.put(float(sum(list(processes.shares.values()))) if row is None else row)
         except BaseException as error:
             # of any kind: it is raised again by the thread that waits for this one
-            told.put(error)
+            news.put(error)
 
+    # Runs that cannot run at all end at once.
     wrong = [run for run in runs if run.wrong]
     for run in wrong:
         yield run.keep(f"vi-contact: {run.wrong}", 1)
+
+    # The others go in batches, each in a process of its own.
     right = [run for run in runs if not run.wrong]
     size = 1 if launch else max(min(TOGETHER, -(-len(right) // jobs)), 1)
+    batches = [right[first : first + size] for first in range(0, len(right), size)]
     with ThreadPoolExecutor(jobs) as pool:
-        futures = [
-            pool.submit(make, right[first : first + size]) for first in range(0, len(right), size)
-        ]
+        futures = [pool.submit(make, batch) for batch in batches]
         try:
             ended = 0
             while ended < len(right):
-                found = told.get()
-                if isinstance(found, BaseException):
-                    raise found
-                if isinstance(found, float):
-                    yield len(wrong) + found
+                item = news.get()
+                if isinstance(item, BaseException):
+                    raise item
+                if isinstance(item, float):
+                    yield len(wrong) + item
                 else:
                     ended += 1
-                    yield found
+                    yield item
         finally:
             processes.stop()
             for future in futures:
                 future.cancel()
 
 
-def _read(line: str) -> dict[str, Any]:
-    """Return what the process of ``command`` tells in a line of JSON; empty for other lines."""
-    with suppress(ValueError):
-        found = json.loads(line)
-        return found if isinstance(found, dict) else {}
-    return {}
+def _read_news(line: str) -> dict[str, Any]:
+    """Return what a process tells in a line of JSON; empty for other lines."""
+    try:
+        news = json.loads(line)
+    except ValueError:
+        return {}
+    return news if isinstance(news, dict) else {}
 
 
 def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
