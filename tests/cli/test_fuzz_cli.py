@@ -24,7 +24,7 @@ pytest.importorskip("matplotlib")
 import vi_contact as vc
 from vi_contact import ground_motion
 from vi_contact.practice.cli.entry import main, parser
-from vi_contact.practice.cli.errors import printable
+from vi_contact.practice.cli.errors import escape_unprintable
 
 pytestmark = pytest.mark.serial
 SHAKING = """[[excitation]]
@@ -460,4 +460,7 @@ def test_a_dollar_in_a_title_is_no_formula(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_names_that_are_no_text_are_printed() -> None:
-    assert printable("a\udcff.at2") == "a\\udcff.at2" and printable("é") in ("é", "\\xe9")
+    assert escape_unprintable("a\udcff.at2") == "a\\udcff.at2" and escape_unprintable("é") in (
+        "é",
+        "\\xe9",
+    )

@@ -21,13 +21,15 @@ from ..studies.cases.case import Case, read_case
 from ..studies.cases.stages import leading
 from ..studies.cases.vocabulary import Parts
 from .entry import status_of
-from .errors import told, world
+from .errors import explain_errors, world
 
 Runs = dict[int, tuple[Case, dict[str, Any]]]  # by number, with arguments of Case.run
 SECONDS = 5.0  # between two shares
 
 
-def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) -> Iterator[Ended]:
+def make_runs(
+    asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]
+) -> Iterator[Ended]:
     """Yield (number, solution or error) as the runs end.
 
     Those of a body that serves all excitations go together.
@@ -36,8 +38,10 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
     every = zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
     for number, (settings, folder, restart) in enumerate(every):
         try:
-            case = told(partial(read_case, asked["case"], settings, allow=asked["allow"]), {})
-            told(case.check, {})
+            case = explain_errors(
+                partial(read_case, asked["case"], settings, allow=asked["allow"]), {}
+            )
+            explain_errors(case.check, {})
         except ViContactError as error:
             yield number, error
         else:
@@ -90,7 +94,7 @@ def main() -> None:
             told = time.monotonic()
             _print({"share": share})
 
-    for number, ended in results(json.loads(sys.argv[1]), world(), tell):
+    for number, ended in make_runs(json.loads(sys.argv[1]), world(), tell):
         error = isinstance(ended, ViContactError)
         _print(
             {"ended": number, "status": int(error), "said": f"vi-contact: {ended}" if error else ""}

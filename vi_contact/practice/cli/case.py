@@ -213,7 +213,7 @@ def _run(options: argparse.Namespace) -> str:
                 f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of "
                 "the two out"
             )
-        return _checked(case, comm, Path(out))
+        return _check_model(case, comm, Path(out))
     found = case.run(
         comm,
         out=out,
@@ -225,7 +225,7 @@ def _run(options: argparse.Namespace) -> str:
     return f"{name}\n{found.summary()}\noutput: {out}" if comm.rank == 0 else ""
 
 
-def _checked(case: "Case", comm: Any, folder: Path) -> str:
+def _check_model(case: "Case", comm: Any, folder: Path) -> str:
     """Describe and draw the model of a case.
 
     It raises InputError for what is wrong with it, once all the rest is told.

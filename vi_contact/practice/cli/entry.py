@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from ...core.errors import Interrupted, OutOfTime, ViContactError
 from ...core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
+from .errors import Parser, check_words, explain_errors, fail_together, keep_streams, say, world
 from .ida import add_ida_commands
 
 _DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
-        if text := told(lambda: options.run(options), getattr(options, "spelling", {})):
+        if text := explain_errors(lambda: options.run(options), getattr(options, "spelling", {})):
             say(text)
 
     return status_of(command)
@@ -82,23 +82,23 @@ def status_of(call: Callable[[], object]) -> int:
     """
     keep_streams()
     try:
-        told(call, {})
+        explain_errors(call, {})
     except ViContactError as error:
         fail_together(str(error))
-        return _stopped(error, 1)
+        return _print_error(error, 1)
     except KeyboardInterrupt as error:
         stopped = error if isinstance(error, Interrupted) else Interrupted()
         # on all ranks: a launcher kills what is left when the first one has failed
         if isinstance(error, OutOfTime):
             fail_together(str(error))
-        return _stopped(stopped, stopped.status)
+        return _print_error(stopped, stopped.status)
     except Exception:  # a defect: its traceback is shown, and the other ranks end too
         fail_together(traceback.format_exc())
         raise
     return 0
 
 
-def _stopped(error: BaseException, status: int) -> int:
+def _print_error(error: BaseException, status: int) -> int:
     """Print the sentence of an error on the first rank; return the status."""
     if world().rank == 0:
         print(f"vi-contact: {error}", file=sys.stderr, flush=True)

@@ -56,7 +56,7 @@ class Parser(argparse.ArgumentParser):
         )
 
 
-def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
+def explain_errors(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     """Return what the call returns.
 
     It raises ViContactError of one sentence for errors of memory, files and sizes of numbers.
@@ -83,7 +83,7 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
         raise ViContactError(text) from error
 
 
-def printable(text: str) -> str:
+def escape_unprintable(text: str) -> str:
     """Return the text without what standard output cannot write.
 
     Such are names of files that are no UTF-8. It is also without characters that steer a terminal.
@@ -99,7 +99,7 @@ def say(text: str) -> None:
     Where nobody reads it any more (head has ended), it and all that follows is dropped.
     """
     try:
-        print(printable(text), flush=True)
+        print(escape_unprintable(text), flush=True)
     except BrokenPipeError:
         # or Python complains at its end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

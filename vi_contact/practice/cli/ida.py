@@ -43,13 +43,13 @@ def add_ida_commands(commands: Any) -> None:
     one_of = ida.add_mutually_exclusive_group(required=True)
     one_of.add_argument(
         "--scales",
-        type=_numbers,
+        type=_read_numbers,
         metavar="F,F,...",
         help="run each motion multiplied by each of these factors",
     )
     one_of.add_argument(
         "--levels",
-        type=_numbers,
+        type=_read_numbers,
         metavar="I,I,...",
         help=("scale each motion to each of these values of the intensity measure, in SI units"),
     )
@@ -104,7 +104,7 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--part",
-        type=_part,
+        type=_read_part,
         default="1/1",
         metavar="I/N",
         help="compute every N-th run only, beginning with run I; use it in job arrays",
@@ -126,7 +126,7 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def _read_numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(word) for word in text.split(","))
     except ValueError:
@@ -135,7 +135,7 @@ def _numbers(text: str) -> tuple[float, ...]:
         ) from None
 
 
-def _part(text: str) -> tuple[int, int]:
+def _read_part(text: str) -> tuple[int, int]:
     first, slash, count = text.partition("/")
     if not (slash and first.isdecimal() and count.isdecimal()):
         raise argparse.ArgumentTypeError(

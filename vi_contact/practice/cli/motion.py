@@ -19,7 +19,7 @@ from ..ground_motion.intensity import pga, record_info
 from ..ground_motion.record import LARGEST_PEAK, UNITS, Record, canonical_units
 from ..ground_motion.spectra import response_spectrum
 from ..plots.records import plot_motion, plot_spectra
-from .options import add_actions, add_command, output_file, spaced
+from .options import add_actions, add_command, output_file, space_numbers
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
@@ -116,7 +116,7 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--largest",
-        type=acceleration,
+        type=read_acceleration,
         metavar="A",
         help=(
             "accept peaks up to this acceleration (default 10g; a larger peak usually "
@@ -206,7 +206,7 @@ def _add_processing(parser: argparse.ArgumentParser) -> None:
     one_of = group.add_mutually_exclusive_group()
     one_of.add_argument("--scale", type=float, metavar="F", help="multiply the record by F")
     one_of.add_argument(
-        "--pga", type=acceleration, metavar="A", help="scale to this peak acceleration"
+        "--pga", type=read_acceleration, metavar="A", help="scale to this peak acceleration"
     )
     one_of.add_argument(
         "--arias", type=float, metavar="I", help="scale to this Arias intensity [m/s]"
@@ -288,7 +288,10 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
         ),
     )
     group.add_argument(
-        "--ag", type=acceleration, metavar="A", help="design ground acceleration on ground type A"
+        "--ag",
+        type=read_acceleration,
+        metavar="A",
+        help="design ground acceleration on ground type A",
     )
     group.add_argument(
         "--ec8-type", type=int, choices=[1, 2], default=1, help="spectrum type (default 1)"
@@ -319,7 +322,7 @@ def _add_spectrum_output(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def acceleration(text: str) -> float:
+def read_acceleration(text: str) -> float:
     """Read metres per second squared from "3.0", "0.3g", "0.3 g" or "300gal"."""
     match = _QUANTITY.fullmatch(text.strip())
     try:
@@ -337,7 +340,7 @@ def _read(options: argparse.Namespace, path: str) -> Record:
     asked = {one.name: getattr(options, one.name) for one in fields(Processing)}
     if (words := options.psa) is not None:
         try:
-            asked["psa"] = acceleration(words[0]), (period := float(words[1]))
+            asked["psa"] = read_acceleration(words[0]), (period := float(words[1]))
             if not 0.0 < period < math.inf:
                 raise ValueError(words[1])
         except (argparse.ArgumentTypeError, ValueError):
@@ -358,10 +361,10 @@ def _read(options: argparse.Namespace, path: str) -> Record:
 
 
 def _info(options: argparse.Namespace) -> str:
-    return "\n\n".join(_told(_read(options, path)) for path in options.file)
+    return "\n\n".join(_describe_record(_read(options, path)) for path in options.file)
 
 
-def _told(record: Record) -> str:
+def _describe_record(record: Record) -> str:
     """Return the table of a record, and where its data come from.
 
     These are its units, its time step and its number of samples.
@@ -410,7 +413,7 @@ def _plot(options: argparse.Namespace) -> str:
 def _spectrum(options: argparse.Namespace) -> str:
     units = canonical_units("--out-units", options.out_units)
     target = _target(options)
-    periods = spaced("--periods", options.periods)
+    periods = space_numbers("--periods", options.periods)
     spectra, steps, rows = {}, {}, []
     for path in options.file:
         record = _read(options, path)

@@ -80,7 +80,7 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", help="output folder of a run")
 
 
-def spaced(option: str, values: Sequence[float]) -> Any:
+def space_numbers(option: str, values: Sequence[float]) -> Any:
     """Read FROM, TO, N as N logarithmically spaced numbers.
 
     It raises InputError for others, before memory is taken.

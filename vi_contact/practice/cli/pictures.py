@@ -169,7 +169,7 @@ def _report(options: argparse.Namespace) -> str:
 def _plot(options: argparse.Namespace) -> str:
     from ..plots.bodies import draw_run
 
-    run, frames, title, times = _opened(options)
+    run, frames, title, times = _open_run(options)
     out = output_file(Path(options.out or options.folder) / "deformed.png").parent
     return "\n".join(
         map(str, draw_run(run, out, title=title, times=times, magnified=options.magnified))
@@ -179,7 +179,7 @@ def _plot(options: argparse.Namespace) -> str:
 def _film(options: argparse.Namespace) -> str:
     from ..plots.bodies import film
 
-    run, frames, title, times = _opened(options)
+    run, frames, title, times = _open_run(options)
     out = output_file(options.out or Path(options.folder) / "film.gif")
     if times is not None:
         times = [t for t in frames.t.tolist() if times[0] <= t <= times[-1]]
@@ -188,7 +188,7 @@ def _film(options: argparse.Namespace) -> str:
     )
 
 
-def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | None]:
+def _open_run(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | None]:
     """Return the run, its frames, its title, and the moments.
 
     These are the moments asked for, which have to be within the run.

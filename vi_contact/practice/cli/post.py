@@ -16,7 +16,7 @@ from ..engineering import (
     write_peaks,
 )
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
-from .options import PICTURES, add_actions, add_command, add_folder, output_file, spaced
+from .options import PICTURES, add_actions, add_command, add_folder, output_file, space_numbers
 
 if TYPE_CHECKING:
     from ...run.files.reading import RunFolder
@@ -168,7 +168,11 @@ def _peaks(options: argparse.Namespace) -> str:
 
 
 def _spectrum(options: argparse.Namespace) -> str:
-    run, periods, table = _run(options), spaced("--periods", options.periods), _table_path(options)
+    run, periods, table = (
+        _run(options),
+        space_numbers("--periods", options.periods),
+        _table_path(options),
+    )
     more = {"damping": options.damping, "relative": options.relative}
     spectra = {name: floor_spectrum(run.history, name, periods, **more) for name in options.columns}
     write_csv(
@@ -191,7 +195,9 @@ def _spectrum(options: argparse.Namespace) -> str:
 
 def _transfer(options: argparse.Namespace) -> str:
     run, table = _run(options), _table_path(options)
-    given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
+    given = (
+        None if options.frequencies is None else space_numbers("--frequencies", options.frequencies)
+    )
     found = transfer_function(
         run.history,
         options.surface,

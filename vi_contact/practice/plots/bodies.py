@@ -19,19 +19,27 @@ from ...core.checks import number, optional
 from ...core.errors import InputError
 from ...core.files import frames_of, write_output
 from ...run.files.reading import ContactGeometry, RunFolder
-from .deformed import contact_states, nearest, plane_normals, read_frames
+from .deformed import contact_states, find_nearest, plane_normals, read_frames
 from .faces import (
     Painter,
     add_polygons,
-    faces_of,
-    leading,
-    limit,
-    moments,
+    choose_times,
+    find_leading_column,
     name_states,
     plot_faces,
+    set_limits,
     sheet,
+    split_faces,
 )
-from .histories import STYLE, plain, require_matplotlib, save, scale, scaled, shaken
+from .histories import (
+    STYLE,
+    escape_dollars,
+    list_shaken_axes,
+    require_matplotlib,
+    save,
+    scale,
+    scale_values,
+)
 
 # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
 DRAWN = 0.1
@@ -69,7 +77,7 @@ class Scene:
     states: Array
 
     @classmethod
-    def of(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
+    def read(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
         """Read the frames next to ``times``.
 
         ``magnified`` is a round number that shows the displacements when None.
@@ -81,7 +89,7 @@ class Scene:
                 "space"
             )
         optional(number, "pictures of a run", "magnified", magnified, positive=True)
-        found = frames.t[np.unique(nearest(frames.t, times))]
+        found = frames.t[np.unique(find_nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2
         corners, cells = (frames.cells, np.arange(len(frames.cells))) if plane else frames.boundary
         contact = run.contact if "pressure" in history else None
@@ -94,7 +102,7 @@ class Scene:
             float(np.ptp(frames.points[seen], axis=0).max()),
             float(np.linalg.norm(u, axis=2).max()),
         )
-        rows, pressure = nearest(history["t"], found), np.zeros((len(found), 0))
+        rows, pressure = find_nearest(history["t"], found), np.zeros((len(found), 0))
         states = pressure
         if contact is not None:
             pressure, states = history["pressure"][rows], contact_states(history)[rows]
@@ -119,7 +127,7 @@ class Scene:
         along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
         return "y" if along[1 % len(along)] > along[-1] else "z"
 
-    def moved(self, k: int) -> Array:
+    def displace(self, k: int) -> Array:
         """Return where the nodes are drawn at the time number k, (s, d) [m]."""
         return np.asarray(self.points + self.magnified * self.u[k])
 
@@ -146,7 +154,7 @@ class Scene:
         Each has edges of a colour of its own. In the plane there are dots inside of them with the
         contact pressure, or the ``states`` of the points, those of both sides of a corner apart.
         """
-        moved, colours = self.moved(k), self.stresses.colours(self.stress[k])
+        moved, colours = self.displace(k), self.stresses.colours(self.stress[k])
         flat, polygons = moved.shape[1] == 2, moved[self.polygons]
         colours = np.full_like(colours, 0.95) if states else colours
         if not flat:
@@ -155,13 +163,13 @@ class Scene:
         thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
         every = (self.points + self.magnified * self.u).reshape(-1, moved.shape[1])
-        limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
+        set_limits(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
             painter, values = (
                 (Painter.of_states(), self.states) if states else (self.pressures, self.pressure)
             )
-            painter.dots(axis, moved[self.nodes] - inwards, values[k])
+            painter.draw_dots(axis, moved[self.nodes] - inwards, values[k])
 
 
 def _round_down(factor: float) -> float:
@@ -189,7 +197,7 @@ def plot_deformed(
     ``magnified``: how many times larger displacements are drawn; None: a round number that shows
     them. InputError for a run without fields or in one dimension.
     """
-    scene = Scene.of(run, moments(run.history) if times is None else times, magnified)
+    scene = Scene.read(run, choose_times(run.history) if times is None else times, magnified)
     flat = scene.points.shape[1] == 2
     with_states = flat and scene.contact is not None
     figure, axes = sheet([flat] * (1 + with_states), len(scene.times), (4.2, 3.8))
@@ -197,17 +205,17 @@ def plot_deformed(
         for k, axis in enumerate(line):
             scene.draw(axis, k, states=row > 0)
             axis.set_title(f"t = {scene.times[k]:.4g} s", fontsize=9)
-    scene.stresses.bar(figure, list(axes[0]), extend="max")
+    scene.stresses.draw_bar(figure, list(axes[0]), extend="max")
     if with_states:
-        scene.pressures.bar(figure, list(axes[0]))
+        scene.pressures.draw_bar(figure, list(axes[0]))
         name_states(figure, "slip" in run.history)
-    return save(figure, path, _headed(title, scene))
+    return save(figure, path, _compose_title(title, scene))
 
 
-def _headed(title: str, scene: Scene) -> str:
+def _compose_title(title: str, scene: Scene) -> str:
     """Return a title on lines that fit above the picture."""
     told = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
-    return "\n".join(wrap(plain(title) + told, 64))
+    return "\n".join(wrap(escape_dollars(title) + told, 64))
 
 
 @checked
@@ -243,9 +251,9 @@ def film(
         raise InputError(
             "an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif"
         )
-    scene = Scene.of(run, _around(run) if times is None else times, magnified)
+    scene = Scene.read(run, _choose_film_times(run) if times is None else times, magnified)
     flat, contact = scene.points.shape[1] == 2, scene.contact
-    faces = [] if flat or contact is None else faces_of(contact, scene.sides)
+    faces = [] if flat or contact is None else split_faces(contact, scene.sides)
     writer = (PillowWriter if Path(path).suffix == ".gif" else FFMpegWriter)(fps=fps)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.6 + 3.4 * len(faces), 6.0), layout="constrained")
@@ -256,12 +264,15 @@ def film(
             figure.add_subplot(grid[0, i], projection=None if plane else "3d")
             for i, plane in enumerate(planes)
         ]
-        marker = _trace(
-            figure.add_subplot(grid[1, :]), run, column or leading(run.history)[0], scene.times
+        marker = _draw_trace(
+            figure.add_subplot(grid[1, :]),
+            run,
+            column or find_leading_column(run.history)[0],
+            scene.times,
         )
-        scene.stresses.bar(figure, axes[0], extend="max", shrink=0.85)
+        scene.stresses.draw_bar(figure, axes[0], extend="max", shrink=0.85)
         if contact is not None:
-            scene.pressures.bar(figure, axes[-1], shrink=0.85)
+            scene.pressures.draw_bar(figure, axes[-1], shrink=0.85)
         with TemporaryDirectory() as place:
             draft = Path(place) / Path(path).name
             with writer.saving(figure, str(draft), dpi=95):
@@ -274,7 +285,8 @@ def film(
                         axis.set_title(face.name, fontsize=9)
                     marker.set_xdata([t, t])
                     figure.suptitle(
-                        _headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10
+                        _compose_title(f"{title}, t = {t:.4g} s".removeprefix(", "), scene),
+                        fontsize=10,
                     )
                     if k == 0:
                         figure.draw_without_rendering()
@@ -285,15 +297,15 @@ def film(
     return Path(path)
 
 
-def _around(run: RunFolder) -> list[float]:
+def _choose_film_times(run: RunFolder) -> list[float]:
     """Return the times of the frames next to the one in which most happens."""
     t = read_frames(run).t
-    (middle,) = nearest(t, [moments(run.history)[1]])
+    (middle,) = find_nearest(t, [choose_times(run.history)[1]])
     first = max(min(middle - FILM_FRAMES // 2, len(t) - FILM_FRAMES), 0)
     return list(t[first : first + FILM_FRAMES])
 
 
-def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
+def _draw_trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     """Draw a column of the history and, dashed the ground's acceleration.
 
     It is that during the film. The moment's line is returned.
@@ -301,14 +313,14 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     history = run.history
     if column not in run.columns or np.ndim(history.get(column, 0)) != 1:
         raise InputError(f"the run has no column '{column}': see columns.json in its folder")
-    values, unit = scaled(history[column], run.columns[column][0])
+    values, unit = scale_values(history[column], run.columns[column][0])
     axis.plot(history["t"], values, color="black", lw=1.0)
     shown = times if len(times) > 1 else history["t"]
     axis.set(xlabel="time [s]", xlim=(shown[0], shown[-1]))
     axis.set_ylabel(f"{column} [{unit}]", fontsize=8)
-    if shaken(history):
+    if list_shaken_axes(history):
         behind = axis.twinx()
-        for ground in shaken(history):
+        for ground in list_shaken_axes(history):
             behind.plot(history["t"], history[f"a_g_{ground}"], color="0.6", lw=0.9, ls="--")
         behind.set_ylabel("$a_g$ [m/s²]", color="0.4")
     return axis.axvline(times[0], color="tab:red", lw=1.2)

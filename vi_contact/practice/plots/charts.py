@@ -17,7 +17,7 @@ from ..engineering.floor_spectra import recorded_motion
 from ..ground_motion.processing import filtered
 from ..ground_motion.record import Record
 from ..ground_motion.spectra import response_spectrum
-from .histories import LEDGER, panels, plain_numbers, scaled, shaken
+from .histories import LEDGER, list_shaken_axes, panels, plain_numbers, scale_values
 from .records import SAMPLES_A_PERIOD
 
 # of the largest energy: terms below it are not drawn; of the size of a column: that is constant
@@ -60,48 +60,50 @@ class Chart:
     log_y: bool = False
     bound: float | None = None
 
-    def shortened(self, names: int) -> "Chart":
+    def shorten(self, names: int) -> "Chart":
         """Return the chart with its first so many names."""
         kept = list(dict.fromkeys(line.name for line in self.lines))[:names]
         return replace(self, lines=tuple(line for line in self.lines if line.name in kept))
 
 
-def motion_charts(run: Run) -> list[Chart]:
+def chart_motion(run: Run) -> list[Chart]:
     """Return the ground's acceleration in a run, and its response spectrum.
 
     There are none where it was at rest.
     """
-    ground = [f"a_g_{axis}" for axis in shaken(run.history)]
+    ground = [f"a_g_{axis}" for axis in list_shaken_axes(run.history)]
     if not ground:
         return []
-    found = [of_columns(run, ground, "ground acceleration")]
+    found = [chart_columns(run, ground, "ground acceleration")]
     return found + ([_spectrum(run, ground)] if len(run.history["t"]) > 2 else [])
 
 
-def history_charts(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart]:
+def chart_histories(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart]:
     """Return a chart for every title whose columns move.
 
     They are those of the first of its beginnings of names that do.
     """
     charts = []
     for title, prefixes in groups.items():
-        found = next(filter(None, (varying(run, prefix) for prefix in prefixes)), [])
+        found = next(filter(None, (list_varying(run, prefix) for prefix in prefixes)), [])
         if found:
             unit = run.columns[found[0]][0]
             charts.append(
-                of_columns(run, [name for name in found if run.columns[name][0] == unit], title)
+                chart_columns(run, [name for name in found if run.columns[name][0] == unit], title)
             )
     return charts
 
 
-def of_columns(run: Run, names: Sequence[str], title: str) -> Chart:
+def chart_columns(run: Run, names: Sequence[str], title: str) -> Chart:
     """Return the histories of columns of one unit, with a prefix that fits."""
-    values, unit = scaled(np.array([run.history[name] for name in names]), run.columns[names[0]][0])
+    values, unit = scale_values(
+        np.array([run.history[name] for name in names]), run.columns[names[0]][0]
+    )
     lines = [Line(name, run.history["t"], one) for name, one in zip(names, values, strict=True)]
     return Chart(title, "time [s]", f"[{unit}]", tuple(lines))
 
 
-def chosen_charts(run: Run, columns: Sequence[Sequence[str]]) -> list[Chart]:
+def chart_groups(run: Run, columns: Sequence[Sequence[str]]) -> list[Chart]:
     """Return a chart for each group of columns.
 
     InputError for columns that do not exist, or of different units.
@@ -114,10 +116,10 @@ def chosen_charts(run: Run, columns: Sequence[Sequence[str]]) -> list[Chart]:
             raise InputError(
                 f"columns {', '.join(group)} have different units: draw one chart for each unit"
             )
-    return [of_columns(run, group, ", ".join(group)) for group in columns]
+    return [chart_columns(run, group, ", ".join(group)) for group in columns]
 
 
-def varying(run: Run, prefix: str) -> list[str]:
+def list_varying(run: Run, prefix: str) -> list[str]:
     """Return the columns of this beginning that are not constant, those that vary most first."""
     ways = {name: _range(run, name) for name in run.columns if name.startswith(prefix)}
     return sorted((name for name in ways if ways[name] > 0.0), key=lambda name: -ways[name])
@@ -139,7 +141,7 @@ def _spectrum(run: Run, names: Sequence[str]) -> Chart:
     lines = []
     for name in names:
         record = recorded_motion(run.history, name)
-        periods = shown_periods(record)
+        periods = choose_periods(record)
         psa = response_spectrum(record, periods).psa / STANDARD_GRAVITY
         trusted = periods >= SAMPLES_A_PERIOD * record.dt
         lines += [Line(name, periods[trusted], psa[trusted]), Line(name, periods, psa, pale=True)]
@@ -147,7 +149,7 @@ def _spectrum(run: Run, names: Sequence[str]) -> Chart:
     return Chart(title, "period [s]", "pseudo-acceleration [g]", tuple(lines), log_x=True)
 
 
-def shown_periods(record: Record) -> Array:
+def choose_periods(record: Record) -> Array:
     """Return the periods [s] of a spectrum.
 
     They go from 0.02 s, for what is short is what structures with contact feel, to twice the
@@ -157,7 +159,7 @@ def shown_periods(record: Record) -> Array:
     return np.geomspace(FIRST_PERIOD, min(last, 10.0) if record.duration > 1.0 else last, 150)
 
 
-def smoothed(run: Run, name: str) -> tuple[Record, Record, float]:
+def smooth_acceleration(run: Run, name: str) -> tuple[Record, Record, float]:
     """Return an acceleration raw and low-passed, with the corner [Hz].
 
     The filter is Butterworth's of order 4, forward and backward.
@@ -170,15 +172,23 @@ def smoothed(run: Run, name: str) -> tuple[Record, Record, float]:
     return raw, filtered(raw, high=corner), corner
 
 
-def acceleration_chart(run: Run, name: str, raw: Record, smooth: Record, corner: float) -> Chart:
-    """Return an absolute acceleration low-passed and, pale, raw, as ``smoothed`` gives them."""
-    values, unit = scaled(np.array([smooth.acceleration, raw.acceleration]), "m/s²")
+def chart_acceleration(run: Run, name: str, raw: Record, smooth: Record, corner: float) -> Chart:
+    """Chart an absolute acceleration low-passed and, pale, raw.
+
+    Args:
+        run: Solution or RunFolder that recorded it.
+        name: column of the acceleration, such as a_x_top.
+        raw: as ``smooth_acceleration`` returns it.
+        smooth: likewise, low-passed.
+        corner: corner frequency of the filter [Hz].
+    """
+    values, unit = scale_values(np.array([smooth.acceleration, raw.acceleration]), "m/s²")
     t = run.history["t"][0] + raw.times
     lines = Line(f"below {corner:.3g} Hz", t, values[0]), Line("raw", t, values[1], pale=True)
     return Chart(f"{name}, low-passed and raw", "time [s]", f"[{unit}]", lines)
 
 
-def energy_chart(run: Run) -> Chart | None:
+def chart_energy(run: Run) -> Chart | None:
     """Return the terms of the ledger; None where there is no energy."""
     if "energy_defect" not in run.history or not np.any(
         run.history["energy_kinetic"] + run.history["energy_strain"]
@@ -190,7 +200,7 @@ def energy_chart(run: Run) -> Chart | None:
     present = [
         entry for entry in LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())
     ]
-    values, unit = scaled(np.array([run.history[name] for name, *_ in present]), "J")
+    values, unit = scale_values(np.array([run.history[name] for name, *_ in present]), "J")
     lines = [
         Line(label, run.history["t"], one, colour=colour, style=style)
         for one, (_, label, colour, style) in zip(values, present, strict=True)
@@ -198,7 +208,7 @@ def energy_chart(run: Run) -> Chart | None:
     return Chart("energy", "time [s]", f"[{unit}]", tuple(lines))
 
 
-def certificate_chart(run: Run) -> Chart:
+def chart_certificate(run: Run) -> Chart:
     """Return the worst residual of every step, and the tolerance.
 
     Exact zeros are drawn at the bottom, at 1e-18.
@@ -285,13 +295,13 @@ def plot_overview(run: Run) -> Any:
         "give a Solution, or what read_run returns",
     )
     probes = [name for name in run.history if name.startswith("u_")][:CURVES]
-    charts = [of_columns(run, probes, "displacement")] if probes else []
+    charts = [chart_columns(run, probes, "displacement")] if probes else []
     charts += (
-        [of_columns(run, ["contact_resultant"], "contact force")]
+        [chart_columns(run, ["contact_resultant"], "contact force")]
         if "contact_resultant" in run.history
         else []
     )
-    charts += [*filter(None, [energy_chart(run)]), certificate_chart(run)]
+    charts += [*filter(None, [chart_energy(run)]), chart_certificate(run)]
     figure, axes = panels(len(charts), (9.0, 2.0 * len(charts)))
     for axis, chart in zip(axes, charts, strict=True):
         draw_chart(axis, chart)

@@ -51,7 +51,7 @@ class StoredFrames:
 
         They are those of the frame nearest to t; stresses are NaN where the run has none.
         """
-        (row,) = nearest(self.t, [t])
+        (row,) = find_nearest(self.t, [t])
         path, group = self.places[row]
         with _opened(path) as file:
             frame, unknown = file[group], np.full(len(self.cells), np.nan)
@@ -123,7 +123,7 @@ def plane_normals(polygons: Array) -> Array:
     return np.asarray(normals / np.where(sizes > 0.0, sizes, 1.0))
 
 
-def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
+def find_nearest(t: Array, times: Sequence[float] | Array) -> Indices:
     """Return the rows of ``t`` next to each of ``times`` [s].
 
     InputError for no times, or what is none.
@@ -155,7 +155,7 @@ def contact_states(history: Mapping[str, Array]) -> Array:
     return np.where(active, np.where(moved, SLIP, STICK), OPEN)
 
 
-def stored_tangents(contact: Geometry) -> Array:
+def compute_tangents(contact: Geometry) -> Array:
     """Return the tangents (m, d, d - 1) of slip and traction_t in a history.
 
     What is at one place is one node.

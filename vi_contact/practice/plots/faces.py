@@ -17,8 +17,17 @@ from ...core.step import AXES
 from ...meshes.rows import connected
 from ...run.files.reading import RunFolder
 from ...run.recorders.contact_parts import Geometry, tangent_vectors
-from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
-from .histories import STYLE, History, length_unit, plain, require_matplotlib, save, scale
+from .deformed import (
+    OPEN,
+    SAME,
+    SLIP,
+    STICK,
+    compute_tangents,
+    contact_states,
+    find_nearest,
+    read_frames,
+)
+from .histories import STYLE, History, escape_dollars, length_unit, require_matplotlib, save, scale
 
 ARROW = 0.15  # of the size of the face: how long the longest arrow is
 NEIGHBOURS = 24  # nearest points that make one face if they point the same way
@@ -41,7 +50,7 @@ class Face:
     parts: Array
     owners: Indices
 
-    def seen(self, vectors: Array) -> Array:
+    def project(self, vectors: Array) -> Array:
         """Return vectors (..., 3) in the plane of the face, (..., 2).
 
         They are as they are where it is curved.
@@ -49,7 +58,7 @@ class Face:
         return vectors if self.axes is None else vectors @ self.axes
 
 
-def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
+def split_faces(contact: Geometry, sides: Indices) -> list[Face]:
     """Return the faces of a contact surface.
 
     They are points near to each other whose directions differ by less than 30°; pieces in one plane
@@ -73,20 +82,20 @@ def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
     for key, pieces in planes.items():
         own, flat = np.sort(np.concatenate(pieces)), isinstance(key, tuple)
         normal, mine = normals[own[:1]], sides[np.all(np.isin(sides, own), axis=1)]
-        name = f"face towards {direction(normal[0])}" if flat else "curved face"
+        name = f"face towards {name_direction(normal[0])}" if flat else "curved face"
         axes = tangent_vectors(normal, np.zeros(1, dtype=np.int64))[0] if flat else None
-        found.append(Face(name, own, points[own], axes, shares(points[mine]), mine.ravel()))
+        found.append(Face(name, own, points[own], axes, cut_shares(points[mine]), mine.ravel()))
     return found
 
 
-def shares(corners: Array) -> Array:
+def cut_shares(corners: Array) -> Array:
     """Return the parts (n corners, 4, 3) of sides (n, corners, 3), each around a corner."""
     before, after = (0.5 * (corners + np.roll(corners, way, axis=1)) for way in (1, -1))
     middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
     return np.stack([corners, after, middle, before], axis=2).reshape(-1, 4, 3)
 
 
-def direction(way: Array) -> str:
+def name_direction(way: Array) -> str:
     """Return the name of a direction (d,): its axis with its sign, or its components."""
     axis = int(np.argmax(np.abs(way)))
     if abs(way[axis]) > 1.0 - SAME:
@@ -143,7 +152,7 @@ class Painter:
         """Return the colours (…, 4) of values (…)."""
         return np.asarray(self.cmap(self.norm(self.factor * values)))
 
-    def bar(self, figure: Any, axes: Any, **look: Any) -> None:
+    def draw_bar(self, figure: Any, axes: Any, **look: Any) -> None:
         """Draw the colour bar beside axes."""
         from matplotlib.cm import ScalarMappable
 
@@ -157,16 +166,16 @@ class Painter:
         """
         if len(face.parts):
             look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.7", "linewidths": 0.2}
-            parts = add_polygons(axis, face.seen(face.parts), **look)
+            parts = add_polygons(axis, face.project(face.parts), **look)
             parts.set_array(self.factor * values[face.owners])
         else:
-            self.dots(axis, face.seen(face.points), values[face.conditions])
-        names = AXES if face.axes is None else [direction(way) for way in face.axes.T]
-        seen = face.seen(face.points)
+            self.draw_dots(axis, face.project(face.points), values[face.conditions])
+        names = AXES if face.axes is None else [name_direction(way) for way in face.axes.T]
+        seen = face.project(face.points)
         # with room for arrows
-        limit(axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW)
+        set_limits(axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW)
 
-    def dots(self, axis: Any, places: Array, values: Array) -> None:
+    def draw_dots(self, axis: Any, places: Array, values: Array) -> None:
         """Draw values (k,) as dots at places (k, d)."""
         look = {
             "norm": self.norm,
@@ -188,7 +197,7 @@ def add_polygons(axis: Any, polygons: Array, **look: Any) -> Any:
     return axis.add_collection(PolyCollection(polygons, **look))
 
 
-def limit(
+def set_limits(
     axis: Any,
     low: Array,
     high: Array,
@@ -223,7 +232,7 @@ def limit(
         axis.set_aspect("equal")
 
 
-def leading(history: History) -> tuple[str, int]:
+def find_leading_column(history: History) -> tuple[str, int]:
     """Return the column and the row that tell when most happens.
 
     Of uplift, largest pressure and displacements it is the first one that is not largest in size at
@@ -242,9 +251,9 @@ def leading(history: History) -> tuple[str, int]:
     return next((found for found in most if found[1] > 0), ("iterations", 0))
 
 
-def moments(history: History) -> list[float]:
-    """Return the first time, the one when most happens (``leading``), and the last."""
-    return history["t"][[0, leading(history)[1], -1]].tolist()
+def choose_times(history: History) -> list[float]:
+    """Return the first time, the one when most happens (``find_leading_column``), and the last."""
+    return history["t"][[0, find_leading_column(history)[1], -1]].tolist()
 
 
 @checked
@@ -273,11 +282,11 @@ def plot_faces(
         if frames_of(run.folder)
         else np.zeros((0, 3), dtype=np.int64)
     )
-    faces = faces_of(contact, sides)
-    rows = nearest(history["t"], sorted({*moments(history)}) if times is None else times)
+    faces = split_faces(contact, sides)
+    rows = find_nearest(history["t"], sorted({*choose_times(history)}) if times is None else times)
     states, slip = contact_states(history)[rows], np.zeros((len(rows), *contact.points.shape))
     if "slip" in history:
-        slip += np.einsum("rmj,mij->rmi", history["slip"][rows], stored_tangents(contact))
+        slip += np.einsum("rmj,mij->rmi", history["slip"][rows], compute_tangents(contact))
     slip[states == OPEN] = 0.0
     figure, axes = sheet(
         [face.axes is not None for face in faces for _ in "ab"], len(rows), (3.4, 2.8)
@@ -294,9 +303,9 @@ def plot_faces(
             Painter.of_states().draw(under, face, states[column])
             _arrows(under, face, drawn * slip[column])
             over.set_title(f"{face.name}, t = {history['t'][row]:.4g} s", fontsize=9)
-    painter.bar(figure, list(axes.ravel()))
+    painter.draw_bar(figure, list(axes.ravel()))
     name_states(figure, "slip" in history, longest)
-    return save(figure, path, plain(title))
+    return save(figure, path, escape_dollars(title))
 
 
 def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tuple[Any, Array]:
@@ -330,7 +339,7 @@ def _arrows(axis: Any, face: Face, slip: Array) -> None:
     )
     if own.any():
         flat = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 3}
-        ends, ways = face.seen(face.points[own]).T, face.seen(slip[face.conditions[own]]).T
+        ends, ways = face.project(face.points[own]).T, face.project(slip[face.conditions[own]]).T
         axis.quiver(*ends, *ways, color="black", **(flat if face.axes is not None else {"lw": 0.8}))
 
 

@@ -53,7 +53,7 @@ def plain_numbers(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def plain(text: str) -> str:
+def escape_dollars(text: str) -> str:
     """Return a text of a file or a user as it is to be drawn: a dollar begins no formula."""
     return text.replace("$", r"\$")
 
@@ -69,7 +69,7 @@ def length_unit(size: float) -> tuple[float, str]:
     return _UNITS[-1] if size > 0.0 else _UNITS[0]
 
 
-def scaled(values: Array, unit: str) -> tuple[Array, str]:
+def scale_values(values: Array, unit: str) -> tuple[Array, str]:
     """Return the values over the power of 1000, and the unit with its prefix.
 
     The power is the one that fits their size; "-" has no prefix.
@@ -91,11 +91,11 @@ def scaled(values: Array, unit: str) -> tuple[Array, str]:
 
 def scale(size: float, unit: str) -> tuple[float, str]:
     """Return (factor, unit with its prefix) for values up to this size that are drawn together."""
-    shown, prefixed = scaled(np.array([size]), unit)
+    shown, prefixed = scale_values(np.array([size]), unit)
     return float(shown[0]) / size if size else 1.0, prefixed
 
 
-def shaken(history: History) -> list[str]:
+def list_shaken_axes(history: History) -> list[str]:
     """Return the axes along which the ground was accelerated."""
     return [axis for axis in "xyz" if np.any(history.get(f"a_g_{axis}", 0.0))]
 
@@ -118,11 +118,11 @@ def write_picture(figure: Any, path: str | Path, **more: Any) -> Path:
         raise InputError(
             f"'{path}' is no picture that matplotlib writes: give a name that ends in .{endings}"
         )
-    write_output(path, image_of(figure, path.suffix.lower()[1:], **more))
+    write_output(path, render_image(figure, path.suffix.lower()[1:], **more))
     return path
 
 
-def image_of(figure: Any, kind: str = "png", **more: Any) -> bytes:
+def render_image(figure: Any, kind: str = "png", **more: Any) -> bytes:
     """Return a picture as the bytes of a file of this kind."""
     image = BytesIO()
     figure.savefig(image, format=kind, dpi=130, **more)

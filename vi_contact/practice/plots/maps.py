@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices
-from .histories import cell_edges, scaled
+from .histories import cell_edges, scale_values
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate
 NO_GAP = 1e-15  # of the length of the contact line
@@ -39,7 +39,7 @@ def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, st
         return np.asarray(place - place.min()), "length along the surface [m]"
     if normals is not None:
         points = np.column_stack([points, STRAIGHT * float(np.ptp(points, axis=0).max()) * normals])
-    order = chain(points)
+    order = order_points(points)
     lengths = np.concatenate(
         [[0.0], np.cumsum(np.linalg.norm(np.diff(points[order], axis=0), axis=1))]
     )
@@ -48,7 +48,7 @@ def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, st
     return place, "arc length [m]"
 
 
-def chain(points: Array) -> Indices:
+def order_points(points: Array) -> Indices:
     """Order the points from the highest (leftmost) one, each time to the nearest that is left."""
     size = float(np.ptp(points, axis=0).max()) or 1.0
     top = points[:, 1] >= points[:, 1].max() - STRAIGHT * size
@@ -60,7 +60,7 @@ def chain(points: Array) -> Indices:
     return np.array(order)
 
 
-def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
+def thin_rows(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
     """Return at most ``rows`` instants.
 
     Of neighbours it takes the value of every point that is largest in size, so that peaks stay.
@@ -90,13 +90,13 @@ def draw_map(
 
     Points at the same place (corners) stand side by side in their order.
     """
-    image, prefixed, _ = coloured(axis, t, position, values, unit, colours)
+    image, prefixed, _ = draw_cells(axis, t, position, values, unit, colours)
     axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
     axis.set(xlabel="time [s]", ylabel=axis_label)
     axis.set_title(f"{title} [{prefixed}] (white: none)", loc="left")
 
 
-def coloured(
+def draw_cells(
     axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str
 ) -> tuple[Any, str, bool]:
     """Draw values in colours.
@@ -107,7 +107,7 @@ def coloured(
     from matplotlib import colormaps
 
     order = np.argsort(position, kind="stable")
-    shown, prefixed = scaled(values[:, order], unit)
+    shown, prefixed = scale_values(values[:, order], unit)
     size = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
     pulling = bool(np.any(shown < 0.0))
     palette = colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
@@ -149,7 +149,7 @@ def _map(axis: Any, run: Any, column: str, unit: str) -> None:
     position, label = arc_position(run.contact.points, run.contact.normals)
     values = np.reshape(run.history[column], (len(run.history["t"]), -1))
     open_gap = column == "gap"
-    t, shown = thinned(run.history["t"], np.maximum(values, 0.0) if open_gap else values)
+    t, shown = thin_rows(run.history["t"], np.maximum(values, 0.0) if open_gap else values)
     draw_map(
         axis,
         t,

@@ -34,7 +34,7 @@ class _Pages:
         self.figure, self.y, self.count = Figure(figsize=PAGE), SIDE, self.count + 1
         self._text(SIDE, PAGE[1] - 0.4, f"{self.foot}, page {self.count}", 6.5, color="0.45")
 
-    def room(self, height: float) -> None:
+    def make_room(self, height: float) -> None:
         """Turn the page where so much [inches] no longer fits."""
         if self.y + height > PAGE[1] - FOOT:
             self.file.savefig(self.figure)
@@ -43,19 +43,19 @@ class _Pages:
     def _text(self, x: float, y: float, text: str, size: float, **look: Any) -> None:
         self.figure.text(x / PAGE[0], 1.0 - y / PAGE[1], text, fontsize=size, va="top", **look)
 
-    def words(self, text: str, size: float = 8.0, keep: float = 0.0, **look: Any) -> None:
+    def write_words(self, text: str, size: float = 8.0, keep: float = 0.0, **look: Any) -> None:
         """Write a paragraph, on one page with ``keep`` [inches] of what follows."""
         lines, step = wrap(text, int(WIDE * 72.0 / (0.53 * size))) or [""], 1.35 * size / 72.0
-        self.room(step * len(lines) + keep)
+        self.make_room(step * len(lines) + keep)
         self._text(SIDE, self.y, "\n".join(lines), size, linespacing=1.2, **look)
         self.y += step * len(lines) + 0.05
 
-    def table(self, table: Table) -> None:
+    def write_table(self, table: Table) -> None:
         """Write a table as wide as its texts; those of a cell that is too wide on several lines."""
         from matplotlib.lines import Line2D
 
         if table.title:
-            self.words(table.title, 7.5, keep=0.5, style="italic")
+            self.write_words(table.title, 7.5, keep=0.5, style="italic")
         rows = [[str(cell) for cell in row] for row in (table.header, *table.rows)]
         widths = [min(70, max(len(row[k]) for row in rows) + 2) for k in range(len(table.header))]
         while sum(widths) * LETTER > WIDE:
@@ -63,7 +63,7 @@ class _Pages:
         for number, row in enumerate(rows):
             cells = [wrap(cell, max(width - 1, 1)) for cell, width in zip(row, widths, strict=True)]
             height, x = LINE * max(1, *map(len, cells)) + 0.03, SIDE
-            self.room(height)
+            self.make_room(height)
             for cell, width in zip(cells, widths, strict=True):
                 self._text(
                     x,
@@ -84,10 +84,10 @@ class _Pages:
             )
         self.y += 0.12
 
-    def panels(self, panels: Sequence[Chart | Drawing], height: float, beside: int) -> None:
+    def draw_panels(self, panels: Sequence[Chart | Drawing], height: float, beside: int) -> None:
         """Draw so many axes beside each other, the rows of them so high [inches]."""
         for first in range(0, len(panels), beside):
-            self.room(height + 0.75)
+            self.make_room(height + 0.75)
             for place, panel in enumerate(panels[first : first + beside]):
                 wide = WIDE / beside
                 box = (
@@ -97,19 +97,17 @@ class _Pages:
                     height,
                 )
                 axis = self.figure.add_axes([one / PAGE[k % 2] for k, one in enumerate(box)])
-                draw_chart(axis, panel.shortened(CURVES)) if isinstance(panel, Chart) else panel(
-                    axis
-                )
+                draw_chart(axis, panel.shorten(CURVES)) if isinstance(panel, Chart) else panel(axis)
             self.y += height + 0.75
 
-    def picture(self, path: Path) -> None:
+    def place_picture(self, path: Path) -> None:
         """Place a PNG as wide as the page, or as high as half of it."""
         from matplotlib.image import imread
 
         image = imread(BytesIO(read_bytes(path)), format="png")
         wide = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
         high = wide * image.shape[0] / image.shape[1]
-        self.room(high)
+        self.make_room(high)
         axis = self.figure.add_axes(
             (SIDE / PAGE[0], 1.0 - (self.y + high) / PAGE[1], wide / PAGE[0], high / PAGE[1])
         )
@@ -133,24 +131,24 @@ def write_pages(
     written, about = BytesIO(), {"Title": title, "CreationDate": None}
     with matplotlib.rc_context(STYLE | fonts), PdfPages(written, metadata=about) as file:
         pages = _Pages(file, foot)
-        pages.words(title, 15.0, weight="bold")
-        pages.table(Table(("", ""), facts))
+        pages.write_words(title, 15.0, weight="bold")
+        pages.write_table(Table(("", ""), facts))
         for section in sections:
             pages.y += 0.12
-            pages.words(
+            pages.write_words(
                 section.title,
                 11.0,
                 keep=1.2 if section.sentences or section.tables else 4.0,
                 weight="bold",
             )
             for sentence in section.sentences:
-                pages.words(sentence)
+                pages.write_words(sentence)
             for table in section.tables:
-                pages.table(table)
-            pages.panels(section.charts, HEIGHT, 2)
-            pages.panels(section.drawings, 1.6 * HEIGHT, 1)
+                pages.write_table(table)
+            pages.draw_panels(section.charts, HEIGHT, 2)
+            pages.draw_panels(section.drawings, 1.6 * HEIGHT, 1)
             for picture in section.pictures:
-                pages.picture(picture)
+                pages.place_picture(picture)
         file.savefig(pages.figure)
     write_output(path, written.getvalue())
     return path

@@ -20,7 +20,15 @@ from ..ground_motion.intensity import arias, d5_95, husid, pga
 from ..ground_motion.processing import integrated
 from ..ground_motion.record import UNITS, Record, canonical_units
 from ..ground_motion.spectra import ResponseSpectrum
-from .histories import canvas, length_unit, panels, plain, plain_numbers, save, scaled
+from .histories import (
+    canvas,
+    escape_dollars,
+    length_unit,
+    panels,
+    plain_numbers,
+    save,
+    scale_values,
+)
 
 SAMPLES_A_PERIOD = (
     10  # a spectrum is drawn pale at periods with fewer samples of the record than this
@@ -40,19 +48,19 @@ def plot_motion(
     units = canonical_units("plot_motion: units", units)
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
-    _line(
+    _draw_history(
         axes[0],
         record.times,
         record.acceleration / UNITS[units],
-        f"acceleration [{_pretty(units)}]",
+        f"acceleration [{_typeset_unit(units)}]",
     )
     quantities = (velocity, "velocity", "/s"), (displacement, "displacement", "")
     for axis, (values, quantity, per_second) in zip(axes[1:3], quantities, strict=True):
-        metres, unit = _size(values)
-        _line(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
-    _husid(axes[3], record)
+        metres, unit = _choose_length_unit(values)
+        _draw_history(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
+    _draw_husid(axes[3], record)
     axes[0].set_title(
-        plain(title if title is not None else record.title or record.source), fontsize=10
+        escape_dollars(title if title is not None else record.title or record.source), fontsize=10
     )
     axes[-1].set_xlim(0.0, record.duration)
     return save(figure, path)
@@ -96,7 +104,9 @@ def plot_spectra(
             (bottom, spectrum.displacement / metres),
         ):
             known = np.where(spectrum.periods >= first[label], values, np.nan)
-            (line,) = axis.plot(spectrum.periods, known, lw=1.2, color=colour, label=plain(label))
+            (line,) = axis.plot(
+                spectrum.periods, known, lw=1.2, color=colour, label=escape_dollars(label)
+            )
             colour = line.get_color()
             axis.plot(spectrum.periods, values, lw=0.8, color=colour, alpha=0.35)
     if target is not None:
@@ -119,7 +129,7 @@ def plot_spectra(
     top.legend(fontsize=8)
     for axis in (top, bottom):
         axis.set_ylim(bottom=0.0)
-    top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=plain(title))
+    top.set(ylabel=f"pseudo-acceleration [{_typeset_unit(units)}]", title=escape_dollars(title))
     bottom.set(
         ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max())
     )
@@ -140,18 +150,20 @@ def plot_loop(
     The title says the work at the end.
     """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
-    across, x_unit = scaled(loop.deformation, x[1])
-    up, y_unit = scaled(loop.force, y[1])
+    across, x_unit = scale_values(loop.deformation, x[1])
+    up, y_unit = scale_values(loop.force, y[1])
     axis.axhline(0.0, color="0.6", lw=0.6)
     axis.axvline(0.0, color="0.6", lw=0.6)
     axis.plot(across, up, color="black", lw=0.8)
     axis.plot(across[:1], up[:1], "o", color="tab:green", ms=5, label="start")
     axis.plot(across[-1:], up[-1:], "s", color="tab:red", ms=5, label="end")
     axis.legend(fontsize=8)
-    work, unit = scaled(loop.work[-1:], "J")
+    work, unit = scale_values(loop.work[-1:], "J")
     title = title or f"work {work[0]:.3g} {unit}"
     axis.set(
-        xlabel=plain(f"{x[0]} [{x_unit}]"), ylabel=plain(f"{y[0]} [{y_unit}]"), title=plain(title)
+        xlabel=escape_dollars(f"{x[0]} [{x_unit}]"),
+        ylabel=escape_dollars(f"{y[0]} [{y_unit}]"),
+        title=escape_dollars(title),
     )
     return save(figure, path)
 
@@ -174,11 +186,11 @@ def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> P
     )
     finite = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
     axis.set_ylim(0.5 * float(finite.min()), 2.0 * float(finite.max()))
-    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=plain(title))
+    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=escape_dollars(title))
     return save(figure, path)
 
 
-def _line(axis: Any, times: Array, values: Array, label: str) -> None:
+def _draw_history(axis: Any, times: Array, values: Array, label: str) -> None:
     """Return a history with its peak marked and written."""
     axis.plot(times, values, color="black", lw=0.7)
     peak = int(np.argmax(np.abs(values)))
@@ -199,7 +211,7 @@ def _line(axis: Any, times: Array, values: Array, label: str) -> None:
     axis.set_ylabel(label)
 
 
-def _husid(axis: Any, record: Record) -> None:
+def _draw_husid(axis: Any, record: Record) -> None:
     """Accumulated Arias intensity in percent, the significant duration shaded."""
     curve = husid(record)
     if curve[-1] > 0.0:
@@ -215,7 +227,7 @@ def _husid(axis: Any, record: Record) -> None:
     axis.set(ylabel="Arias intensity [%]", ylim=(-3.0, 103.0))
 
 
-def _size(values: Array) -> tuple[float, str]:
+def _choose_length_unit(values: Array) -> tuple[float, str]:
     """Return the unit of length that fits.
 
     There are centimetres in place of hundreds of millimetres, as is usual for ground motions.
@@ -224,5 +236,5 @@ def _size(values: Array) -> tuple[float, str]:
     return (0.01, "cm") if 0.001 <= peak < 10.0 else length_unit(peak)
 
 
-def _pretty(units: str) -> str:
+def _typeset_unit(units: str) -> str:
     return units.replace("s2", "s²")

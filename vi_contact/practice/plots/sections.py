@@ -19,7 +19,7 @@ from ...run.solution import energy_warning
 from ..engineering.peak_values import peaks
 from . import charts
 from .charts import Chart
-from .histories import LEDGER, scaled
+from .histories import LEDGER, scale_values
 from .maps import Drawing, maps_of
 from .report_words import (
     CHARTS,
@@ -70,9 +70,9 @@ def sections_of(
             f"the run in '{run.folder}' has no steps yet: report on it when it has some"
         )
     histories = (
-        charts.history_charts(run, CHARTS)
+        charts.chart_histories(run, CHARTS)
         if columns is None
-        else charts.chosen_charts(run, columns)
+        else charts.chart_groups(run, columns)
     )
     found = [
         _model(model),
@@ -89,26 +89,26 @@ def sections_of(
 NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Return a number with four digits, a dash for none."""
     return "-" if np.isnan(value) else f"{value:.4g}"
 
 
-def words(value: Any, depth: int = 9) -> str:
+def format_value(value: Any, depth: int = 9) -> str:
     """Return a value of a file as it is read by people.
 
     What is nested deeper than anybody would is left out.
     """
     if isinstance(value, Mapping) and depth:
-        return ", ".join(f"{key} = {words(one, depth - 1)}" for key, one in value.items())
+        return ", ".join(f"{key} = {format_value(one, depth - 1)}" for key, one in value.items())
     if isinstance(value, list | tuple | Mapping):
-        return ", ".join(words(one, depth - 1) for one in value) if depth else "…"
+        return ", ".join(format_value(one, depth - 1) for one in value) if depth else "…"
     if isinstance(value, float):
         return f"{value:.5g}"
     return "-" if value is None else shorten(str(value), 200, placeholder=" …")
 
 
-def table_of(title: str, rows: Any) -> list[Table]:
+def tabulate(title: str, rows: Any) -> list[Table]:
     """Return the table of objects that a file lists.
 
     It has a column for each of their keys; there is none for anything else.
@@ -118,7 +118,7 @@ def table_of(title: str, rows: Any) -> list[Table]:
     )
     header = list(dict.fromkeys(key for one in given for key in one if key not in NOT_SHOWN))
     return (
-        [Table(header, [[words(one.get(key)) for key in header] for one in given], title)]
+        [Table(header, [[format_value(one.get(key)) for key in header] for one in given], title)]
         if given
         else []
     )
@@ -126,16 +126,20 @@ def table_of(title: str, rows: Any) -> list[Table]:
 
 def _model(model: Mapping[str, Any]) -> Section:
     tables = [
-        table for title, key in MODEL_TABLES.items() for table in table_of(title, model.get(key))
+        table for title, key in MODEL_TABLES.items() for table in tabulate(title, model.get(key))
     ]
-    said = [text.format(words(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)]
+    said = [
+        text.format(format_value(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)
+    ]
     warnings = model.get("warnings")
-    said += [f"Warning: {words(one)}." for one in (warnings if isinstance(warnings, list) else ())]
+    said += [
+        f"Warning: {format_value(one)}." for one in (warnings if isinstance(warnings, list) else ())
+    ]
     return Section("Model and contact", said, tables)
 
 
 def _motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
-    records, shown = table_of("records (SI units)", model.get("records")), charts.motion_charts(run)
+    records, shown = tabulate("records (SI units)", model.get("records")), charts.chart_motion(run)
     said = []
     if shown:
         peaks = {
@@ -178,15 +182,15 @@ def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Itera
             continue  # the thrust on a level part has no height
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
-        shown, unit = scaled(values, run.columns[name][0])
+        shown, unit = scale_values(values, run.columns[name][0])
         yield [
             title,
             name,
             unit,
-            number(shown[row]),
-            number(t[row]),
-            number(shown[0]),
-            number(shown[-1]),
+            format_number(shown[row]),
+            format_number(t[row]),
+            format_number(shown[0]),
+            format_number(shown[-1]),
         ]
 
 
@@ -200,27 +204,35 @@ def _safety(run: RunFolder) -> Iterable[list[str]]:
         if not np.isnan(used).all() and np.nanmax(used) > 0.0:
             row = int(np.nanargmax(used))
             last = 1.0 / used[-1] if used[-1] > 0.0 else np.inf
-            yield [name[7:], number(1.0 / used[row]), number(run.history["t"][row]), number(last)]
+            yield [
+                name[7:],
+                format_number(1.0 / used[row]),
+                format_number(run.history["t"][row]),
+                format_number(last),
+            ]
 
 
 def _accelerations(run: RunFolder) -> Section:
     """Accelerations of probes, low-passed beside raw."""
     names = (
-        [name for axis in "xyz" for name in charts.varying(run, f"a_{axis}_")]
+        [name for axis in "xyz" for name in charts.list_varying(run, f"a_{axis}_")]
         if len(run.history["t"]) > 20
         else []
     )
     title, rows, found = (
         "Accelerations, low-passed and raw",
         [],
-        {name: charts.smoothed(run, name) for name in names},
+        {name: charts.smooth_acceleration(run, name) for name in names},
     )
     # the same for all: they have the run's step
     corner = max((corner for _, _, corner in found.values()), default=0.0)
     for name, (raw, smooth, _) in found.items():
         low, high = (float(np.max(np.abs(one.acceleration))) for one in (smooth, raw))
         rows.append(
-            [name, *map(number, (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY))]
+            [
+                name,
+                *map(format_number, (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY)),
+            ]
         )
     said, below = SAY["accelerations"].format(corner=corner), f"peak below {corner:.3g} Hz [m/s²]"
     table = Table(
@@ -228,7 +240,7 @@ def _accelerations(run: RunFolder) -> Section:
         rows,
         sortable=True,
     )
-    shown = [charts.acceleration_chart(run, name, *found[name]) for name in names[:2]]
+    shown = [charts.chart_acceleration(run, name, *found[name]) for name in names[:2]]
     return Section(title, [said], [table], shown) if rows else Section(title)
 
 
@@ -244,13 +256,13 @@ def _certificate(run: RunFolder) -> Section:
                 why=facts.get("reason") or facts.get("status") or "killed, or going on"
             )
         )
-    energy = charts.energy_chart(run)
+    energy = charts.chart_energy(run)
     tables = []
     if energy is not None:
         ends = {name: float(history[name][-1]) for name, *_ in LEDGER if name in history}
         most = float(np.max(history["energy_kinetic"] + history["energy_strain"]))
         rows = [
-            [label, number(ends[name]), number(ends[name] / most)]
+            [label, format_number(ends[name]), format_number(ends[name] / most)]
             for name, label, *_ in LEDGER
             if ends.get(name)
         ]
@@ -258,13 +270,18 @@ def _certificate(run: RunFolder) -> Section:
         defect = float(np.max(np.abs(history["energy_defect"]))) / most
         said.append(SAY["ledger"].format(defect=defect, most=most))
     said += [f"Warning: {one}." for one in (energy_warning(facts), facts.get("sampling")) if one]
-    shown = [one for one in (energy, charts.certificate_chart(run)) if one is not None]
+    shown = [one for one in (energy, charts.chart_certificate(run)) if one is not None]
     return Section("Certificate and energies in words", said, tables, shown)
 
 
 def _peaks(run: RunFolder) -> Section:
     rows = [
-        [one.name, one.quantity, one.unit, *map(number, (one.max, one.t_max, one.min, one.t_min))]
+        [
+            one.name,
+            one.quantity,
+            one.unit,
+            *map(format_number, (one.max, one.t_max, one.min, one.t_min)),
+        ]
         for one in peaks(run.history, run.columns)
     ]
     return Section(
@@ -288,7 +305,9 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
         "mean": facts.get("iterations_per_step", {}).get("mean", np.nan),
     }
     known: dict[str, Any] = defaultdict(lambda: "-")
-    known |= {key: number(one) if isinstance(one, float) else one for key, one in facts.items()}
+    known |= {
+        key: format_number(one) if isinstance(one, float) else one for key, one in facts.items()
+    }
     return [
         (name, shorten(text.format_map(known), 78, placeholder=" …"))
         for name, text in SUMMARY.items()

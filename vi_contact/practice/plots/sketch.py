@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from .faces import add_polygons, limit, sheet
-from .histories import plain
+from .faces import add_polygons, set_limits, sheet
+from .histories import escape_dollars
 
 # what holds the bodies
 LINES = ("tab:green", "tab:blue", "tab:purple", "tab:brown", "tab:olive", "tab:cyan")
@@ -40,7 +40,7 @@ def sketch(model: Mapping[str, Any]) -> Any:
             *np.full((max(d, 2), 1), np.nan),
             lw=3.0,
             color=LINES[k % len(LINES)],
-            label=plain(words),
+            label=escape_dollars(words),
         )
         colours |= dict.fromkeys(one["groups"], LINES[k % len(LINES)])
     for one in model["outline"]:
@@ -53,7 +53,9 @@ def sketch(model: Mapping[str, Any]) -> Any:
         )
     for k, one in enumerate(model["contact"]):
         dots = {"ls": "", "marker": "o", "ms": 3.0, "color": DOTS[k % len(DOTS)]}
-        axis.plot(*_points(one["places"], d).T, label=plain(f"contact: {one['name']}"), **dots)
+        axis.plot(
+            *_points(one["places"], d).T, label=escape_dollars(f"contact: {one['name']}"), **dots
+        )
         for kind, places in one.get("others", {}).items():
             if kind in MARKS:
                 marker, colour = MARKS[kind]
@@ -65,11 +67,11 @@ def sketch(model: Mapping[str, Any]) -> Any:
                     "mec": colour,
                     "mew": 1.4,
                 }
-                words = plain(f"{one['name']}: {len(places)} {kind}")
+                words = escape_dollars(f"{one['name']}: {len(places)} {kind}")
                 axis.plot(*_points(places, d).T, label=words, zorder=5, **marks)
     ends = np.concatenate([_points(one["lines"], d) for one in model["outline"]])
-    limit(axis, ends.min(axis=0), ends.max(axis=0), margin=0.06)
-    axis.set_title(plain(model["title"]))
+    set_limits(axis, ends.min(axis=0), ends.max(axis=0), margin=0.06)
+    axis.set_title(escape_dollars(model["title"]))
     axis.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
     return figure
 

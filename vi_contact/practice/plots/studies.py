@@ -10,7 +10,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.arguments import checked
 from ...core.units import STANDARD_GRAVITY
-from .histories import canvas, plain, save, scale
+from .histories import canvas, escape_dollars, save, scale
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
@@ -40,9 +40,9 @@ def plot_ida(
     Accelerations are in g.
     """
     figure, ((*axes,),) = canvas(1, len(demands), (1.0 + 4.4 * len(demands), 4.6), sharey=True)
-    factor, unit = _in_g(unit)
+    factor, unit = _choose_intensity_unit(unit)
     for axis, panel in zip(axes, demands, strict=True):
-        _draw(axis, panel, factor)
+        _draw_panel(axis, panel, factor)
     axes[0].set_ylabel(f"{intensity} [{unit}]")
     axes[0].set_ylim(bottom=0.0)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -67,12 +67,12 @@ def plot_fragility(
     it is fitted to are drawn one above the other.
     """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.4))
-    factor, unit = _in_g(unit)
+    factor, unit = _choose_intensity_unit(unit)
     every = np.concatenate([brackets for _, brackets in curves.values()])
     x = np.linspace(0.0, 1.2 * np.max(every, where=np.isfinite(every), initial=0.0), 300)[1:]
     for number, (name, (curve, brackets)) in enumerate(curves.items()):
         colour, (low, value, high) = f"C{number}", curve(x)
-        axis.plot(factor * x, value, color=colour, label=plain(name))
+        axis.plot(factor * x, value, color=colour, label=escape_dollars(name))
         axis.fill_between(factor * x, low, high, color=colour, alpha=0.15, lw=0.0)
         first, last = brackets[np.lexsort(brackets.T)].T
         shares = (np.arange(len(first)) + 0.5) / len(first)
@@ -95,19 +95,19 @@ def plot_fragility(
     return save(figure, path)
 
 
-def _in_g(unit: str) -> tuple[float, str]:
+def _choose_intensity_unit(unit: str) -> tuple[float, str]:
     """Return the factor and the unit in which an intensity is drawn: accelerations in g."""
     return (1.0 / STANDARD_GRAVITY, "g") if unit == "m/s²" else (1.0, unit)
 
 
-def _draw(axis: Any, panel: DemandPanel, level: float) -> None:
+def _draw_panel(axis: Any, panel: DemandPanel, level: float) -> None:
     size = max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())
     factor, unit = scale(size, panel.unit)
     axis.set_xlabel(f"{panel.label} [{unit}]")
     few = len(panel.curves) <= 5
     marks = "osv^D"
     for number, (record, (intensity, demand)) in enumerate(panel.curves.items()):
-        label = plain(record) if few else "a record" if number == 0 else None
+        label = escape_dollars(record) if few else "a record" if number == 0 else None
         mark = marks[number] if few else None
         axis.plot(
             factor * demand, level * intensity, marker=mark, color="0.65", lw=0.9, ms=4, label=label

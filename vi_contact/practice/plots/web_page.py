@@ -69,7 +69,7 @@ def write_web_page(
     ]
     shown, count = [], 0
     for one in sections:
-        images = [*map(_drawn, one.drawings), *map(read_bytes, one.pictures)]
+        images = [*map(_draw_png, one.drawings), *map(read_bytes, one.pictures)]
         shown.append(
             {
                 "own": one,
@@ -106,7 +106,7 @@ def write_web_page(
     return path
 
 
-def extremes(values: Array, most: int) -> Indices:
+def find_extremes(values: Array, most: int) -> Indices:
     """Return at most ``most`` rows (k,) in order.
 
     They are the smallest and the largest of equal parts; of few rows they are all.
@@ -126,7 +126,7 @@ def _chart(chart: Chart, most: int) -> Mapping[str, Any]:
     """Return what the script draws."""
     lines = []
     for line in chart.lines:
-        rows = extremes(line.y, most)
+        rows = find_extremes(line.y, most)
         lines.append(
             {
                 "name": line.name,
@@ -153,7 +153,7 @@ def _numbers(values: Iterable[float], digits: int) -> list[float | None]:
     return [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in values]
 
 
-def _drawn(drawing: Drawing) -> bytes:
+def _draw_png(drawing: Drawing) -> bytes:
     """Return the PNG of a drawing."""
     require_matplotlib()
     import matplotlib

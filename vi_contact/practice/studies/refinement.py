@@ -17,7 +17,7 @@ from ...core.own_files import inner_folder, is_own
 from ...run.files.folder import CHECKPOINT, HISTORY_CSV
 from ...run.files.reading import RunFolder, read_run
 from ..engineering.peak_values import GROWS, peaks
-from ..plots.sections import SAY, Section, Table, number
+from ..plots.sections import SAY, Section, Table, format_number
 from .cases.library import COPY, copied_settings, read_copy
 from .cases.toml_file import toml_value, with_settings
 
@@ -156,7 +156,7 @@ def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
         told = [_size(each[one.name]) if one.name in each else np.nan for each in found.values()]
         if base > NOISE * like:
             pairs = [
-                (number(other), f"{round(100.0 * (other / base - 1.0), 2) + 0.0:+g} %")
+                (format_number(other), f"{round(100.0 * (other / base - 1.0), 2) + 0.0:+g} %")
                 for other in told
             ]
             mark = ", raw: not convergent at impacts" if one.quantity.endswith(GROWS) else ""
@@ -164,7 +164,7 @@ def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
                 [
                     one.name + mark,
                     one.unit,
-                    number(base),
+                    format_number(base),
                     *(text for pair in pairs for text in pair),
                 ]
             )

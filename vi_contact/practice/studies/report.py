@@ -19,9 +19,9 @@ from ..engineering import checks
 from ..engineering.checks.comparison import Check, Comparison
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
-from ..plots.histories import image_of
+from ..plots.histories import render_image
 from ..plots.pages import write_pages
-from ..plots.sections import HEADERS, Section, Table, header_facts, number, sections_of
+from ..plots.sections import HEADERS, Section, Table, format_number, header_facts, sections_of
 from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from .cases.library import COPY, read_copy
@@ -91,7 +91,7 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
         return {}, []
     try:
         model = read_object(folder / MODEL)
-        image = image_of(sketch(model), bbox_inches="tight")
+        image = render_image(sketch(model), bbox_inches="tight")
     except InputError:
         raise
     except OSError as error:
@@ -136,12 +136,13 @@ def _checks(folder: Path) -> Section:
             one.name,
             one.formula,
             ", ".join(
-                f"{name} = {number(value)} {unit}" for name, (value, unit) in one.inputs.items()
+                f"{name} = {format_number(value)} {unit}"
+                for name, (value, unit) in one.inputs.items()
             ),
-            number(one.expected),
-            number(one.found),
+            format_number(one.expected),
+            format_number(one.found),
             one.unit,
-            f"does not apply: {one.applies}" if one.applies else number(one.ratio),
+            f"does not apply: {one.applies}" if one.applies else format_number(one.ratio),
             one.source,
         ]
         for one in comparisons(folder)
