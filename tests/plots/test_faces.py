@@ -269,7 +269,7 @@ def test_points_that_pull() -> None:
     assert pulling.label == "contact pressure [kPa], negative: pull"
     assert np.asarray(pulling.norm([-2.0, 0.0, 2.0])) == pytest.approx([0.0, 0.5, 1.0])
     assert np.asarray(pushing.norm([0.0, 0.25, 1.0])) == pytest.approx([0.0, 0.5, 1.0])
-    assert np.all(pushing.colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [
+    assert np.all(pushing.map_colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [
         True,
         False,
         False,

@@ -1,6 +1,6 @@
-"""Draw the bodies of a run at some times, and a film.
+"""Draw the bodies of a run at some times, and film them, in the plane and in space.
 
-They are in plane or space, and need a folder alone.
+Pictures need nothing but the folder of a run that wrote fields.
 """
 
 from collections.abc import Sequence
@@ -21,6 +21,7 @@ from ...core.files import frames_of, write_output
 from ...run.files.reading import ContactGeometry, RunFolder
 from .deformed import contact_states, find_nearest, plane_normals, read_frames
 from .faces import (
+    Face,
     Painter,
     add_polygons,
     choose_times,
@@ -41,26 +42,35 @@ from .histories import (
     scale_values,
 )
 
-# of the size of the bodies: how large their largest displacement is drawn, if it is not larger
+# How large the largest displacement is drawn if it is not larger, over the size of the bodies.
 DRAWN = 0.1
 FILM_FRAMES = 48  # at most: a film of two megabytes
 BODIES = ("0.35", "tab:blue", "tab:green", "tab:purple")  # edges of their elements
-# from where it comes; sides along it have 0.6 of their brightness
+# Direction from which the light comes; sides along it have 0.6 of their brightness.
 LIGHT = np.array([0.3, -0.5, 0.81])
-# of the size of the bodies: how far inside the dots are that show the contact in the plane
+# How far inside the dots are that show the contact in the plane, over the size of the bodies.
 INWARDS = 0.015
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Hold what is seen of bodies at ``times`` (k,) [s].
+    """Hold what is seen of bodies at some times.
 
-    That is cells in the plane, in space the boundary's sides of cells.
+    In the plane that is the cells, in space the sides of cells on the boundary.
 
-    ``points`` (s, d) [m] of their nodes; ``polygons`` (p, corners), the number of the ``body`` (p,)
-    of each; u (k, s, d) [m], drawn ``magnified`` times; von Mises stresses (k, p) [Pa].
-    ``contact``: where it was recorded its conditions, their nodes (m,), the ``sides`` (n, corners)
-    of elements between them, pressures [Pa] and states (k, m).
+    Attributes:
+        times: (k,) those of the frames [s].
+        points: (s, d) nodes of what is drawn [m].
+        polygons: (p, corners) rows of ``points``.
+        body: (p,) number of the body of each polygon.
+        u: (k, s, d) displacements [m].
+        stress: (k, p) von Mises stresses [Pa].
+        magnified: how many times larger displacements are drawn.
+        contact: the conditions of the contact, where it was recorded.
+        sides: (n, corners) sides of elements between contact points, as conditions.
+        nodes: (m,) row of ``points`` of each condition.
+        pressure: (k, m) contact pressures [Pa], (k, 0) without contact.
+        states: (k, m) as of ``contact_states``.
     """
 
     times: Array
@@ -78,47 +88,76 @@ class Scene:
 
     @classmethod
     def read(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
-        """Read the frames next to ``times``.
+        """Read the frames next to some times.
 
-        ``magnified`` is a round number that shows the displacements when None.
+        Args:
+            run: its folder holds fields.
+            times: moments that are wanted [s].
+            magnified: how many times larger displacements are drawn; None: a round number that
+                shows them.
+
+        Returns:
+            the bodies, and their contact where it was recorded.
+
+        Raises:
+            InputError: the run has bars or points only, or a number is wrong.
         """
-        frames, history = read_frames(run), run.history
+        frames = read_frames(run)
+        history = run.history
         if frames.cells.shape[1] < 3:
             raise InputError(
                 f"the run in '{run.folder}' has bars or points only: draw runs in the plane or in "
                 "space"
             )
         optional(number, "pictures of a run", "magnified", magnified, positive=True)
-        found = frames.t[np.unique(find_nearest(frames.t, times))]
-        plane = frames.points.shape[1] == 2
-        corners, cells = (frames.cells, np.arange(len(frames.cells))) if plane else frames.boundary
+        t = frames.t[np.unique(find_nearest(frames.t, times))]
+
+        # The polygons: cells of the plane, or what is seen of a body in space from outside.
+        if frames.points.shape[1] == 2:
+            corners = frames.cells
+            cells = np.arange(len(frames.cells))
+        else:
+            corners, cells = frames.boundary
+
         contact = run.contact if "pressure" in history else None
-        sides, nodes = (corners[:0], corners[:0, 0]) if contact is None else frames.facing(contact)
-        seen = np.union1d(corners, nodes)  # of degree 2 contact is at mid-points too
-        u, stress = map(
-            np.array, zip(*((u[seen], s[cells]) for _, u, s in map(frames.at, found)), strict=True)
-        )
-        size, largest = (
-            float(np.ptp(frames.points[seen], axis=0).max()),
-            float(np.linalg.norm(u, axis=2).max()),
-        )
-        rows, pressure = find_nearest(history["t"], found), np.zeros((len(found), 0))
-        states = pressure
-        if contact is not None:
-            pressure, states = history["pressure"][rows], contact_states(history)[rows]
+        if contact is None:
+            sides = corners[:0]
+            nodes = corners[:0, 0]
+        else:
+            sides, nodes = frames.facing(contact)
+
+        # Of all nodes those that are drawn: of degree 2 contact is at mid-points too.
+        seen = np.union1d(corners, nodes)
+        displacements = []
+        stresses = []
+        for moment in t:
+            _, u, stress = frames.at(moment)
+            displacements.append(u[seen])
+            stresses.append(stress[cells])
+        all_u = np.array(displacements)
+
+        if contact is None:
+            pressure = states = np.zeros((len(t), 0))
+        else:
+            rows = find_nearest(history["t"], t)
+            pressure = history["pressure"][rows]
+            states = contact_states(history)[rows]
+
+        size = float(np.ptp(frames.points[seen], axis=0).max())
+        largest = float(np.linalg.norm(all_u, axis=2).max())
         return cls(
-            found,
-            frames.points[seen],
-            np.searchsorted(seen, corners),
-            frames.bodies[cells],
-            u,
-            stress,
-            magnified or _round_down(DRAWN * size / (largest or np.inf)),
-            contact,
-            sides,
-            np.searchsorted(seen, nodes),
-            pressure,
-            states,
+            times=t,
+            points=frames.points[seen],
+            polygons=np.searchsorted(seen, corners),
+            body=frames.bodies[cells],
+            u=all_u,
+            stress=np.array(stresses),
+            magnified=magnified or _round_down(DRAWN * size / (largest or np.inf)),
+            contact=contact,
+            sides=sides,
+            nodes=np.searchsorted(seen, nodes),
+            pressure=pressure,
+            states=states,
         )
 
     @property
@@ -149,33 +188,50 @@ class Scene:
         return Painter.of_pressure(self.pressure)
 
     def draw(self, axis: Any, k: int, states: bool = False) -> None:
-        """Draw the bodies at the time number k.
+        """Draw the bodies at one time.
 
-        Each has edges of a colour of its own. In the plane there are dots inside of them with the
-        contact pressure, or the ``states`` of the points, those of both sides of a corner apart.
+        Each has edges of a colour of its own. In the plane, dots inside of them show the contact,
+        those of both sides of a corner apart.
+
+        Args:
+            axis: in projection where the bodies are in space.
+            k: number of the time.
+            states: whether dots are coloured by the states of the points on pale bodies, in place
+                of the contact pressure on bodies coloured by their stress.
         """
-        moved, colours = self.displace(k), self.stresses.colours(self.stress[k])
-        flat, polygons = moved.shape[1] == 2, moved[self.polygons]
-        colours = np.full_like(colours, 0.95) if states else colours
+        places = self.displace(k)
+        polygons = places[self.polygons]
+        flat = places.shape[1] == 2
+        colours = self.stresses.map_colours(self.stress[k])
+        if states:
+            colours = np.full_like(colours, 0.95)
         if not flat:
+            # Sides along the light are darker, or the shape of a body could not be seen.
             colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(polygons) @ LIGHT)[:, None]
         edges = [BODIES[body % len(BODIES)] for body in self.body]
         thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
-        every = (self.points + self.magnified * self.u).reshape(-1, moved.shape[1])
+
+        # The limits are those of all times, so that pictures can be compared.
+        every = (self.points + self.magnified * self.u).reshape(-1, places.shape[1])
         set_limits(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
+
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
-            painter, values = (
-                (Painter.of_states(), self.states) if states else (self.pressures, self.pressure)
-            )
-            painter.draw_dots(axis, moved[self.nodes] - inwards, values[k])
+            if states:
+                painter = Painter.of_states()
+                values = self.states[k]
+            else:
+                painter = self.pressures
+                values = self.pressure[k]
+            painter.draw_dots(axis, places[self.nodes] - inwards, values)
 
 
 def _round_down(factor: float) -> float:
-    """1, 2 or 5 times a power of ten, at least 1."""
+    """Return 1, 2 or 5 times a power of ten, not above the factor but at least 1."""
     power = 10.0 ** np.floor(np.log10(max(factor, 1.0)))
-    return float(max([1.0, *(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor)]))
+    steps = [step * power for step in (1.0, 2.0, 5.0) if step * power <= factor]
+    return float(max([1.0, *steps]))
 
 
 @checked
@@ -187,20 +243,32 @@ def plot_deformed(
     magnified: float | None = None,
     title: str = "Deformed bodies",
 ) -> Path:
-    """Draw the deformed bodies of a run in the frames next to ``times`` [s].
+    """Draw the deformed bodies of a run at some times, coloured by von Mises stress.
 
-    They are coloured by von Mises stress.
+    The edges of elements have the colour of their body. In the plane dots show the contact
+    pressure, and below them which points are open, stick and slip. In space y points upwards where
+    contact is along y rather than z, else z.
 
-    None: the first, the last, and when most happens. The edges of elements have the colour of their
-    body. In the plane dots show the contact pressure, and below them which points are open, stick
-    and slip. In space y points upwards where contact is along y rather than z, else z.
-    ``magnified``: how many times larger displacements are drawn; None: a round number that shows
-    them. InputError for a run without fields or in one dimension.
+    Args:
+        run: its folder holds fields.
+        path: the picture; its ending says the format.
+        times: moments [s], of which the nearest frames are drawn; None: the first, the last, and
+            when most happens.
+        magnified: how many times larger displacements are drawn; None: a round number that shows
+            them.
+        title: stands above the picture.
+
+    Returns:
+        the path.
+
+    Raises:
+        InputError: the run has no fields, or is in one dimension.
     """
     scene = Scene.read(run, choose_times(run.history) if times is None else times, magnified)
     flat = scene.points.shape[1] == 2
     with_states = flat and scene.contact is not None
-    figure, axes = sheet([flat] * (1 + with_states), len(scene.times), (4.2, 3.8))
+    rows = [flat, flat] if with_states else [flat]
+    figure, axes = sheet(rows, len(scene.times), (4.2, 3.8))
     for row, line in enumerate(axes):
         for k, axis in enumerate(line):
             scene.draw(axis, k, states=row > 0)
@@ -213,9 +281,9 @@ def plot_deformed(
 
 
 def _compose_title(title: str, scene: Scene) -> str:
-    """Return a title on lines that fit above the picture."""
-    told = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
-    return "\n".join(wrap(escape_dollars(title) + told, 64))
+    """Return a title on lines that fit above the picture, with the factor of displacements."""
+    factor = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
+    return "\n".join(wrap(escape_dollars(title) + factor, 64))
 
 
 @checked
@@ -231,70 +299,90 @@ def film(
 ) -> Path:
     """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4.
 
-    Its frames are those next to ``times`` [s].
+    In space the pressure on each contact face is beside the bodies. Below them is a column of the
+    history with the moment marked, and dashed the motion of the ground.
 
-    None: up to 48 frames around the one in which most happens. In space the pressure on each
-    contact face is beside the bodies. Below them is a ``column`` of the history with the moment
-    marked, and dashed the motion of the ground. InputError for another kind of file, .mp4 without
-    ffmpeg, a column that the run does not have, and as ``plot_deformed``.
+    Args:
+        run: its folder holds fields.
+        path: the film, .gif or .mp4.
+        times: moments [s], of which the nearest frames are shown; None: up to 48 frames around the
+            one in which most happens.
+        magnified: how many times larger displacements are drawn; None: a round number that shows
+            them.
+        column: what is drawn below; None: what tells when most happens.
+        title: stands above the film, before the moment.
+        fps: frames per second.
+
+    Returns:
+        the path.
+
+    Raises:
+        InputError: another kind of file, .mp4 without ffmpeg, a column that the run does not have,
+            and as of ``plot_deformed``.
     """
     require_matplotlib()
     import matplotlib
     from matplotlib.animation import FFMpegWriter, PillowWriter
-    from matplotlib.figure import Figure
 
-    if Path(path).suffix not in (".gif", ".mp4"):
+    path = Path(path)
+    if path.suffix not in (".gif", ".mp4"):
         raise InputError(
-            f"'{Path(path).name}' is not a .gif or .mp4: give such a name, or use plot_deformed"
+            f"'{path.name}' is not a .gif or .mp4: give such a name, or use plot_deformed"
         )
-    if Path(path).suffix == ".mp4" and not FFMpegWriter.isAvailable():
+    if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(
             "an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif"
         )
     scene = Scene.read(run, _choose_film_times(run) if times is None else times, magnified)
-    flat, contact = scene.points.shape[1] == 2, scene.contact
-    faces = [] if flat or contact is None else split_faces(contact, scene.sides)
-    writer = (PillowWriter if Path(path).suffix == ".gif" else FFMpegWriter)(fps=fps)
+    flat = scene.points.shape[1] == 2
+    faces = [] if flat or scene.contact is None else split_faces(scene.contact, scene.sides)
+    writer = PillowWriter(fps=fps) if path.suffix == ".gif" else FFMpegWriter(fps=fps)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.6 + 3.4 * len(faces), 6.0), layout="constrained")
-        wide = [1.6, *[1.0] * len(faces)]
-        grid = figure.add_gridspec(2, len(wide), height_ratios=(3.6, 1.0), width_ratios=wide)
-        planes = [flat, *(face.axes is not None for face in faces)]
-        axes = [
-            figure.add_subplot(grid[0, i], projection=None if plane else "3d")
-            for i, plane in enumerate(planes)
-        ]
-        marker = _draw_trace(
-            figure.add_subplot(grid[1, :]),
-            run,
-            column or find_leading_column(run.history)[0],
-            scene.times,
-        )
+        figure, axes, below = _lay_out_film(scene, faces)
+        marker = _draw_trace(below, run, column or find_leading_column(run.history)[0], scene.times)
         scene.stresses.draw_bar(figure, axes[0], extend="max", shrink=0.85)
-        if contact is not None:
+        if scene.contact is not None:
             scene.pressures.draw_bar(figure, axes[-1], shrink=0.85)
-        with TemporaryDirectory() as place:
-            draft = Path(place) / Path(path).name
+        with TemporaryDirectory() as folder:
+            draft = Path(folder) / path.name
             with writer.saving(figure, str(draft), dpi=95):
                 for k, t in enumerate(scene.times):
-                    for axis in axes:
-                        axis.clear()
-                    scene.draw(axes[0], k)
-                    for axis, face in zip(axes[1:], faces, strict=True):
-                        scene.pressures.draw(axis, face, scene.pressure[k])
-                        axis.set_title(face.name, fontsize=9)
+                    _draw_film_frame(axes, scene, faces, k)
                     marker.set_xdata([t, t])
-                    figure.suptitle(
-                        _compose_title(f"{title}, t = {t:.4g} s".removeprefix(", "), scene),
-                        fontsize=10,
-                    )
+                    moment = f"{title}, t = {t:.4g} s".removeprefix(", ")
+                    figure.suptitle(_compose_title(moment, scene), fontsize=10)
                     if k == 0:
                         figure.draw_without_rendering()
                         # the same places in every frame, laid out once
                         figure.set_layout_engine("none")
                     writer.grab_frame()
             write_output(path, draft.read_bytes())
-    return Path(path)
+    return path
+
+
+def _lay_out_film(scene: Scene, faces: Sequence[Face]) -> tuple[Any, list[Any], Any]:
+    """Make (figure, axes of the bodies and of each contact face, axis of the history below)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.6 + 3.4 * len(faces), 6.0), layout="constrained")
+    widths = [1.6, *[1.0] * len(faces)]
+    grid = figure.add_gridspec(2, len(widths), height_ratios=(3.6, 1.0), width_ratios=widths)
+    planes = [scene.points.shape[1] == 2, *(face.axes is not None for face in faces)]
+    axes = [
+        figure.add_subplot(grid[0, i], projection=None if plane else "3d")
+        for i, plane in enumerate(planes)
+    ]
+    return figure, axes, figure.add_subplot(grid[1, :])
+
+
+def _draw_film_frame(axes: Sequence[Any], scene: Scene, faces: Sequence[Face], k: int) -> None:
+    """Draw the bodies, and the pressure on each contact face, at the time number k."""
+    for axis in axes:
+        axis.clear()
+    scene.draw(axes[0], k)
+    for axis, face in zip(axes[1:], faces, strict=True):
+        scene.pressures.draw_values(axis, face, scene.pressure[k])
+        axis.set_title(face.name, fontsize=9)
 
 
 def _choose_film_times(run: RunFolder) -> list[float]:
@@ -306,9 +394,15 @@ def _choose_film_times(run: RunFolder) -> list[float]:
 
 
 def _draw_trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
-    """Draw a column of the history and, dashed the ground's acceleration.
+    """Draw a column of the history, and dashed the acceleration of the ground.
 
-    It is that during the film. The moment's line is returned.
+    Both are shown during the film.
+
+    Returns:
+        the line that marks the moment.
+
+    Raises:
+        InputError: the run has no such column.
     """
     history = run.history
     if column not in run.columns or np.ndim(history.get(column, 0)) != 1:
@@ -318,10 +412,13 @@ def _draw_trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     shown = times if len(times) > 1 else history["t"]
     axis.set(xlabel="time [s]", xlim=(shown[0], shown[-1]))
     axis.set_ylabel(f"{column} [{unit}]", fontsize=8)
-    if list_shaken_axes(history):
+
+    directions = list_shaken_axes(history)
+    if directions:
         behind = axis.twinx()
-        for ground in list_shaken_axes(history):
-            behind.plot(history["t"], history[f"a_g_{ground}"], color="0.6", lw=0.9, ls="--")
+        for direction in directions:
+            ground = history[f"a_g_{direction}"]
+            behind.plot(history["t"], ground, color="0.6", lw=0.9, ls="--")
         behind.set_ylabel("$a_g$ [m/s²]", color="0.4")
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
@@ -335,20 +432,27 @@ def draw_run(
     times: Sequence[float] | None = None,
     magnified: float | None = None,
 ) -> list[Path]:
-    """Draw the bodies of a run with fields into the folder ``out``.
+    """Draw all pictures of the bodies of a run for which its folder has data.
 
-    They are drawn as deformed.png and, in space with ``Contact()``, the contact faces as faces.png,
-    next to the ``times`` [s]. None: the first, the last, and when most happens.
+    With fields the bodies are drawn as deformed.png; in space with ``Contact()`` the contact faces
+    are drawn as faces.png.
 
-    ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
+    Args:
+        run: what ``read_run`` returned.
+        out: folder of the pictures.
+        title: stands above them.
+        times: moments [s], of which the nearest are drawn; None: the first, the last, and when most
+            happens.
+        magnified: how many times larger displacements are drawn; None: so that they are seen.
+
+    Returns:
+        the pictures that were written.
     """
-    drawn, contact, history = [], run.contact, run.history
+    pictures = []
     if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
-        drawn.append(
-            plot_deformed(
-                run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title
-            )
-        )
-    if contact is not None and contact.points.shape[1] == 3 and "active" in history:
-        drawn.append(plot_faces(run, Path(out) / "faces.png", times=times, title=title))
-    return drawn
+        path = Path(out) / "deformed.png"
+        pictures.append(plot_deformed(run, path, times=times, magnified=magnified, title=title))
+    contact = run.contact
+    if contact is not None and contact.points.shape[1] == 3 and "active" in run.history:
+        pictures.append(plot_faces(run, Path(out) / "faces.png", times=times, title=title))
+    return pictures
