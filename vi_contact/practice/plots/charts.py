@@ -296,21 +296,21 @@ def _choose_look(line: Line, log_x: bool, colour: Any) -> dict[str, Any]:
             name before it, in a history it is one of its own.
         colour: of the line of the same name before it, None where there is none.
     """
+    look: dict[str, Any] = {
+        "lw": 0.8,
+        "ls": line.style,
+        "label": line.name,
+        "color": line.colour,
+    }
     if line.style == ".":
-        look: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 2, "color": "black"}
-    else:
-        look = {"lw": 0.8, "ls": line.style, "label": line.name}
-        if line.colour is not None:
-            look["color"] = line.colour
+        look = {"ls": "none", "marker": ".", "ms": 2, "color": "black"}
     if line.pale:
         look |= {"alpha": 0.35, "zorder": 1.5}
         if log_x:
-            look.pop("label", None)
-            if colour is not None:
-                look["color"] = colour
+            look |= {"label": None, "color": colour}
         else:
             look |= {"label": line.name, "color": "0.3"}
-    return look
+    return {name: value for name, value in look.items() if value is not None}
 
 
 def _add_legend(axis: Any) -> None:
