@@ -21,7 +21,7 @@ _PETSC = "-vi_contact_"
 def parser(command: str = "") -> argparse.ArgumentParser:
     """Build the parser of all commands and options.
 
-    It has those for runs alone, which need less, when one is given.
+    When the command is one that runs cases, the parser has those for runs alone, which need less.
     """
     top = Parser(prog="vi-contact", description=_DESCRIPTION)
     top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
@@ -47,13 +47,17 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     own: list[str] = []
     petsc: list[str] = []
     for before, argument in zip(["", *arguments], arguments, strict=False):
-        value = before.startswith(_PETSC) and not argument.startswith("-")
-        (petsc if value or argument.startswith(_PETSC) else own).append(argument)
+        is_option = argument.startswith(_PETSC)
+        is_value = before.startswith(_PETSC) and not argument.startswith("-")
+        if is_option or is_value:
+            petsc.append(argument)
+        else:
+            own.append(argument)
     return own, petsc
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and print its text; return 0, 1 (one sentence on stderr)or more.
+    """Run a command and print its text; return 0, 1 (one sentence on stderr) or more.
 
     Other statuses are 128 + n (signal n) and 75 (wall time).
     """
@@ -69,7 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
-        if text := explain_errors(lambda: options.run(options), getattr(options, "spelling", {})):
+        spelling = getattr(options, "spelling", {})
+        text = explain_errors(lambda: options.run(options), spelling)
+        if text:
             say(text)
 
     return status_of(command)
@@ -87,11 +93,11 @@ def status_of(call: Callable[[], object]) -> int:
         fail_together(str(error))
         return _print_error(error, 1)
     except KeyboardInterrupt as error:
-        stopped = error if isinstance(error, Interrupted) else Interrupted()
+        stop = error if isinstance(error, Interrupted) else Interrupted()
         # on all ranks: a launcher kills what is left when the first one has failed
         if isinstance(error, OutOfTime):
             fail_together(str(error))
-        return _print_error(stopped, stopped.status)
+        return _print_error(stop, stop.status)
     except Exception:  # a defect: its traceback is shown, and the other ranks end too
         fail_together(traceback.format_exc())
         raise
