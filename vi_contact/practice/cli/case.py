@@ -58,7 +58,7 @@ def add_case_commands(commands: Any) -> None:
     add_command(
         commands,
         "schema",
-        _print_schema,
+        _compose_schema,
         help="print the JSON schema of case files, for editors",
         description=(
             "Print the JSON schema of case files. To keep it: vi-contact schema > case.json."
@@ -159,17 +159,20 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 
 
 def _list_cases(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact cases``: return names, titles and the folder."""
     lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
     return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
-def _print_schema(options: argparse.Namespace) -> str:
+def _compose_schema(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact schema``: return the schema."""
     from ..studies.cases.schema import text  # late: finite elements
 
     return text().rstrip()
 
 
 def _write_starter(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact new``: write the files, and return what may be done next."""
     if world().rank:
         return ""
     files = copy_starter(options.name, Path(options.folder or options.name))
@@ -186,6 +189,7 @@ def _write_starter(options: argparse.Namespace) -> str:
 
 
 def _run(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact run``: return the summary on the first rank. Collective."""
     import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
     from ...run.wall_time import seconds_of

@@ -150,6 +150,7 @@ def _read_part(text: str) -> tuple[int, int]:
 
 
 def _analyse(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact ida``: return how many runs there are; an error if one has failed."""
     from ..studies.ida.ida import run_ida
 
     launch = _split_launch(options.launch)

@@ -387,6 +387,7 @@ def _read_psa(words: Sequence[str]) -> tuple[float, float]:
 
 
 def _describe_files(options: argparse.Namespace) -> str:
+    """Carry out ``motion info``: return a table for each file."""
     return "\n\n".join(_describe_record(_read(options, path)) for path in options.file)
 
 
@@ -408,6 +409,7 @@ def _describe_record(record: Record) -> str:
 
 
 def _convert(options: argparse.Namespace) -> str:
+    """Carry out ``motion convert``: write the record, and return what was written."""
     output_file(options.out, reads=[options.file])
     record = _read(options, options.file)
     form = options.to or _FORMATS.get(Path(options.out).suffix.lower(), "columns")
@@ -428,6 +430,7 @@ def _convert(options: argparse.Namespace) -> str:
 
 
 def _plot(options: argparse.Namespace) -> str:
+    """Carry out ``motion plot``: draw the record, and return the path of the picture."""
     out = output_file(
         options.out or Path(options.file).stem + ".png", reads=[options.file], picture=True
     )
@@ -437,6 +440,7 @@ def _plot(options: argparse.Namespace) -> str:
 
 
 def _compute_spectra(options: argparse.Namespace) -> str:
+    """Carry out ``motion spectrum``: write table and picture, and return a few values."""
     units = canonical_units("--out-units", options.out_units)
     target = _read_target(options)
     periods = space_numbers("--periods", options.periods)

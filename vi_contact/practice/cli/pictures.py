@@ -154,6 +154,7 @@ def _add_magnify(parser: argparse.ArgumentParser) -> None:
 
 
 def _report(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact report``: return the paths of what was written. Collective."""
     with suppress(ImportError):  # a report needs no MPI
         import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
@@ -188,6 +189,7 @@ def _format_refinement(section: "Section") -> list[str]:
 
 
 def _plot(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact plot``: return the paths of the pictures."""
     from ...run.files.reading import read_run
     from ..plots.bodies import draw_run
     from ..plots.deformed import read_frames
@@ -201,6 +203,7 @@ def _plot(options: argparse.Namespace) -> str:
 
 
 def _film(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact film``: return the path of the film."""
     from ...run.files.reading import read_run
     from ..plots.bodies import film
     from ..plots.deformed import read_frames

@@ -188,12 +188,14 @@ def _add_table(parser: argparse.ArgumentParser, action: str) -> None:
 
 
 def _read_folder(options: argparse.Namespace) -> "RunFolder":
+    """Read the run of which a command has the folder."""
     from ...run.files.reading import read_run  # late: h5py, which records do not need
 
     return read_run(options.folder)
 
 
 def _tabulate_peaks(options: argparse.Namespace) -> str:
+    """Carry out ``post peaks``: write the table, and return it for people."""
     run = _read_folder(options)
     rows = peaks(run.history, run.columns, options.columns or None)
     table = write_peaks(_choose_table(options), rows)
@@ -208,6 +210,7 @@ def _tabulate_peaks(options: argparse.Namespace) -> str:
 
 
 def _compute_spectra(options: argparse.Namespace) -> str:
+    """Carry out ``post spectrum``: write table and picture, and return their paths."""
     run = _read_folder(options)
     periods = space_numbers("--periods", options.periods)
     table = _choose_table(options)
@@ -243,6 +246,7 @@ def _write_spectra(path: Path, spectra: Mapping[str, "ResponseSpectrum"], dampin
 
 
 def _compute_transfer(options: argparse.Namespace) -> str:
+    """Carry out ``post transfer``: write table and picture, and return the peak."""
     run = _read_folder(options)
     table = _choose_table(options)
     frequencies = None
@@ -266,6 +270,7 @@ def _compute_transfer(options: argparse.Namespace) -> str:
 
 
 def _draw_loop(options: argparse.Namespace) -> str:
+    """Carry out ``post loop``: write table and picture, and return the work."""
     run = _read_folder(options)
     table = _choose_table(options)
     sign = -1.0 if options.turn else 1.0
@@ -288,6 +293,7 @@ def _draw_loop(options: argparse.Namespace) -> str:
 
 
 def _compare_with_formulas(options: argparse.Namespace) -> str:
+    """Carry out ``post checks``: write the table, and return it for people."""
     from ..studies.report import comparisons
 
     results = comparisons(options.folder)

@@ -127,14 +127,14 @@ class Scene:
             sides, nodes = frames.facing(contact)
 
         # Of all nodes those that are drawn: of degree 2 contact is at mid-points too.
-        seen = np.union1d(corners, nodes)
+        drawn = np.union1d(corners, nodes)
         displacements = []
         stresses = []
         for moment in t:
             _, u, stress = frames.at(moment)
-            displacements.append(u[seen])
+            displacements.append(u[drawn])
             stresses.append(stress[cells])
-        all_u = np.array(displacements)
+        u_of_times = np.array(displacements)
 
         if contact is None:
             pressure = states = np.zeros((len(t), 0))
@@ -143,19 +143,19 @@ class Scene:
             pressure = history["pressure"][rows]
             states = contact_states(history)[rows]
 
-        size = float(np.ptp(frames.points[seen], axis=0).max())
-        largest = float(np.linalg.norm(all_u, axis=2).max())
+        size = float(np.ptp(frames.points[drawn], axis=0).max())
+        largest = float(np.linalg.norm(u_of_times, axis=2).max())
         return cls(
             times=t,
-            points=frames.points[seen],
-            polygons=np.searchsorted(seen, corners),
+            points=frames.points[drawn],
+            polygons=np.searchsorted(drawn, corners),
             body=frames.bodies[cells],
-            u=all_u,
+            u=u_of_times,
             stress=np.array(stresses),
             magnified=magnified or _round_down(DRAWN * size / (largest or np.inf)),
             contact=contact,
             sides=sides,
-            nodes=np.searchsorted(seen, nodes),
+            nodes=np.searchsorted(drawn, nodes),
             pressure=pressure,
             states=states,
         )
@@ -213,8 +213,10 @@ class Scene:
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
 
         # The limits are those of all times, so that pictures can be compared.
-        every = (self.points + self.magnified * self.u).reshape(-1, places.shape[1])
-        set_limits(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
+        reached = (self.points + self.magnified * self.u).reshape(-1, places.shape[1])
+        low = reached.min(axis=0)
+        high = reached.max(axis=0)
+        set_limits(axis, low, high, margin=0.03, up=self.up)
 
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
@@ -409,8 +411,8 @@ def _draw_trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
         raise InputError(f"the run has no column '{column}': see columns.json in its folder")
     values, unit = scale_values(history[column], run.columns[column][0])
     axis.plot(history["t"], values, color="black", lw=1.0)
-    shown = times if len(times) > 1 else history["t"]
-    axis.set(xlabel="time [s]", xlim=(shown[0], shown[-1]))
+    span = times if len(times) > 1 else history["t"]
+    axis.set(xlabel="time [s]", xlim=(span[0], span[-1]))
     axis.set_ylabel(f"{column} [{unit}]", fontsize=8)
 
     directions = list_shaken_axes(history)

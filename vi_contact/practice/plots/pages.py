@@ -138,15 +138,15 @@ class _Pages:
         from matplotlib.image import imread
 
         image = imread(BytesIO(read_bytes(path)), format="png")
-        wide = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
-        high = wide * image.shape[0] / image.shape[1]
-        self.make_room(high)
+        width = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
+        height = width * image.shape[0] / image.shape[1]
+        self.make_room(height)
         axis = self.figure.add_axes(
-            (SIDE / PAGE[0], 1.0 - (self.y + high) / PAGE[1], wide / PAGE[0], high / PAGE[1])
+            (SIDE / PAGE[0], 1.0 - (self.y + height) / PAGE[1], width / PAGE[0], height / PAGE[1])
         )
         axis.set_axis_off()
         axis.imshow(image)
-        self.y += high + 0.15
+        self.y += height + 0.15
 
 
 def _choose_widths(rows: Sequence[Sequence[str]]) -> list[int]:

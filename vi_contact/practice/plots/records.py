@@ -124,9 +124,9 @@ def plot_spectra(
         )
     if target is not None:
         name = f"EC8 target, {100.0 * target.damping:g} %"
-        every = np.geomspace(periods.min(), periods.max(), 500)
-        top.plot(every, target.acceleration(every) / UNITS[units], "k--", lw=1.2, label=name)
-        code = every[every <= 4.0]  # beyond, the code gives another displacement spectrum
+        grid = np.geomspace(periods.min(), periods.max(), 500)
+        top.plot(grid, target.acceleration(grid) / UNITS[units], "k--", lw=1.2, label=name)
+        code = grid[grid <= 4.0]  # beyond, the code gives another displacement spectrum
         bottom.plot(code, target.displacement(code) / metres, "k--", lw=1.2, label=name)
     if any(np.min(spectrum.periods) < trusted[label] for label, spectrum in spectra.items()):
         pale = f"pale: under {SAMPLES_A_PERIOD} samples a period"

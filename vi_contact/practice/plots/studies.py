@@ -93,8 +93,8 @@ def plot_fragility(
     """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.4))
     factor, shown_unit = _choose_intensity_unit(unit)
-    every = np.concatenate([brackets for _, brackets in curves.values()])
-    x = np.linspace(0.0, 1.2 * np.max(every, where=np.isfinite(every), initial=0.0), 300)[1:]
+    bounds = np.concatenate([brackets for _, brackets in curves.values()])
+    x = np.linspace(0.0, 1.2 * np.max(bounds, where=np.isfinite(bounds), initial=0.0), 300)[1:]
     for number, (name, (curve, brackets)) in enumerate(curves.items()):
         colour = f"C{number}"
         low, value, high = curve(x)
