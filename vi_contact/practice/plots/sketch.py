@@ -67,7 +67,7 @@ def _name_supports(axis: Any, supports: Sequence[Mapping[str, Any]], d: int) -> 
 
 
 def _draw_contact(axis: Any, part: Mapping[str, Any], d: int, colour: str) -> None:
-    """Draw the points of a part of the contact, and mark the nodes that are none or not free."""
+    """Draw the points of a part of the contact, and mark its nodes of other kinds."""
     axis.plot(
         *_read_points(part["places"], d).T,
         label=escape_dollars(f"contact: {part['name']}"),
