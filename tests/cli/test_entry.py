@@ -216,7 +216,7 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
     monkeypatch.setattr(cli_errors, "PATIENCE", 0.0)
     monkeypatch.setattr(
-        "vi_contact.practice.cli.entry.parser",
+        "vi_contact.practice.cli.entry.build_parser",
         lambda *_: SimpleNamespace(parse_args=lambda words: SimpleNamespace(run=fails)),
     )
     if others == "wait":

@@ -18,7 +18,7 @@ every time step. Start it with "mpirun -n N vi-contact" on N ranks. Options that
 _PETSC = "-vi_contact_"
 
 
-def parser(command: str = "") -> argparse.ArgumentParser:
+def build_parser(command: str = "") -> argparse.ArgumentParser:
     """Build the parser of all commands and options.
 
     When the command is one that runs cases, the parser has those for runs alone, which need less.
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        options = parser(own[0] if own else "").parse_args(own)
+        options = build_parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py
 

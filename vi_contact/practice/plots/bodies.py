@@ -19,7 +19,7 @@ from ...core.checks import number, optional
 from ...core.errors import InputError
 from ...core.files import frames_of, write_output
 from ...run.files.reading import ContactGeometry, RunFolder
-from .deformed import contact_states, find_nearest, plane_normals, read_frames
+from .deformed import compute_normals, contact_states, find_nearest, read_frames
 from .faces import (
     Face,
     Painter,
@@ -207,7 +207,7 @@ class Scene:
             colours = np.full_like(colours, 0.95)
         if not flat:
             # Sides along the light are darker, or the shape of a body could not be seen.
-            colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(polygons) @ LIGHT)[:, None]
+            colours[:, :3] *= 0.6 + 0.4 * np.abs(compute_normals(polygons) @ LIGHT)[:, None]
         edges = [BODIES[body % len(BODIES)] for body in self.body]
         thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)

@@ -114,7 +114,7 @@ class StoredFrames:
         # Outward normals of the sides: away from the middle of their cells.
         corners = self.points[sides]
         away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
-        outwards = plane_normals(corners)
+        outwards = compute_normals(corners)
         outwards *= np.sign(np.sum(outwards * away, axis=1))[:, None]
 
         # Of the candidates of a corner the one whose direction is nearest to that normal; none has
@@ -131,8 +131,8 @@ class StoredFrames:
         return conditions[facing], node
 
 
-def plane_normals(polygons: Array) -> Array:
-    """Return a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3).
+def compute_normals(polygons: Array) -> Array:
+    """Compute a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3).
 
     That of one without any size is zero.
     """

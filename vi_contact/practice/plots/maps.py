@@ -155,8 +155,8 @@ def draw_cells(
     return image, prefixed, pulling
 
 
-def maps_of(run: Any) -> list[Drawing]:
-    """Return what draws the maps of the contact line of a run.
+def list_maps(run: Any) -> list[Drawing]:
+    """List what draws the maps of the contact line of a run.
 
     The maps are those of its pressure and, if it opens, of its opening.
     """

@@ -20,7 +20,7 @@ from ..engineering.peak_values import peaks
 from . import charts
 from .charts import Chart
 from .histories import LEDGER, scale_values
-from .maps import Drawing, maps_of
+from .maps import Drawing, list_maps
 from .report_words import (
     CHARTS,
     HEADERS,
@@ -100,7 +100,7 @@ def sections_of(
         _describe_motion(run, model),
         _tabulate_results(run),
         _compare_accelerations(run),
-        Section("Histories", charts=histories, drawings=maps_of(run)),
+        Section("Histories", charts=histories, drawings=list_maps(run)),
         _explain_certificate(run),
         _tabulate_peaks(run),
     ]
