@@ -18,7 +18,7 @@ import vi_contact
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.practice.cli import errors as cli_errors
 from vi_contact.practice.cli.entry import main, split_petsc
-from vi_contact.practice.cli.errors import told
+from vi_contact.practice.cli.errors import explain_errors
 
 pytestmark = pytest.mark.serial
 ROOT = Path(vi_contact.__file__).parent.parent
@@ -216,7 +216,7 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
     monkeypatch.setattr(cli_errors, "PATIENCE", 0.0)
     monkeypatch.setattr(
-        "vi_contact.practice.cli.entry.parser",
+        "vi_contact.practice.cli.entry.build_parser",
         lambda *_: SimpleNamespace(parse_args=lambda words: SimpleNamespace(run=fails)),
     )
     if others == "wait":
@@ -262,6 +262,6 @@ def test_a_library_that_is_missing_is_named():
     with pytest.raises(
         ViContactError, match=r"^ufl is needed and this Python does not find it: install it"
     ):
-        told(lambda: missing("ufl"), {})
+        explain_errors(lambda: missing("ufl"), {})
     with pytest.raises(ModuleNotFoundError, match="No module named 'mine'"):
-        told(lambda: missing("mine"), {})
+        explain_errors(lambda: missing("mine"), {})

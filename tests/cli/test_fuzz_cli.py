@@ -23,8 +23,8 @@ pytest.importorskip("matplotlib")
 
 import vi_contact as vc
 from vi_contact import ground_motion
-from vi_contact.practice.cli.entry import main, parser
-from vi_contact.practice.cli.errors import printable
+from vi_contact.practice.cli.entry import build_parser, main
+from vi_contact.practice.cli.errors import escape_unprintable
 
 pytestmark = pytest.mark.serial
 SHAKING = """[[excitation]]
@@ -384,7 +384,7 @@ def check(
     that is no SystemExit would be a traceback, and ends the test; so does a warning of numpy."""
     monkeypatch.chdir(tmp_path)
     # made once, not for each line
-    monkeypatch.setattr("vi_contact.practice.cli.entry.parser", cache(parser))
+    monkeypatch.setattr("vi_contact.practice.cli.entry.build_parser", cache(build_parser))
     monkeypatch.setattr("signal.signal", lambda *_: None)  # ida makes Ctrl-C of SIGTERM for good
     warnings.simplefilter("error", RuntimeWarning)
 
@@ -460,4 +460,7 @@ def test_a_dollar_in_a_title_is_no_formula(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_names_that_are_no_text_are_printed() -> None:
-    assert printable("a\udcff.at2") == "a\\udcff.at2" and printable("é") in ("é", "\\xe9")
+    assert escape_unprintable("a\udcff.at2") == "a\\udcff.at2" and escape_unprintable("é") in (
+        "é",
+        "\\xe9",
+    )

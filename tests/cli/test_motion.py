@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vi_contact.practice.cli.entry import main
-from vi_contact.practice.cli.motion import acceleration
+from vi_contact.practice.cli.motion import read_acceleration
 from vi_contact.practice.ground_motion import (
     EC8Spectrum,
     Record,
@@ -228,12 +228,12 @@ def test_bad_input_is_answered_in_one_sentence(packet, capsys, arguments, word):
 
 def test_accelerations_with_units():
     assert (
-        acceleration("3.0") == 3.0
-        and acceleration("-1e-1 m/s2") == -0.1
-        and acceleration(".3g") == 0.3 * G
+        read_acceleration("3.0") == 3.0
+        and read_acceleration("-1e-1 m/s2") == -0.1
+        and read_acceleration(".3g") == 0.3 * G
     )
-    assert math.isclose(acceleration("300 gal"), 3.0) and math.isclose(
-        acceleration("300cm/s^2"), 3.0
+    assert math.isclose(read_acceleration("300 gal"), 3.0) and math.isclose(
+        read_acceleration("300cm/s^2"), 3.0
     )
 
 

@@ -18,7 +18,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.practice.engineering.floor_spectra import konno_ohmachi
 from vi_contact.practice.engineering.peak_values import HEADER
-from vi_contact.practice.plots.maps import arc_position, thinned
+from vi_contact.practice.plots.maps import arc_position, thin_rows
 from vi_contact.run.recorders.racking import racking
 
 pytestmark = pytest.mark.serial
@@ -375,7 +375,7 @@ def test_thinned_maps_keep_peaks() -> None:
     values = np.zeros((10007, 2))
     values[7003, 1] = 5.0
     values[7004, 0] = -4.0
-    t, shown = thinned(np.arange(10007.0), values)
+    t, shown = thin_rows(np.arange(10007.0), values)
     assert len(t) == len(shown) == 1200 and shown[:, 1].max() == 5.0 and shown[:, 0].min() == -4.0
 
 

@@ -227,7 +227,7 @@ def test_pictures_have_the_contact_of_mid_points_too(name: str, tmp_path: Path) 
         record=[vc.Contact()],
     )
     run = vc.read_run(tmp_path / "run")
-    scene = Scene.of(run, [0.0], None)
+    scene = Scene.read(run, [0.0], None)
     assert scene.contact is not None and len(scene.nodes) == (25 if name == "hexahedra" else 5)
     assert np.abs(scene.points[scene.nodes] - scene.contact.points).max() < 1e-14
     assert plot_deformed(run, tmp_path / "bodies.png").stat().st_size > 1000

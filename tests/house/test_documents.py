@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import vi_contact
-from vi_contact.practice.cli.entry import parser
+from vi_contact.practice.cli.entry import build_parser
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,7 +93,7 @@ def test_commands_exist(document: Path) -> None:
         ), wanted
 
 
-commands = cache(parser)  # read only
+commands = cache(build_parser)  # read only
 COMMAND = r"\b(vi-contact|demos/run\.sh(?: -n \d+)? (?:wall|channel)(?= --)) ((?:\\\n|[^`\n#])+)"
 
 

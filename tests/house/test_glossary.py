@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from vi_contact.practice.cli.entry import parser
+from vi_contact.practice.cli.entry import build_parser
 from vi_contact.run.solution import LINES
 
 pytestmark = pytest.mark.serial
@@ -63,7 +63,9 @@ def test_keys_of_shipped_case_files_are_named() -> None:
 
 @pytest.mark.parametrize("command", ["run", "ida"])
 def test_options_are_named(command: str) -> None:
-    (commands,) = (one for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
+    (commands,) = (
+        one for one in build_parser()._actions if isinstance(one, argparse._SubParsersAction)
+    )
     options = {
         one for one in commands.choices[command]._option_string_actions if one.startswith("--")
     }

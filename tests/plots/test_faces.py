@@ -32,7 +32,13 @@ from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.practice.plots import bodies, faces
 from vi_contact.practice.plots.bodies import film, plot_deformed
 from vi_contact.practice.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
-from vi_contact.practice.plots.faces import Painter, faces_of, leading, moments, plot_faces
+from vi_contact.practice.plots.faces import (
+    Painter,
+    choose_times,
+    find_leading_column,
+    plot_faces,
+    split_faces,
+)
 from vi_contact.run.files.reading import RunFolder, read_run
 
 pytestmark = pytest.mark.serial
@@ -107,7 +113,7 @@ def test_what_belongs_to_whom(runs: Any, kind: str) -> None:
     assert np.all(np.isin(nodes, frames.cells[frames.bodies == 1]))
     with open_hdf5(frames.places[7][0]) as file:  # of step 21, told by the solver
         assert np.array_equal(file["contact_status"][:][nodes], contact_states(run.history)[21])
-    (face,) = faces_of(run.contact, facing)
+    (face,) = split_faces(run.contact, facing)
     assert face.name == "face towards -y" and np.array_equal(face.conditions, np.arange(16))
     one, other = face.parts[:, 2] - face.parts[:, 0], face.parts[:, 3] - face.parts[:, 1]
     weights = np.bincount(face.owners, 0.5 * np.linalg.norm(np.cross(one, other), axis=1))
@@ -190,7 +196,7 @@ def test_curved_faces_and_corners(tmp_path: Path, figures: list[Any]) -> None:
         progress=False,
     )
     run = read_run(tmp_path)
-    curved, flat = faces_of(run.contact, read_frames(run).facing(run.contact)[0])
+    curved, flat = split_faces(run.contact, read_frames(run).facing(run.contact)[0])
     assert (curved.name, flat.name) == ("curved face", "face towards x")
     assert (
         len(curved.owners) == len(flat.owners) == 36
@@ -263,7 +269,7 @@ def test_points_that_pull() -> None:
     assert pulling.label == "contact pressure [kPa], negative: pull"
     assert np.asarray(pulling.norm([-2.0, 0.0, 2.0])) == pytest.approx([0.0, 0.5, 1.0])
     assert np.asarray(pushing.norm([0.0, 0.25, 1.0])) == pytest.approx([0.0, 0.5, 1.0])
-    assert np.all(pushing.colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [
+    assert np.all(pushing.map_colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [
         True,
         False,
         False,
@@ -284,9 +290,13 @@ def test_moments() -> None:
             "contact_max_pressure": pressure,
             "u_x_a": u,
         }
-        assert leading(history) == (column, when) and moments(history) == [0.0, when, 3.0]
-    assert moments({"t": t, "u_x_top": u}) == [0.0, 3.0, 3.0]
-    assert moments({"t": t, "iterations": np.zeros(4)}) == [0.0, 0.0, 3.0]
+        assert find_leading_column(history) == (column, when) and choose_times(history) == [
+            0.0,
+            when,
+            3.0,
+        ]
+    assert choose_times({"t": t, "u_x_top": u}) == [0.0, 3.0, 3.0]
+    assert choose_times({"t": t, "iterations": np.zeros(4)}) == [0.0, 0.0, 3.0]
 
 
 def test_all_pictures_of_a_run(
@@ -300,7 +310,7 @@ def test_all_pictures_of_a_run(
     assert [path.name for path in drawn] == ["deformed.png", "faces.png"]
     with plain_pictures():
         film(run, tmp_path / "film.gif", times=[0.012, 0.021, 0.03], title="Blocks")
-    shown = sorted(set(moments(run.history)))
+    shown = sorted(set(choose_times(run.history)))
     assert [axis.get_title() for axis in figures[1].axes[: len(shown)]] == [
         f"face towards -y, t = {t:.4g} s" for t in shown
     ]
@@ -408,7 +418,7 @@ def test_numbers_on_slender_panels_do_not_overlap(high: tuple[float, float]) -> 
     are left."""
     figure, axes = faces.sheet([True], 1, (4.2, 3.8))
     axis = axes[0, 0]
-    faces.limit(axis, np.array([-0.6 * high[0], 0.0]), np.array(high), margin=0.03)
+    faces.set_limits(axis, np.array([-0.6 * high[0], 0.0]), np.array(high), margin=0.03)
     figure.draw_without_rendering()
     for line, side in ((axis.xaxis, 0), (axis.yaxis, 1)):
         low, top = line.get_view_interval()

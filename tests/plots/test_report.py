@@ -22,7 +22,7 @@ import vi_contact as vc
 from vi_contact import engineering
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
-from vi_contact.practice.plots.charts import smoothed
+from vi_contact.practice.plots.charts import smooth_acceleration
 from vi_contact.practice.plots.pages import write_pages
 from vi_contact.practice.plots.sections import Section, header_facts, sections_of
 from vi_contact.practice.studies.report import report
@@ -288,7 +288,7 @@ def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
             {},
             None,
         )
-        raw, low, corner = smoothed(run, "a_x_top")
+        raw, low, corner = smooth_acceleration(run, "a_x_top")
         assert raw.acceleration.max() == 1.0 / dt and corner == 25.0
         found.append(low.acceleration.max())
     limit = 50.0 * (np.pi / 8.0) / np.sin(np.pi / 8.0)

@@ -16,7 +16,7 @@ from report_packages import browser, report_packages
 from written_runs import write_run
 
 from vi_contact.practice.plots.sections import sections_of
-from vi_contact.practice.plots.web_page import extremes, write_web_page
+from vi_contact.practice.plots.web_page import find_extremes, write_web_page
 from vi_contact.practice.studies.report import report
 from vi_contact.run.files.reading import RunFolder
 
@@ -138,9 +138,9 @@ def test_extremes() -> None:
     values = np.sin(np.arange(1000.0))
     values[[137, 561]] = 5.0, -7.0
     values[300:320] = np.nan
-    rows = extremes(values, 50)
+    rows = find_extremes(values, 50)
     assert len(rows) <= 50 and {137, 561} <= set(rows) and np.all(np.diff(rows) > 0)
-    assert np.array_equal(extremes(values, 1000), np.arange(1000))
+    assert np.array_equal(find_extremes(values, 1000), np.arange(1000))
 
 
 def test_checks_and_doubtful_peaks(page: Path) -> None:

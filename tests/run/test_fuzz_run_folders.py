@@ -25,7 +25,7 @@ from vi_contact import ground_motion
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.engineering.peak_values import peaks
-from vi_contact.practice.plots.charts import shown_periods
+from vi_contact.practice.plots.charts import choose_periods
 from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.practice.plots.sections import header_facts, sections_of
 from vi_contact.practice.plots.web_page import can_write
@@ -406,8 +406,8 @@ def test_arrays_of_other_files_are_not_followed(run: Path, tmp_path: Path) -> No
 def test_the_spectrum_begins_at_20_ms(run: Path) -> None:
     """Not at a part of the duration: 0.31 s for a record of 31 s."""
     record = ground_motion.Record(np.ones(3118), 0.01)
-    assert shown_periods(record)[[0, -1]].tolist() == pytest.approx([0.02, 10.0])
-    assert shown_periods(ground_motion.Record(np.ones(50), 0.01))[
+    assert choose_periods(record)[[0, -1]].tolist() == pytest.approx([0.02, 10.0])
+    assert choose_periods(ground_motion.Record(np.ones(50), 0.01))[
         [0, -1]
     ].tolist() == pytest.approx([0.02, 1.0])
 

@@ -148,7 +148,7 @@ def test_exit_status_of_the_command_line(
             raise error
 
         monkeypatch.setattr(
-            "vi_contact.practice.cli.entry.parser", lambda *_, stop=stop: Parser(stop)
+            "vi_contact.practice.cli.entry.build_parser", lambda *_, stop=stop: Parser(stop)
         )
         assert main(["anything"]) == status
         said = capsys.readouterr()

@@ -292,7 +292,7 @@ def test_out_of_memory_is_one_sentence(
     def fails(options: object) -> str:
         raise error
 
-    monkeypatch.setattr("vi_contact.practice.cli.motion._info", fails)
+    monkeypatch.setattr("vi_contact.practice.cli.motion._describe_files", fails)
     assert "out of memory: take a coarser mesh" in said(capsys, ["motion", "info", "file"])
 
 
@@ -302,6 +302,6 @@ def test_other_errors_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     def fails(options: object) -> str:
         raise KeyError(json.dumps("defect"))
 
-    monkeypatch.setattr("vi_contact.practice.cli.motion._info", fails)
+    monkeypatch.setattr("vi_contact.practice.cli.motion._describe_files", fails)
     with pytest.raises(KeyError):
         main(["motion", "info", "file"])

@@ -18,7 +18,7 @@ from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.practice.cli.batch import results
+from vi_contact.practice.cli.batch import make_runs
 from vi_contact.practice.soil import upgoing
 from vi_contact.practice.studies import read_case
 from vi_contact.practice.studies.cases.short_settings import ShortOptions
@@ -334,7 +334,7 @@ def test_many_records_share_the_static_stages(
             "restart": [False, False],
         }
         found.clear()
-        ended = dict(results(asked, MPI.COMM_SELF, lambda share: None))
+        ended = dict(make_runs(asked, MPI.COMM_SELF, lambda share: None))
         assert len(found) == 1
         for number, setting in enumerate(settings):
             alone = case(folder, text, *setting).run(MPI.COMM_SELF, progress=False).history

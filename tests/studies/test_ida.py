@@ -27,7 +27,7 @@ from mpi4py import MPI
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, OutOfTime
-from vi_contact.practice.cli.batch import results
+from vi_contact.practice.cli.batch import make_runs
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.ground_motion import Record, arias, pga, psa, read_record, scaled, tapered
 from vi_contact.practice.plots.studies import DemandPanel, plot_ida
@@ -307,7 +307,7 @@ def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> Non
     runs = [OneRun(case, shaking, scale, tmp_path / f"x{scale}") for scale in (1.0, 2.0)]
     shares: list[float] = []
     ends = dict(
-        results(json.loads(build_command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append)
+        make_runs(json.loads(build_command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append)
     )
     assert shares[-1] == 1.0
     for number, run in enumerate(runs):

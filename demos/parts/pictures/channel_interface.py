@@ -16,12 +16,12 @@ from vi_contact.practice.plots.histories import (
     History,
     canvas,
     cell_edges,
+    list_shaken_axes,
     panels,
     save,
     scale,
-    shaken,
 )
-from vi_contact.practice.plots.maps import thinned
+from vi_contact.practice.plots.maps import thin_rows
 
 SHOWN = {  # panels of plot_openings: point -> outward normal of the channel there
     "tops of the walls": {"19": (-1.0, 0.0), "13": (1.0, 0.0)},
@@ -128,7 +128,7 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
         max(float(np.abs(one).max()) for rows in found.values() for one in rows.values())
     )
     figure, axes = panels(len(found) + 1, (9.0, 9.6))
-    for component in shaken(history):
+    for component in list_shaken_axes(history):
         colour = "black" if component == "x" else "0.6"
         axes[0].plot(
             history["t"],
@@ -262,8 +262,8 @@ def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
     rows = len(run["t"])
     pressure, gap = (np.reshape(run[name], (rows, -1))[:, parts] for name in ("pressure", "gap"))
     gap = np.where(np.reshape(run["active"], (rows, -1))[:, parts] > 0.0, 0.0, gap)
-    t, pressure = thinned(run["t"], pressure)
-    return t, pressure, thinned(run["t"], gap)[1]
+    t, pressure = thin_rows(run["t"], pressure)
+    return t, pressure, thin_rows(run["t"], gap)[1]
 
 
 def plot_envelope(

@@ -11,7 +11,7 @@ import numpy as np
 from demos.parts.pictures.tractions import Tractions, read_tractions
 from vi_contact.core.algebra import Array
 from vi_contact.practice.plots.deformed import StoredFrames, read_frames
-from vi_contact.practice.plots.histories import canvas, save, scale, scaled
+from vi_contact.practice.plots.histories import canvas, save, scale, scale_values
 
 ARROW = 0.3  # length of the longest arrow over the size of the body
 
@@ -36,7 +36,7 @@ def plot_snapshots(
     runs = {name: (read_frames(folder), read_tractions(folder)) for name, folder in folders.items()}
     shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
     stresses = np.array([stress.max() for row in shots for *_, stress in row])
-    shown, unit = scaled(stresses, "Pa")
+    shown, unit = scale_values(stresses, "Pa")
     longest = max(
         float(np.linalg.norm(_arrows(tractions, t), axis=1).max(initial=0.0))
         for _, tractions in runs.values()

@@ -20,7 +20,7 @@ from vi_contact.practice.plots.histories import (
     length_unit,
     panels,
     save,
-    scaled,
+    scale_values,
 )
 
 
@@ -46,7 +46,7 @@ def plot_hysteresis(
     work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(slip)))
     slip = slip if work >= 0.0 else -slip
     metres, unit = length_unit(float(np.max(np.abs(slip), initial=0.0)))
-    newtons, force_unit = scaled(force, "N")
+    newtons, force_unit = scale_values(force, "N")
     figure, ((plot,),) = canvas(1, 1, (6.4, 4.8))
     plot.axhline(0.0, color="0.6", lw=0.6)
     plot.axvline(0.0, color="0.6", lw=0.6)

@@ -16,14 +16,14 @@ from vi_contact.core.surfaces import ContactSurface
 from vi_contact.practice.plots.histories import (
     LEDGER,
     History,
+    escape_dollars,
     length_unit,
+    list_shaken_axes,
     panels,
-    plain,
     save,
     scale,
-    shaken,
 )
-from vi_contact.practice.plots.maps import arc_position, coloured
+from vi_contact.practice.plots.maps import arc_position, draw_cells
 
 SOIL = "_soil"  # after the label of a point: that of the soil which touches it
 
@@ -42,7 +42,7 @@ def draw_histories(
     ``reference`` is in grey.
     """
     drawn = []
-    if shaken(history):
+    if list_shaken_axes(history):
         drawn.append(plot_excitation(history, out / "excitation.png"))
     for axis in "xyz":
         labels = [
@@ -56,7 +56,7 @@ def draw_histories(
                     history,
                     labels,
                     out / f"displacements_{axis}.png",
-                    title=plain(title),
+                    title=escape_dollars(title),
                     component=axis,
                     unilateral=unilateral if axis == "x" else None,
                     reference=reference,
@@ -110,7 +110,7 @@ def plot_points(
             kind = " (contact point)"
             axis.axhline(0.0, color="tab:red", lw=0.8, ls="--")
         axis.set_ylabel(f"$u_{component}$ [{unit}]")
-        axis.set_title(f"point {plain(label)}{kind}", fontsize=9, loc="left")
+        axis.set_title(f"point {escape_dollars(label)}{kind}", fontsize=9, loc="left")
     if reference is not None:
         axes[0].legend(
             fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False
@@ -123,7 +123,7 @@ def plot_excitation(
 ) -> Path:
     """Draw the ground acceleration components that the run used (Fig. 3)."""
     figure, (axis,) = panels(1, (9.0, 3.0))
-    for component in shaken(history):
+    for component in list_shaken_axes(history):
         axis.plot(history["t"], history[f"a_g_{component}"], lw=0.9, label=f"$a_{{g,{component}}}$")
     if axis.lines:
         axis.legend()
@@ -167,7 +167,7 @@ def plot_contact(
     """
     figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
     pressure = np.reshape(history["pressure"], (len(history["t"]), -1))
-    image, unit, pulling = coloured(top, history["t"], position, pressure, "Pa", "magma_r")
+    image, unit, pulling = draw_cells(top, history["t"], position, pressure, "Pa", "magma_r")
     meaning = "negative: pull" if pulling else "white: open"
     figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] ({meaning})")
     top.set(ylabel=axis_label, title="Contact pressure")

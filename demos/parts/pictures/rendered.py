@@ -27,11 +27,11 @@ def render_deformed(
         raise InputError(
             "render_deformed needs pyvista: install it, or draw with plot_deformed"
         ) from error
-    scene = Scene.of(run, [t], magnified)
+    scene = Scene.read(run, [t], magnified)
     if scene.points.shape[1] != 3:
         raise InputError(f"the run in '{run.folder}' is in the plane: draw it with plot_deformed")
     plotter = pyvista.Plotter(off_screen=True)
-    skin = pyvista.PolyData(scene.moved(0), _counted(scene.polygons))
+    skin = pyvista.PolyData(scene.displace(0), _counted(scene.polygons))
     skin.cell_data["von Mises stress [Pa]"] = scene.stress[0]
     bars = (
         {"vertical": True, "position_x": x, "position_y": 0.1, "height": 0.7, "fmt": "%.3g"}
@@ -39,7 +39,7 @@ def render_deformed(
     )
     plotter.add_mesh(skin, cmap="YlGnBu", opacity=0.4, show_edges=True, scalar_bar_args=next(bars))
     if len(scene.sides):
-        faces = pyvista.PolyData(scene.moved(0)[scene.nodes], _counted(scene.sides))
+        faces = pyvista.PolyData(scene.displace(0)[scene.nodes], _counted(scene.sides))
         faces.point_data["contact pressure [Pa]"] = scene.pressure[0]
         plotter.add_mesh(faces, cmap="YlOrRd", scalar_bar_args=next(bars))
     plotter.add_text(

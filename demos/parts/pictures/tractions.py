@@ -7,7 +7,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.practice.plots.deformed import nearest, stored_tangents
+from vi_contact.practice.plots.deformed import compute_tangents, find_nearest
 from vi_contact.run.files.reading import read_run
 
 
@@ -29,7 +29,7 @@ class Tractions:
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Return (pressure (m,), shear (m, d) along the axes) of the step that ends next to t."""
-        (row,) = nearest(self.t, [t])
+        (row,) = find_nearest(self.t, [t])
         return self.normal[row], np.einsum("mj,mij->mi", self.shear[row], self.tangents)
 
 
@@ -42,7 +42,7 @@ def read_tractions(folder: str | Path) -> Tractions:
             f"'{folder}' is not a finished run in plane or space with Contact(): finish one"
         )
     pressure = history["pressure"]
-    tangents = stored_tangents(contact)
+    tangents = compute_tangents(contact)
     shear = (
         -history["traction_t"]
         if "traction_t" in history

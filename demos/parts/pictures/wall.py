@@ -15,7 +15,7 @@ import numpy as np
 from demos.parts.pictures.tractions import read_tractions
 from demos.parts.problems.decomposition import Decomposition
 from demos.parts.problems.wall import Wall
-from vi_contact.practice.plots.deformed import nearest, read_frames
+from vi_contact.practice.plots.deformed import find_nearest, read_frames
 from vi_contact.practice.plots.histories import canvas, save, scale
 
 GROUND, WALL, CONTACT = "0.87", "#e8dfc8", "#c0392b"
@@ -224,7 +224,7 @@ def plot_frames(folder: str | Path, wall: Wall, times: Sequence[float], path: st
     magnified = float(
         f"{LEANS * wall.height / max(float(np.abs(u).max()) for _, u, _ in shots):.1g}"
     )
-    pressures = [tractions.normal[nearest(tractions.t, [t])[0]] for t, _, _ in shots]
+    pressures = [tractions.normal[find_nearest(tractions.t, [t])[0]] for t, _, _ in shots]
     push = max(float(p.max()) for p in pressures)
     most = max(float(stress.max()) for *_, stress in shots)
     (factor, unit), (force, force_unit) = scale(most, "Pa"), scale(push, "Pa")

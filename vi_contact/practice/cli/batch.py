@@ -21,23 +21,34 @@ from ..studies.cases.case import Case, read_case
 from ..studies.cases.stages import run_leading_stages
 from ..studies.cases.vocabulary import Parts
 from .entry import status_of
-from .errors import told, world
+from .errors import explain_errors, world
 
 Runs = dict[int, tuple[Case, dict[str, Any]]]  # by number, with arguments of Case.run
 SECONDS = 5.0  # between two shares
 
 
-def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) -> Iterator[Ended]:
-    """Yield (number, solution or error) as the runs end.
+def make_runs(
+    asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]
+) -> Iterator[Ended]:
+    """Make the runs that are asked for.
 
-    Those of a body that serves all excitations go together.
+    Those of a body that serves all excitations go together. Collective.
+
+    Args:
+        asked: the JSON object of the module's docstring.
+        comm: MPI's communicator.
+        tell: called with the share of the steps that are done.
+
+    Yields:
+        (number, solution or error) as the runs end.
     """
     runs: Runs = {}
-    every = zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
-    for number, (settings, folder, restart) in enumerate(every):
+    entries = zip(asked["settings"], asked["folders"], asked["restart"], strict=True)
+    for number, (settings, folder, restart) in enumerate(entries):
+        reading = partial(read_case, asked["case"], settings, allow=asked["allow"])
         try:
-            case = told(partial(read_case, asked["case"], settings, allow=asked["allow"]), {})
-            told(case.check, {})
+            case = explain_errors(reading, {})
+            explain_errors(case.check, {})
         except ViContactError as error:
             yield number, error
         else:
@@ -47,33 +58,37 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
             )
     if not runs:
         return
+
+    # The stages before the one that differs are run once, for all.
     case, _ = next(iter(runs.values()))
     reached, parts, state = run_leading_stages(case, comm)
     if parts.steady and (reached is None or reached.number == len(case.stages) - 1):
-        yield from _together(runs, parts, state, tell)
+        yield from _make_runs_together(runs, parts, state, tell)
         return
-    for done, (number, (case, more)) in enumerate(runs.items(), start=1):
+    for count, (number, (case, more)) in enumerate(runs.items(), start=1):
         try:
             yield number, case.run(comm, progress=False, reached=reached, **more)
         except ViContactError as error:
             yield number, error
-        tell(done / len(runs))
+        tell(count / len(runs))
 
 
-def _together(
+def _make_runs_together(
     runs: Runs, parts: Parts, state: State | None, tell: Callable[[float], None]
 ) -> Iterator[Ended]:
     """Make runs of one body, which begin at rest in the same state; None: that of the first one."""
+    numbers = list(runs)
     calls = []
     with ExitStack() as stack:
         for case, more in runs.values():
             calls.append(stack.enter_context(case.call(parts, more["out"], state)) | more)
             state = calls[0]["state"]
         for place, ended in simulate_many(calls, tell=tell):
-            yield list(runs)[place], ended
+            yield numbers[place], ended
 
 
 def _print(line: Mapping[str, Any]) -> None:
+    """Print an object as a line of JSON, on the first rank."""
     if world().rank == 0:
         print(json.dumps(line), flush=True)
 
@@ -82,19 +97,18 @@ def main() -> None:
     """Make the runs of the argument and tell of each."""
     import mpi4py.MPI  # noqa: F401
 
-    told = time.monotonic()
+    last = time.monotonic()  # when the share was printed
 
     def tell(share: float) -> None:
-        nonlocal told
-        if time.monotonic() > told + SECONDS:
-            told = time.monotonic()
+        nonlocal last
+        if time.monotonic() > last + SECONDS:
+            last = time.monotonic()
             _print({"share": share})
 
-    for number, ended in results(json.loads(sys.argv[1]), world(), tell):
-        error = isinstance(ended, ViContactError)
-        _print(
-            {"ended": number, "status": int(error), "said": f"vi-contact: {ended}" if error else ""}
-        )
+    for number, ended in make_runs(json.loads(sys.argv[1]), world(), tell):
+        failed = isinstance(ended, ViContactError)
+        sentence = f"vi-contact: {ended}" if failed else ""
+        _print({"ended": number, "status": int(failed), "said": sentence})
 
 
 if __name__ == "__main__":

@@ -1,7 +1,4 @@
-"""Carry out ``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``.
-
-This has their options and what they do.
-"""
+"""Carry out ``vi-contact run``, ``cases``, ``schema`` and ``new``: options and what they do."""
 
 import argparse
 import gc
@@ -23,6 +20,7 @@ if TYPE_CHECKING:
     from ..studies.cases.case import Case
 
 
+# Options that steer the steps of a run: their names in the namespace, and as users write them.
 OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": "--wall-time"}
 
 
@@ -53,14 +51,14 @@ def add_case_commands(commands: Any) -> None:
     add_command(
         commands,
         "cases",
-        _cases,
+        _list_cases,
         help="list the cases of the package",
         description="List the cases of the package, and their folder.",
     )
     add_command(
         commands,
         "schema",
-        _schema,
+        _compose_schema,
         help="print the JSON schema of case files, for editors",
         description=(
             "Print the JSON schema of case files. To keep it: vi-contact schema > case.json."
@@ -70,7 +68,7 @@ def add_case_commands(commands: Any) -> None:
     new = add_command(
         commands,
         "new",
-        _new,
+        _write_starter,
         help="write a case to begin with, and the script of its mesh",
         description=(
             "Write a commented case file and the Gmsh script of its mesh, which you then change."
@@ -160,73 +158,94 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="print no progress line")
 
 
-def _cases(options: argparse.Namespace) -> str:
+def _list_cases(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact cases``: return names, titles and the folder."""
     lines = [f"{name:<10} {title}" for name, title in list_builtin_cases().items()]
     return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
-def _schema(options: argparse.Namespace) -> str:
+def _compose_schema(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact schema``: return the schema."""
     from ..studies.cases.schema import write_schema  # late: finite elements
 
     return write_schema().rstrip()
 
 
-def _new(options: argparse.Namespace) -> str:
+def _write_starter(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact new``: write the files, and return what may be done next."""
     if world().rank:
         return ""
     files = copy_starter(options.name, Path(options.folder or options.name))
-    steps = f"run {files[0]} --check", f"run {files[0]}", f"report results/{options.name}"
+    case = files[0]
     return "\n".join(
-        [*(f"wrote {path}" for path in files), "next:", *(f"    vi-contact {one}" for one in steps)]
+        [
+            *(f"wrote {path}" for path in files),
+            "next:",
+            f"    vi-contact run {case} --check",
+            f"    vi-contact run {case}",
+            f"    vi-contact report results/{options.name}",
+        ]
     )
 
 
 def _run(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact run``: return the summary on the first rank. Collective."""
     import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
     from ...run.wall_time import seconds_of
-    from ..studies.cases.case import read_case  # late: finite elements
 
-    comm, path = world(), locate(options.case)
+    comm = world()
+    path = locate(options.case)
     timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
         seconds_of(options.wall_time)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
-    short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})
-    with ExitStack() as after:
-        after.callback(gc.enable if gc.isenabled() else gc.disable)
-        # modules are no garbage: looking for it takes a tenth of the way to the first step
-        gc.disable()
-        case = read_case(
-            path, short.settings(read_toml(path), options.settings), allow=options.allow
-        )
-    name = case.tables.get("title") or path.stem
-    restart = options.restart or options.changed
+    case = _read_case(options, path)
     out = options.out or case.out or Path("results") / path.stem
     if options.check:
-        vain = next(
-            (name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None
-        )
-        if vain is not None:
-            raise InputError(
-                f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of "
-                "the two out"
-            )
-        return _checked(case, comm, Path(out))
-    found = case.run(
+        _refuse_vain_options(options)
+        return _check_model(case, comm, Path(out))
+    solution = case.run(
         comm,
         out=out,
-        restart=restart,
+        restart=options.restart or options.changed,
         progress=not options.quiet,
         changed=options.changed,
         wall_time=options.wall_time,
     )
-    return f"{name}\n{found.summary()}\noutput: {out}" if comm.rank == 0 else ""
+    if comm.rank != 0:
+        return ""
+    title = case.tables.get("title") or path.stem
+    return f"{title}\n{solution.summary()}\noutput: {out}"
 
 
-def _checked(case: "Case", comm: Any, folder: Path) -> str:
-    """Describe and draw the model of a case.
+def _read_case(options: argparse.Namespace, path: Path) -> "Case":
+    """Read a case file, with the short options and --set."""
+    from ..studies.cases.case import read_case  # late: finite elements
+
+    names = [field.name for field in fields(ShortOptions)]
+    short = ShortOptions(**{name: getattr(options, name) for name in names})
+    with ExitStack() as after:
+        after.callback(gc.enable if gc.isenabled() else gc.disable)
+        # modules are no garbage: looking for it takes a tenth of the way to the first step
+        gc.disable()
+        settings = short.settings(read_toml(path), options.settings)
+        return read_case(path, settings, allow=options.allow)
+
+
+def _refuse_vain_options(options: argparse.Namespace) -> None:
+    """Raise InputError for options that steer the steps, none of which --check computes."""
+    for name, option in OPTIONS.items():
+        if getattr(options, name):
+            raise InputError(
+                f"{option} has no effect with --check, which computes no step: leave one of the "
+                "two out"
+            )
+
+
+def _check_model(case: "Case", comm: Any, folder: Path) -> str:
+    """Describe and draw the model of a case, into a folder. Collective.
 
     It raises InputError for what is wrong with it, once all the rest is told.
     """
@@ -239,14 +258,16 @@ def _checked(case: "Case", comm: Any, folder: Path) -> str:
 
     case.check()
     parts = case.parts(comm)
-    model, ranks = describe(case, comm, parts), parts.system.algebra.comm
+    model = describe(case, comm, parts)
+    ranks = parts.system.algebra.comm
     case.columns(comm, parts)  # points and groups of the recorders
     if is_marked(folder):  # of a run, of which model.json there tells
         folder = inner_folder(folder, "check")
     write_model(ranks, model, run_folder(ranks, folder))
-    on_root(ranks, lambda: write_picture(sketch(model), folder / "model.png", bbox_inches="tight"))
+    picture = folder / "model.png"
+    on_root(ranks, lambda: write_picture(sketch(model), picture, bbox_inches="tight"))
     if comm.rank == 0:
-        say(f"{put_in_words(model)}\npicture: {folder / 'model.png'}")
+        say(f"{put_in_words(model)}\npicture: {picture}")
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

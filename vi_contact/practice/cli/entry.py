@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from ...core.errors import Interrupted, OutOfTime, ViContactError
 from ...core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
+from .errors import Parser, check_words, explain_errors, fail_together, keep_streams, say, world
 from .ida import add_ida_commands
 
 _DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks
@@ -18,10 +18,10 @@ every time step. Start it with "mpirun -n N vi-contact" on N ranks. Options that
 _PETSC = "-vi_contact_"
 
 
-def parser(command: str = "") -> argparse.ArgumentParser:
+def build_parser(command: str = "") -> argparse.ArgumentParser:
     """Build the parser of all commands and options.
 
-    It has those for runs alone, which need less, when one is given.
+    When the command is one that runs cases, the parser has those for runs alone, which need less.
     """
     top = Parser(prog="vi-contact", description=_DESCRIPTION)
     top.add_argument("--version", action="version", version=f"vi-contact {__version__}")
@@ -47,13 +47,17 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     own: list[str] = []
     petsc: list[str] = []
     for before, argument in zip(["", *arguments], arguments, strict=False):
-        value = before.startswith(_PETSC) and not argument.startswith("-")
-        (petsc if value or argument.startswith(_PETSC) else own).append(argument)
+        is_option = argument.startswith(_PETSC)
+        is_value = before.startswith(_PETSC) and not argument.startswith("-")
+        if is_option or is_value:
+            petsc.append(argument)
+        else:
+            own.append(argument)
     return own, petsc
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and print its text; return 0, 1 (one sentence on stderr)or more.
+    """Run a command and print its text; return 0, 1 (one sentence on stderr) or more.
 
     Other statuses are 128 + n (signal n) and 75 (wall time).
     """
@@ -63,13 +67,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        options = parser(own[0] if own else "").parse_args(own)
+        options = build_parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py
 
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
-        if text := told(lambda: options.run(options), getattr(options, "spelling", {})):
+        spelling = getattr(options, "spelling", {})
+        text = explain_errors(lambda: options.run(options), spelling)
+        if text:
             say(text)
 
     return status_of(command)
@@ -82,23 +88,23 @@ def status_of(call: Callable[[], object]) -> int:
     """
     keep_streams()
     try:
-        told(call, {})
+        explain_errors(call, {})
     except ViContactError as error:
         fail_together(str(error))
-        return _stopped(error, 1)
+        return _print_error(error, 1)
     except KeyboardInterrupt as error:
-        stopped = error if isinstance(error, Interrupted) else Interrupted()
+        stop = error if isinstance(error, Interrupted) else Interrupted()
         # on all ranks: a launcher kills what is left when the first one has failed
         if isinstance(error, OutOfTime):
             fail_together(str(error))
-        return _stopped(stopped, stopped.status)
+        return _print_error(stop, stop.status)
     except Exception:  # a defect: its traceback is shown, and the other ranks end too
         fail_together(traceback.format_exc())
         raise
     return 0
 
 
-def _stopped(error: BaseException, status: int) -> int:
+def _print_error(error: BaseException, status: int) -> int:
     """Print the sentence of an error on the first rank; return the status."""
     if world().rank == 0:
         print(f"vi-contact: {error}", file=sys.stderr, flush=True)

@@ -1,6 +1,6 @@
-"""Tell errors in one sentence, and end a command on all its ranks.
+"""Tell errors in one sentence, also those of the machine and of libraries.
 
-Those of the machine and of libraries are among them.
+A command that fails ends on all its ranks.
 """
 
 import argparse
@@ -19,6 +19,8 @@ from ...core.files import sentence
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
+OUTPUTS = ("--out", "--csv", "--png")
+CONTROLS = re.compile("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]")  # characters that steer a terminal
 OUT_OF_MEMORY = (
     "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a "
     "run keeps what it has written, and --restart continues it"
@@ -36,11 +38,9 @@ def check_words(arguments: Sequence[str]) -> None:
         if word.startswith("--") and word.endswith("=--"):
             raise InputError(f"{shown(word)} has no value: give one")
     for option, value in zip(arguments, [*arguments[1:], None], strict=True):
-        if (option in ("--out", "--csv", "--png") and value == "") or option in (
-            "--out=",
-            "--csv=",
-            "--png=",
-        ):
+        apart = option in OUTPUTS and value == ""
+        joined = option.endswith("=") and option.removesuffix("=") in OUTPUTS
+        if apart or joined:
             raise InputError(
                 f"{option.rstrip('=')} is empty: give the name of a file or folder, or leave it out"
             )
@@ -51,44 +51,51 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and end the program."""
-        super().error(
-            shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …")
-        )
+        words = " ".join(word[:SHOWN] for word in message.split())
+        super().error(shorten(words, 400, placeholder=" …"))
 
 
-def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
-    """Return what the call returns.
+def explain_errors(call: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
+    """Return what a call returns, and raise its errors as sentences for users.
 
-    It raises ViContactError of one sentence for errors of memory, files and sizes of numbers.
+    Args:
+        call: without arguments.
+        spelling: argument -> option; what sentences call units= is --units here.
 
-    spelling: argument -> option: what sentences call units= is --units here.
+    Raises:
+        ViContactError: of one sentence, also for errors of memory, files and sizes of numbers.
+        Exception: any other one, as it is.
     """
     try:
-        return run()
+        return call()
     except ViContactError as error:
         if of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
         if spelling and isinstance(error, InputError):
-            said = str(error)
-            for argument, option in spelling.items():
-                said = said.replace(f" {argument}= ", f" {option} ").replace(
-                    f" {argument}=", f" {option} "
-                )
-            raise InputError(said.rstrip()) from error
+            raise InputError(_spell_options(str(error), spelling)) from error
         raise
-    except Exception as error:  # those that have no sentence are raised again
-        text = _sentence(error)
+    except Exception as error:
+        text = _explain(error)
         if text is None:
             raise
         raise ViContactError(text) from error
 
 
-def printable(text: str) -> str:
+def _spell_options(text: str, spelling: Mapping[str, str]) -> str:
+    """Write options in place of the arguments of functions in a sentence."""
+    for argument, option in spelling.items():
+        # with a blank after it first, or two blanks would be left
+        text = text.replace(f" {argument}= ", f" {option} ")
+        text = text.replace(f" {argument}=", f" {option} ")
+    return text.rstrip()
+
+
+def escape_unprintable(text: str) -> str:
     """Return the text without what standard output cannot write.
 
     Such are names of files that are no UTF-8. It is also without characters that steer a terminal.
     """
-    text = re.sub("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]", lambda found: ascii(found[0])[1:-1], text)
+    text = CONTROLS.sub(lambda match: ascii(match[0])[1:-1], text)
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
@@ -99,7 +106,7 @@ def say(text: str) -> None:
     Where nobody reads it any more (head has ended), it and all that follows is dropped.
     """
     try:
-        print(printable(text), flush=True)
+        print(escape_unprintable(text), flush=True)
     except BrokenPipeError:
         # or Python complains at its end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -121,7 +128,8 @@ def keep_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
 
 
-def _sentence(error: Exception) -> str | None:
+def _explain(error: Exception) -> str | None:
+    """Return the sentence of an error of the machine or of a library; None if it has none."""
     if of_memory(error):
         return OUT_OF_MEMORY
     if isinstance(error, OSError):
@@ -148,14 +156,16 @@ def world() -> Any:
 
 
 def fail_together(text: str) -> None:
-    """Return when all ranks come here.
+    """Wait until all ranks have failed.
 
-    Else it says what stopped this one and ends the others, which wait. Collective.
+    Where one does not come here in time, the others wait for something else: this rank then says
+    what stopped it, and ends them. Collective.
     """
     ranks = world()
     if ranks.size == 1:
         return
-    request, end = ranks.Ibarrier(), time.monotonic() + PATIENCE
+    request = ranks.Ibarrier()
+    end = time.monotonic() + PATIENCE
     while not request.Test():
         if time.monotonic() > end:
             print(

@@ -3,7 +3,7 @@
 import argparse
 import shlex
 import signal
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...core.checks import shown
 from ...core.errors import InputError, OutOfTime, ViContactError
@@ -11,13 +11,16 @@ from ..studies.cases.library import locate
 from .errors import say
 from .options import add_command, add_settings
 
+if TYPE_CHECKING:
+    from ..studies.ida.ida import IDA
+
 
 def add_ida_commands(commands: Any) -> None:
     """Add ``ida`` to the commands of the top parser."""
     ida = add_command(
         commands,
         "ida",
-        _ida,
+        _analyse,
         help=(
             "incremental dynamic analysis: run a case file under many records, each at several "
             "intensities"
@@ -40,16 +43,16 @@ def add_ida_commands(commands: Any) -> None:
             "record in each line"
         ),
     )
-    one_of = ida.add_mutually_exclusive_group(required=True)
-    one_of.add_argument(
+    choice = ida.add_mutually_exclusive_group(required=True)
+    choice.add_argument(
         "--scales",
-        type=_numbers,
+        type=_read_numbers,
         metavar="F,F,...",
         help="run each motion multiplied by each of these factors",
     )
-    one_of.add_argument(
+    choice.add_argument(
         "--levels",
-        type=_numbers,
+        type=_read_numbers,
         metavar="I,I,...",
         help=("scale each motion to each of these values of the intensity measure, in SI units"),
     )
@@ -104,7 +107,7 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--part",
-        type=_part,
+        type=_read_part,
         default="1/1",
         metavar="I/N",
         help="compute every N-th run only, beginning with run I; use it in job arrays",
@@ -126,7 +129,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def _read_numbers(text: str) -> tuple[float, ...]:
+    """Read numbers with commas between them."""
     try:
         return tuple(float(word) for word in text.split(","))
     except ValueError:
@@ -135,7 +139,8 @@ def _numbers(text: str) -> tuple[float, ...]:
         ) from None
 
 
-def _part(text: str) -> tuple[int, int]:
+def _read_part(text: str) -> tuple[int, int]:
+    """Read "1/4" as (1, 4)."""
     first, slash, count = text.partition("/")
     if not (slash and first.isdecimal() and count.isdecimal()):
         raise argparse.ArgumentTypeError(
@@ -144,27 +149,12 @@ def _part(text: str) -> tuple[int, int]:
     return int(first), int(count)
 
 
-def _ida(options: argparse.Namespace) -> str:
-    from ..studies.cases.case import read_case
-    from ..studies.ida.ida import IDA, run_ida
-    from ..studies.ida.runs import record_set
+def _analyse(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact ida``: return how many runs there are; an error if one has failed."""
+    from ..studies.ida.ida import run_ida
 
-    try:
-        launch = shlex.split(options.launch)
-    except ValueError as error:
-        raise InputError(
-            f"--launch {shown(options.launch)}: {error}; close the quotation mark"
-        ) from None
-    motions = [files for motion in options.motions for files in record_set(motion)]
-    study = IDA(
-        read_case(locate(options.case), options.settings, allow=options.allow),
-        motions,
-        options.edp,
-        scales=options.scales or (),
-        levels=options.levels or (),
-        intensity=options.im,
-        limits=options.fragility,
-    )
+    launch = _split_launch(options.launch)
+    study = _read_study(options)
     # a scheduler's end of time is as Ctrl-C, also in the background
     for signum in (signal.SIGINT, signal.SIGTERM):
         signal.signal(signum, signal.default_int_handler)
@@ -184,10 +174,36 @@ def _ida(options: argparse.Namespace) -> str:
         raise ViContactError(
             "interrupted: give the same command again to continue the study"
         ) from None
-    failed = [row["reason"] for row in rows if row["status"] != "finished"]
-    if failed:
+    reasons = [row["reason"] for row in rows if row["status"] != "finished"]
+    if reasons:
         raise ViContactError(
-            f"{len(failed)} of {len(rows)} runs have failed, the first because: {failed[0]}; all "
+            f"{len(reasons)} of {len(rows)} runs have failed, the first because: {reasons[0]}; all "
             f"rows with their reasons are in {options.out}/ida.csv"
         )
     return f"{len(rows)} runs, 0 of them failed: {options.out}/ida.csv, ida.png"
+
+
+def _split_launch(text: str) -> list[str]:
+    """Split the words before the command of every run as a shell does."""
+    try:
+        return shlex.split(text)
+    except ValueError as error:
+        raise InputError(f"--launch {shown(text)}: {error}; close the quotation mark") from None
+
+
+def _read_study(options: argparse.Namespace) -> "IDA":
+    """Read case and records of an incremental dynamic analysis."""
+    from ..studies.cases.case import read_case
+    from ..studies.ida.ida import IDA
+    from ..studies.ida.runs import record_set
+
+    motions = [files for motion in options.motions for files in record_set(motion)]
+    return IDA(
+        read_case(locate(options.case), options.settings, allow=options.allow),
+        motions,
+        options.edp,
+        scales=options.scales or (),
+        levels=options.levels or (),
+        intensity=options.im,
+        limits=options.fragility,
+    )

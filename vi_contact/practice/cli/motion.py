@@ -3,6 +3,7 @@
 import argparse
 import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,16 @@ from ..ground_motion.formats.reader import read_record
 from ..ground_motion.formats.writer import write_at2, write_columns, write_path_series
 from ..ground_motion.intensity import pga, record_info
 from ..ground_motion.record import LARGEST_PEAK, UNITS, Record, canonical_units
-from ..ground_motion.spectra import response_spectrum
+from ..ground_motion.spectra import ResponseSpectrum, response_spectrum
 from ..plots.records import plot_motion, plot_spectra
-from .options import add_actions, add_command, output_file, spaced
+from .options import add_actions, add_command, output_file, space_numbers
 
+# Ending of a file -> format.
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
+_WRITERS = {"columns": write_columns, "at2": write_at2, "path": write_path_series}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
 _SHOWN = (0.1, 0.2, 0.5, 1.0, 2.0)  # periods of the printed table [s]
+# Arguments of read_record -> the options that stand for them.
 _SPELLING = {
     "units": "--units",
     "dt": "--dt",
@@ -44,7 +48,7 @@ def add_motion_commands(commands: Any) -> None:
     info = add_command(
         actions,
         "info",
-        _info,
+        _describe_files,
         help="print what a record file holds: units, peaks, intensities, duration, drift",
     )
     info.add_argument("file", nargs="+", help=_RECORD_FILE)
@@ -77,7 +81,7 @@ def add_motion_commands(commands: Any) -> None:
     spectrum = add_command(
         actions,
         "spectrum",
-        _spectrum,
+        _compute_spectra,
         help=(
             "compute response spectra, as a CSV table and a picture, beside the spectrum of "
             "Eurocode 8"
@@ -116,7 +120,7 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--largest",
-        type=acceleration,
+        type=read_acceleration,
         metavar="A",
         help=(
             "accept peaks up to this acceleration (default 10g; a larger peak usually "
@@ -136,6 +140,13 @@ def _add_processing(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "processing, in this order", "Give accelerations as 3.0 (in m/s2), or with a unit as 0.3g."
     )
+    _add_windows(group)
+    _add_filters(group)
+    _add_scaling(group)
+
+
+def _add_windows(group: Any) -> None:
+    """Add the options of the parts of a record that are kept, and of its ends."""
     group.add_argument(
         "--trim",
         type=float,
@@ -162,6 +173,10 @@ def _add_processing(parser: argparse.ArgumentParser) -> None:
             "number follows)"
         ),
     )
+
+
+def _add_filters(group: Any) -> None:
+    """Add the options of the filter, of the time step and of the baseline."""
     group.add_argument(
         "--low",
         type=float,
@@ -203,15 +218,19 @@ def _add_processing(parser: argparse.ArgumentParser) -> None:
             "rest where it began"
         ),
     )
-    one_of = group.add_mutually_exclusive_group()
-    one_of.add_argument("--scale", type=float, metavar="F", help="multiply the record by F")
-    one_of.add_argument(
-        "--pga", type=acceleration, metavar="A", help="scale to this peak acceleration"
+
+
+def _add_scaling(group: Any) -> None:
+    """Add the options of the size of a record, of which a command takes one at most."""
+    choice = group.add_mutually_exclusive_group()
+    choice.add_argument("--scale", type=float, metavar="F", help="multiply the record by F")
+    choice.add_argument(
+        "--pga", type=read_acceleration, metavar="A", help="scale to this peak acceleration"
     )
-    one_of.add_argument(
+    choice.add_argument(
         "--arias", type=float, metavar="I", help="scale to this Arias intensity [m/s]"
     )
-    one_of.add_argument(
+    choice.add_argument(
         "--psa",
         nargs=2,
         metavar=("A", "T"),
@@ -288,7 +307,10 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
         ),
     )
     group.add_argument(
-        "--ag", type=acceleration, metavar="A", help="design ground acceleration on ground type A"
+        "--ag",
+        type=read_acceleration,
+        metavar="A",
+        help="design ground acceleration on ground type A",
     )
     group.add_argument(
         "--ec8-type", type=int, choices=[1, 2], default=1, help="spectrum type (default 1)"
@@ -319,7 +341,7 @@ def _add_spectrum_output(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def acceleration(text: str) -> float:
+def read_acceleration(text: str) -> float:
     """Read metres per second squared from "3.0", "0.3g", "0.3 g" or "300gal"."""
     match = _QUANTITY.fullmatch(text.strip())
     try:
@@ -334,18 +356,11 @@ def acceleration(text: str) -> float:
 
 def _read(options: argparse.Namespace, path: str) -> Record:
     """Return the record of a file after the processing asked for."""
-    asked = {one.name: getattr(options, one.name) for one in fields(Processing)}
-    if (words := options.psa) is not None:
-        try:
-            asked["psa"] = acceleration(words[0]), (period := float(words[1]))
-            if not 0.0 < period < math.inf:
-                raise ValueError(words[1])
-        except (argparse.ArgumentTypeError, ValueError):
-            raise InputError(
-                f"--psa {' '.join(words)}: give an acceleration such as 0.5g, and a period in "
-                "seconds"
-            ) from None
-    return Processing(**asked)(
+    steps = {field.name: getattr(options, field.name) for field in fields(Processing)}
+    if options.psa is not None:
+        steps["psa"] = _read_psa(options.psa)
+    process = Processing(**steps)
+    return process(
         read_record(
             path,
             options.units,
@@ -357,34 +372,49 @@ def _read(options: argparse.Namespace, path: str) -> Record:
     )
 
 
-def _info(options: argparse.Namespace) -> str:
-    return "\n\n".join(_told(_read(options, path)) for path in options.file)
+def _read_psa(words: Sequence[str]) -> tuple[float, float]:
+    """Read pseudo-acceleration [m/s²] and period [s]."""
+    try:
+        acceleration = read_acceleration(words[0])
+        period = float(words[1])
+        if not 0.0 < period < math.inf:
+            raise ValueError(words[1])
+    except (argparse.ArgumentTypeError, ValueError):
+        raise InputError(
+            f"--psa {' '.join(words)}: give an acceleration such as 0.5g, and a period in seconds"
+        ) from None
+    return acceleration, period
 
 
-def _told(record: Record) -> str:
+def _describe_files(options: argparse.Namespace) -> str:
+    """Carry out ``motion info``: return a table for each file."""
+    return "\n\n".join(_describe_record(_read(options, path)) for path in options.file)
+
+
+def _describe_record(record: Record) -> str:
     """Return the table of a record, and where its data come from.
 
     These are its units, its time step and its number of samples.
     """
-    spelled = {
+    origins = {
         "units": record.units_from.replace("option", "--units"),
         "dt": record.dt_from.replace("option", "--dt"),
         "samples": record.samples_from,
     }
-    rows = [f"{f'{name} from':<20}{origin}" for name, origin in spelled.items()]
+    rows = [f"{f'{name} from':<20}{origin}" for name, origin in origins.items()]
     table = record_info(record).split("\n")
-    notes = next(k for k, row in enumerate(table) if row.startswith("sha256")) + 1
-    return "\n".join([*table[:notes], *rows, *table[notes:]])
+    # between what the file holds and the notes about it
+    end = next(k for k, row in enumerate(table) if row.startswith("sha256")) + 1
+    return "\n".join([*table[:end], *rows, *table[end:]])
 
 
 def _convert(options: argparse.Namespace) -> str:
+    """Carry out ``motion convert``: write the record, and return what was written."""
     output_file(options.out, reads=[options.file])
     record = _read(options, options.file)
     form = options.to or _FORMATS.get(Path(options.out).suffix.lower(), "columns")
     units = options.out_units or ("g" if form == "at2" else "m/s2")
-    {"columns": write_columns, "at2": write_at2, "path": write_path_series}[form](
-        record, options.out, units
-    )
+    _WRITERS[form](record, options.out, units)
     lines = [
         f"{options.out}: {form}, {record.acceleration.size} samples, dt = {record.dt:.10g} s, in "
         f"{units}, PGA = {pga(record):.4g} m/s2"
@@ -395,10 +425,12 @@ def _convert(options: argparse.Namespace) -> str:
             f" # -factor: your unit of acceleration per {units}"
         )
     lines += [f"doubt: {doubt}" for doubt in record.doubts]
-    return "\n".join(lines + [f"note: {note}" for note in record.notes])
+    lines += [f"note: {note}" for note in record.notes]
+    return "\n".join(lines)
 
 
 def _plot(options: argparse.Namespace) -> str:
+    """Carry out ``motion plot``: draw the record, and return the path of the picture."""
     out = output_file(
         options.out or Path(options.file).stem + ".png", reads=[options.file], picture=True
     )
@@ -407,11 +439,18 @@ def _plot(options: argparse.Namespace) -> str:
     return f"picture: {plot_motion(record, out, units=units)}"
 
 
-def _spectrum(options: argparse.Namespace) -> str:
+def _compute_spectra(options: argparse.Namespace) -> str:
+    """Carry out ``motion spectrum``: write table and picture, and return a few values."""
     units = canonical_units("--out-units", options.out_units)
-    target = _target(options)
-    periods = spaced("--periods", options.periods)
-    spectra, steps, rows = {}, {}, []
+    target = _read_target(options)
+    periods = space_numbers("--periods", options.periods)
+
+    # All spectra; of each a row with its values at a few periods is printed.
+    spectra: dict[str, ResponseSpectrum] = {}
+    steps: dict[str, float] = {}
+    lines = [
+        f"{f'PSA [{units}] at period [s]':<44}" + "".join(f"{period:>10g}" for period in _SHOWN)
+    ]
     for path in options.file:
         record = _read(options, path)
         for damping in options.damping:
@@ -422,8 +461,10 @@ def _spectrum(options: argparse.Namespace) -> str:
                 )
             spectra[label] = response_spectrum(record, periods, damping=damping)
             steps[label] = record.dt
-            at = response_spectrum(record, np.array(_SHOWN), damping=damping).psa / UNITS[units]
-            rows.append(f"{label:<44}" + "".join(f"{value:>10.4g}" for value in at))
+            psa = response_spectrum(record, np.array(_SHOWN), damping=damping).psa / UNITS[units]
+            lines.append(f"{label:<44}" + "".join(f"{value:>10.4g}" for value in psa))
+
+    # The names of the files are checked before the first is written.
     stem = Path(options.file[0]).stem
     table = output_file(options.csv or f"{stem}_spectrum.csv", reads=options.file)
     picture = output_file(options.png or f"{stem}_spectrum.png", reads=options.file, picture=True)
@@ -432,18 +473,15 @@ def _spectrum(options: argparse.Namespace) -> str:
             f"{table}: the table would be overwritten by its picture; give --csv and --png two "
             "names"
         )
-    _write_csv(table, spectra, target)
+    _write_table(table, spectra, target)
     plot_spectra(spectra, picture, target=target, steps=steps, units=units)
     if target is not None:
-        rows.append(
-            f"{'EC8 target':<44}"
-            + "".join(f"{v / UNITS[units]:>10.4g}" for v in target.acceleration(_SHOWN))
-        )
-    head = f"{f'PSA [{units}] at period [s]':<44}" + "".join(f"{period:>10g}" for period in _SHOWN)
-    return "\n".join([head, *rows, f"table: {table}", f"picture: {picture}"])
+        values = target.acceleration(np.array(_SHOWN)) / UNITS[units]
+        lines.append(f"{'EC8 target':<44}" + "".join(f"{value:>10.4g}" for value in values))
+    return "\n".join([*lines, f"table: {table}", f"picture: {picture}"])
 
 
-def _target(options: argparse.Namespace) -> Any:
+def _read_target(options: argparse.Namespace) -> EC8Spectrum | None:
     """Return the Eurocode 8 spectrum asked for, at the first damping, or None."""
     if (options.ec8 is None) != (options.ag is None):
         raise InputError(
@@ -456,15 +494,26 @@ def _target(options: argparse.Namespace) -> Any:
     )
 
 
-def _write_csv(path: Path, spectra: Any, target: Any) -> None:
+def _write_table(
+    path: Path, spectra: Mapping[str, ResponseSpectrum], target: EC8Spectrum | None
+) -> None:
     """Write one row for each record, damping and period, in SI units."""
-    rows = []
-    for label, one in spectra.items():
-        columns = [one.periods, one.displacement, one.velocity, one.acceleration, one.psv, one.psa]
-        columns += [] if target is None else [target.acceleration(one.periods)]
-        rows += [
-            [label.rpartition(",")[0], one.damping, *(f"{value:.8g}" for value in row)]
-            for row in zip(*columns, strict=True)
-        ]
     header = ["record", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psv_m/s", "psa_m/s2"]
-    write_csv(path, header if target is None else [*header, "ec8_m/s2"], rows)
+    if target is not None:
+        header.append("ec8_m/s2")
+    rows: list[list[Any]] = []
+    for label, spectrum in spectra.items():
+        name, _, _ = label.rpartition(",")  # without the damping
+        columns = [
+            spectrum.periods,
+            spectrum.displacement,
+            spectrum.velocity,
+            spectrum.acceleration,
+            spectrum.psv,
+            spectrum.psa,
+        ]
+        if target is not None:
+            columns.append(target.acceleration(spectrum.periods))
+        for numbers in zip(*columns, strict=True):
+            rows.append([name, spectrum.damping, *(f"{number:.8g}" for number in numbers)])
+    write_csv(path, header, rows)

@@ -34,16 +34,24 @@ def add_command(
         help: the line about it in the list of commands, without a period.
         description: the text above its options; ``help`` as a sentence when None.
     """
-    sentence = f"{help[0].upper()}{help[1:]}."
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=help, description=sentence if description is None else description
-    )
+    if description is None:
+        description = f"{help[0].upper()}{help[1:]}."
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=description)
     parser.set_defaults(run=run)
     return parser
 
 
 def add_actions(commands: Any, name: str, *, help: str) -> Any:
-    """Add a command that has actions, and return what they are added to by ``add_command``."""
+    """Add a command that has actions.
+
+    Args:
+        commands: what argparse's ``add_subparsers`` returned, of the top parser.
+        name: the word that calls it.
+        help: the line about it in the list of commands, without a period.
+
+    Returns:
+        what its actions are added to by ``add_command``.
+    """
     actions = commands.add_parser(name, help=help)
     return actions.add_subparsers(dest="action", required=True, metavar="ACTION")
 
@@ -80,10 +88,11 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="DIR", help="output folder of a run")
 
 
-def spaced(option: str, values: Sequence[float]) -> Any:
+def space_numbers(option: str, values: Sequence[float]) -> Any:
     """Read FROM, TO, N as N logarithmically spaced numbers.
 
-    It raises InputError for others, before memory is taken.
+    Raises:
+        InputError: for others, before memory is taken.
     """
     first, last, count = values
     if not (0.0 < first < last < math.inf and 2 <= count < math.inf and count == int(count)):
@@ -91,9 +100,8 @@ def spaced(option: str, values: Sequence[float]) -> Any:
             f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from "
             "2 on"
         )
-    return np.geomspace(
-        first, last, counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
-    )
+    number = counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
+    return np.geomspace(first, last, number)
 
 
 def output_file(
@@ -101,9 +109,14 @@ def output_file(
 ) -> Path:
     """Return the file that a command is about to write, checked before any work is done.
 
-    reads: files of its input, which it must not overwrite; picture: whether its name says the
-    format of a picture. InputError for a folder, a file in no folder, one of ``reads``, or a name
-    without the ending of a picture.
+    Args:
+        path: the file.
+        reads: files of the command's input, which it must not overwrite.
+        picture: whether the name says the format of a picture.
+
+    Raises:
+        InputError: a folder, a file in no folder, one of ``reads``, or a name without the ending
+            of a picture.
     """
     out = Path(path)
     try:
@@ -123,7 +136,7 @@ def output_file(
             f"{out}: a picture ends in {', '.join(PICTURES[:-1])} or {PICTURES[-1]}; give it such "
             "a name"
         )
-    if out.exists() and any(Path(one).exists() and out.samefile(one) for one in reads):
+    if out.exists() and any(Path(source).exists() and out.samefile(source) for source in reads):
         raise InputError(
             f"{out} is read by this command, which would overwrite it: give another name for the "
             "output"

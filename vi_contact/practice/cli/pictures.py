@@ -3,16 +3,27 @@
 import argparse
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...core.checks import shown
 from ...core.errors import InputError
 from .errors import world
 from .options import add_command, add_folder, output_file
 
+if TYPE_CHECKING:
+    from ...run.files.reading import RunFolder
+    from ..plots.sections import Section
+
 
 def add_picture_commands(commands: Any) -> None:
     """Add ``report``, ``plot`` and ``film`` to the commands of the top parser."""
+    _add_report(commands)
+    _add_plot(commands)
+    _add_film(commands)
+
+
+def _add_report(commands: Any) -> None:
+    """Add ``report`` with its options."""
     report = add_command(
         commands,
         "report",
@@ -60,6 +71,9 @@ def add_picture_commands(commands: Any) -> None:
     )
     add_folder(report)
 
+
+def _add_plot(commands: Any) -> None:
+    """Add ``plot`` with its options."""
     plot = add_command(
         commands,
         "plot",
@@ -85,6 +99,9 @@ def add_picture_commands(commands: Any) -> None:
     add_folder(plot)
     _add_magnify(plot)
 
+
+def _add_film(commands: Any) -> None:
+    """Add ``film`` with its options."""
     film = add_command(
         commands,
         "film",
@@ -137,6 +154,7 @@ def _add_magnify(parser: argparse.ArgumentParser) -> None:
 
 
 def _report(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact report``: return the paths of what was written. Collective."""
     with suppress(ImportError):  # a report needs no MPI
         import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
@@ -150,65 +168,80 @@ def _report(options: argparse.Namespace) -> str:
     failed = refine(options.folder, comm, allow=options.allow) if options.refine else None
     if comm.rank != 0:
         return ""
-    columns = None if options.show is None else [one.split(",") for one in options.show]
-    told, written = report(
+    columns = None if options.show is None else [group.split(",") for group in options.show]
+    refinement, paths = report(
         options.folder, out=options.out, title=options.title, columns=columns, failed=failed
     )
-    lines = [
-        *told.sentences,
-        *(
-            f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:])
-            for table in told.tables
-            for row in (table.header, *table.rows)
-        ),
-    ]
-    missing = [] if options.out is not None or can_write() else [f"no report.html: {MISSING}"]
-    return "\n".join([*(lines if options.refine else ()), *map(str, written), *missing])
+    lines = _format_refinement(refinement) if options.refine else []
+    lines += map(str, paths)
+    if options.out is None and not can_write():
+        lines.append(f"no report.html: {MISSING}")
+    return "\n".join(lines)
+
+
+def _format_refinement(section: "Section") -> list[str]:
+    """Return the lines about the discretisation error: sentences, and tables in columns."""
+    lines = [*section.sentences]
+    for table in section.tables:
+        for first, *others in (table.header, *table.rows):
+            lines.append(f"{first:<48}" + "".join(f"{cell:>13}" for cell in others))
+    return lines
 
 
 def _plot(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact plot``: return the paths of the pictures."""
+    from ...run.files.reading import read_run
     from ..plots.bodies import draw_run
+    from ..plots.deformed import read_frames
 
-    run, frames, title, times = _opened(options)
+    run = read_run(options.folder)
+    read_frames(run)  # without them there is nothing to draw: an InputError says so
+    times = _read_times(run, options.times)
     out = output_file(Path(options.out or options.folder) / "deformed.png").parent
-    return "\n".join(
-        map(str, draw_run(run, out, title=title, times=times, magnified=options.magnified))
-    )
+    paths = draw_run(run, out, title=_read_title(run), times=times, magnified=options.magnified)
+    return "\n".join(map(str, paths))
 
 
 def _film(options: argparse.Namespace) -> str:
+    """Carry out ``vi-contact film``: return the path of the film."""
+    from ...run.files.reading import read_run
     from ..plots.bodies import film
+    from ..plots.deformed import read_frames
 
-    run, frames, title, times = _opened(options)
+    run = read_run(options.folder)
+    frames = read_frames(run)
+    times = _read_times(run, options.times)
+    title = _read_title(run)
     out = output_file(options.out or Path(options.folder) / "film.gif")
     if times is not None:
         times = [t for t in frames.t.tolist() if times[0] <= t <= times[-1]]
-    return str(
-        film(run, out, times=times, magnified=options.magnified, column=options.column, title=title)
+    path = film(
+        run, out, times=times, magnified=options.magnified, column=options.column, title=title
     )
+    return str(path)
 
 
-def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | None]:
-    """Return the run, its frames, its title, and the moments.
-
-    These are the moments asked for, which have to be within the run.
-    """
-    from ...run.files.reading import read_run
-    from ..plots.deformed import read_frames
+def _read_title(run: "RunFolder") -> str:
+    """Read the title of the case of a run."""
     from ..studies.cases.library import read_copy
 
-    run, asked, times = read_run(options.folder), options.times, None
-    frames, (first, last) = read_frames(run), run.history["t"][[0, -1]]
-    if asked is not None:
-        try:
-            times = [float(one) for one in asked.split(",")]
-        except ValueError:
-            raise InputError(
-                f"{shown(asked)} is not a list of moments: give seconds, such as 3.2,5"
-            ) from None
-        slack = 1e-9 * (last - first)
-        if not all(first - slack <= one <= last + slack for one in times):
-            raise InputError(
-                f"{shown(asked)} is outside the run: give seconds from {first:g} to {last:g}"
-            )
-    return run, frames, str(read_copy(run.folder).get("title", "Deformed bodies")), times
+    return str(read_copy(run.folder).get("title", "Deformed bodies"))
+
+
+def _read_times(run: "RunFolder", text: str | None) -> list[float] | None:
+    """Read the moments asked for [s], which have to be within the run; None for none."""
+    if text is None:
+        return None
+    try:
+        times = [float(word) for word in text.split(",")]
+    except ValueError:
+        raise InputError(
+            f"{shown(text)} is not a list of moments: give seconds, such as 3.2,5"
+        ) from None
+    first, last = run.history["t"][[0, -1]]
+    slack = 1e-9 * (last - first)
+    if not all(first - slack <= t <= last + slack for t in times):
+        raise InputError(
+            f"{shown(text)} is outside the run: give seconds from {first:g} to {last:g}"
+        )
+    return times

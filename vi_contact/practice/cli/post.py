@@ -1,6 +1,7 @@
 """``vi-contact post peaks|spectrum|transfer|loop|checks``: options and what each does."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,22 +17,45 @@ from ..engineering import (
     write_peaks,
 )
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
-from .options import PICTURES, add_actions, add_command, add_folder, output_file, spaced
+from .options import PICTURES, add_actions, add_command, add_folder, output_file, space_numbers
 
 if TYPE_CHECKING:
     from ...run.files.reading import RunFolder
+    from ..engineering.checks.comparison import Comparison
+    from ..ground_motion.spectra import ResponseSpectrum
+
+CHECKS_HEADER = (
+    "name",
+    "formula",
+    "source",
+    "range",
+    "inputs",
+    "expected",
+    "found",
+    "unit",
+    "ratio",
+    "applies",
+)
 
 
 def add_post_commands(commands: Any) -> None:
-    """Add ``post`` to the commands of the top parser."""
+    """Add ``post`` with its actions to the commands of the top parser."""
     actions = add_actions(
         commands, "post", help="compute numbers and draw pictures from the folder of a run"
     )
+    _add_peaks(actions)
+    _add_spectrum(actions)
+    _add_transfer(actions)
+    _add_checks(actions)
+    _add_loop(actions)
 
+
+def _add_peaks(actions: Any) -> None:
+    """Add ``peaks`` with its options."""
     largest = add_command(
         actions,
         "peaks",
-        _peaks,
+        _tabulate_peaks,
         help="print the largest and the smallest value of every column, as a table",
     )
     add_folder(largest)
@@ -40,10 +64,13 @@ def add_post_commands(commands: Any) -> None:
         "columns", metavar="COLUMN", nargs="*", help="columns of history.csv (default: all)"
     )
 
+
+def _add_spectrum(actions: Any) -> None:
+    """Add ``spectrum`` with its options."""
     spectrum = add_command(
         actions,
         "spectrum",
-        _spectrum,
+        _compute_spectra,
         help=(
             "compute floor response spectra of recorded accelerations, as a CSV table and a picture"
         ),
@@ -76,10 +103,13 @@ def add_post_commands(commands: Any) -> None:
         help="use the motion relative to the ground instead of the absolute motion",
     )
 
+
+def _add_transfer(actions: Any) -> None:
+    """Add ``transfer`` with its options."""
     transfer = add_command(
         actions,
         "transfer",
-        _transfer,
+        _compute_transfer,
         help=(
             "compute the transfer function between two recorded accelerations, as a CSV table "
             "and a picture"
@@ -115,16 +145,25 @@ def add_post_commands(commands: Any) -> None:
         ),
     )
 
+
+def _add_checks(actions: Any) -> None:
+    """Add ``checks`` with its options."""
     checks = add_command(
-        actions, "checks", _checks, help="compare the run with the formulas of its [[check]] tables"
+        actions,
+        "checks",
+        _compare_with_formulas,
+        help="compare the run with the formulas of its [[check]] tables",
     )
     add_folder(checks)
     _add_table(checks, "checks")
 
+
+def _add_loop(actions: Any) -> None:
+    """Add ``loop`` with its options."""
     loop = add_command(
         actions,
         "loop",
-        _loop,
+        _draw_loop,
         help=(
             "draw a force over a deformation, with the work of the force, as a CSV table and a "
             "picture"
@@ -148,143 +187,164 @@ def _add_table(parser: argparse.ArgumentParser, action: str) -> None:
     )
 
 
-def _run(options: argparse.Namespace) -> "RunFolder":
+def _read_folder(options: argparse.Namespace) -> "RunFolder":
+    """Read the run of which a command has the folder."""
     from ...run.files.reading import read_run  # late: h5py, which records do not need
 
     return read_run(options.folder)
 
 
-def _peaks(options: argparse.Namespace) -> str:
-    run = _run(options)
+def _tabulate_peaks(options: argparse.Namespace) -> str:
+    """Carry out ``post peaks``: write the table, and return it for people."""
+    run = _read_folder(options)
     rows = peaks(run.history, run.columns, options.columns or None)
-    table = write_peaks(_table_path(options), rows)
-    lines = [
-        f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}"
-        f"{row.min:>13.4e}{row.t_min:>10.4g}"
-        for row in rows
-    ]
-    head = f"{'column':<28}{'unit':>6}{'max':>13}{'t [s]':>10}{'min':>13}{'t [s]':>10}"
-    return "\n".join([head, *lines, f"table: {table}"])
+    table = write_peaks(_choose_table(options), rows)
+    lines = [f"{'column':<28}{'unit':>6}{'max':>13}{'t [s]':>10}{'min':>13}{'t [s]':>10}"]
+    for row in rows:
+        lines.append(
+            f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}"
+            f"{row.min:>13.4e}{row.t_min:>10.4g}"
+        )
+    lines.append(f"table: {table}")
+    return "\n".join(lines)
 
 
-def _spectrum(options: argparse.Namespace) -> str:
-    run, periods, table = _run(options), spaced("--periods", options.periods), _table_path(options)
-    more = {"damping": options.damping, "relative": options.relative}
-    spectra = {name: floor_spectrum(run.history, name, periods, **more) for name in options.columns}
-    write_csv(
-        table,
-        ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"],
-        (
-            [name, options.damping, *(f"{x:.8g}" for x in row)]
-            for name, one in spectra.items()
-            for row in zip(
-                one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True
-            )
-        ),
-    )
-    dt = {name: recorded_motion(run.history, name).dt for name in spectra}
+def _compute_spectra(options: argparse.Namespace) -> str:
+    """Carry out ``post spectrum``: write table and picture, and return their paths."""
+    run = _read_folder(options)
+    periods = space_numbers("--periods", options.periods)
+    table = _choose_table(options)
+    spectra = {}
+    steps = {}
+    for column in options.columns:
+        spectra[column] = floor_spectrum(
+            run.history, column, periods, damping=options.damping, relative=options.relative
+        )
+        steps[column] = recorded_motion(run.history, column).dt
+    _write_spectra(table, spectra, options.damping)
     kind = "relative" if options.relative else "absolute"
     title = f"Response spectra of {kind} motions, {100.0 * options.damping:g} %"
-    picture = plot_spectra(spectra, table.with_suffix(".png"), steps=dt, title=title)
+    picture = plot_spectra(spectra, table.with_suffix(".png"), steps=steps, title=title)
     return f"table: {table}\npicture: {picture}"
 
 
-def _transfer(options: argparse.Namespace) -> str:
-    run, table = _run(options), _table_path(options)
-    given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
-    found = transfer_function(
+def _write_spectra(path: Path, spectra: Mapping[str, "ResponseSpectrum"], damping: float) -> None:
+    """Write one row for each column and period, in SI units."""
+    rows: list[list[Any]] = []
+    for column, spectrum in spectra.items():
+        for numbers in zip(
+            spectrum.periods,
+            spectrum.displacement,
+            spectrum.velocity,
+            spectrum.acceleration,
+            spectrum.psa,
+            strict=True,
+        ):
+            rows.append([column, damping, *(f"{number:.8g}" for number in numbers)])
+    header = ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"]
+    write_csv(path, header, rows)
+
+
+def _compute_transfer(options: argparse.Namespace) -> str:
+    """Carry out ``post transfer``: write table and picture, and return the peak."""
+    run = _read_folder(options)
+    table = _choose_table(options)
+    frequencies = None
+    if options.frequencies is not None:
+        frequencies = space_numbers("--frequencies", options.frequencies)
+    transfer = transfer_function(
         run.history,
         options.surface,
         options.base,
         bandwidth=options.bandwidth or None,
-        frequencies=given,
+        frequencies=frequencies,
     )
-    rows = zip(found.frequencies, found.amplitude, strict=True)
-    write_csv(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in rows))
-    picture = plot_transfer(
-        found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|"
-    )
-    frequency, amplitude = found.peak
+    rows = []
+    for frequency, amplitude in zip(transfer.frequencies, transfer.amplitude, strict=True):
+        rows.append([f"{frequency:.8g}", f"{amplitude:.8g}"])
+    write_csv(table, ["frequency_Hz", "amplitude"], rows)
+    title = f"|{options.surface}| / |{options.base}|"
+    picture = plot_transfer(transfer, table.with_suffix(".png"), title=title)
+    frequency, amplitude = transfer.peak
     return f"largest: {amplitude:.4g} at {frequency:.4g} Hz\ntable: {table}\npicture: {picture}"
 
 
-def _loop(options: argparse.Namespace) -> str:
-    run, table = _run(options), _table_path(options)
-    loop = hysteresis(
-        run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0
-    )
+def _draw_loop(options: argparse.Namespace) -> str:
+    """Carry out ``post loop``: write table and picture, and return the work."""
+    run = _read_folder(options)
+    table = _choose_table(options)
+    sign = -1.0 if options.turn else 1.0
+    loop = hysteresis(run.history, options.deformation, options.force, sign=sign)
     write_csv(
         table,
         ["t_s", options.deformation, options.force, "work"],
         zip(run.history["t"], loop.deformation, loop.force, loop.work, strict=True),
     )
-    x, y = ((name, run.columns[name][0]) for name in (options.deformation, options.force))
-    picture = plot_loop(loop, table.with_suffix(".png"), x=x, y=y)
+    picture = plot_loop(
+        loop,
+        table.with_suffix(".png"),
+        x=(options.deformation, run.columns[options.deformation][0]),
+        y=(options.force, run.columns[options.force][0]),
+    )
     return (
         f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: "
         f"{table}\npicture: {picture}"
     )
 
 
-def _checks(options: argparse.Namespace) -> str:
+def _compare_with_formulas(options: argparse.Namespace) -> str:
+    """Carry out ``post checks``: write the table, and return it for people."""
     from ..studies.report import comparisons
 
-    found, table = comparisons(options.folder), _table_path(options)
-    if not found:
+    results = comparisons(options.folder)
+    table = _choose_table(options)
+    if not results:
         raise InputError(
             f"{options.folder}: its case has no [[check]]: add one, docs/guide/checks.md lists them"
         )
-    inputs = [
-        "; ".join(f"{key} = {value:.6g} {unit}" for key, (value, unit) in one.inputs.items())
-        for one in found
-    ]
-    head = (
-        "name",
-        "formula",
-        "source",
-        "range",
-        "inputs",
-        "expected",
-        "found",
-        "unit",
-        "ratio",
-        "applies",
-    )
-    write_csv(
-        table,
-        head,
-        (
+    rows = []
+    lines = []
+    for result in results:
+        inputs = _list_inputs(result)
+        rows.append(
             [
-                one.name,
-                one.formula,
-                one.source,
-                one.range,
-                given,
-                one.expected,
-                one.found,
-                one.unit,
-                one.ratio,
-                one.applies,
+                result.name,
+                result.formula,
+                result.source,
+                result.range,
+                inputs,
+                result.expected,
+                result.found,
+                result.unit,
+                result.ratio,
+                result.applies,
             ]
-            for one, given in zip(found, inputs, strict=True)
-        ),
-    )
-    said = [
-        f"{one.name}: "
-        + (
-            f"does not apply: {one.applies}"
-            if one.applies
-            else f"expected {one.expected:.5g}, "
-            f"found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}"
         )
-        + f"\n    {one.formula}   ({one.source})\n    "
-        f"for {one.range}\n    {given}"
-        for one, given in zip(found, inputs, strict=True)
-    ]
-    return "\n".join([*said, f"table: {table}"])
+        if result.applies:
+            outcome = f"does not apply: {result.applies}"
+        else:
+            outcome = (
+                f"expected {result.expected:.5g}, found {result.found:.5g} {result.unit}, "
+                f"ratio {result.ratio:.4g}"
+            )
+        lines += [
+            f"{result.name}: {outcome}",
+            f"    {result.formula}   ({result.source})",
+            f"    for {result.range}",
+            f"    {inputs}",
+        ]
+    write_csv(table, CHECKS_HEADER, rows)
+    return "\n".join([*lines, f"table: {table}"])
 
 
-def _table_path(options: argparse.Namespace) -> Path:
+def _list_inputs(result: "Comparison") -> str:
+    """Return what a formula takes, with units."""
+    return "; ".join(
+        f"{name} = {value:.6g} {unit}" for name, (value, unit) in result.inputs.items()
+    )
+
+
+def _choose_table(options: argparse.Namespace) -> Path:
     """Return the table that a command is about to write.
 
     A picture of the same name is written beside it. It raises InputError where a file may not be

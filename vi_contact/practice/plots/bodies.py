@@ -1,6 +1,6 @@
-"""Draw the bodies of a run at some times, and a film.
+"""Draw the bodies of a run at some times, and film them, in the plane and in space.
 
-They are in plane or space, and need a folder alone.
+Pictures need nothing but the folder of a run that wrote fields.
 """
 
 from collections.abc import Sequence
@@ -19,40 +19,58 @@ from ...core.checks import number, optional
 from ...core.errors import InputError
 from ...core.files import frames_of, write_output
 from ...run.files.reading import ContactGeometry, RunFolder
-from .deformed import contact_states, nearest, plane_normals, read_frames
+from .deformed import compute_normals, contact_states, find_nearest, read_frames
 from .faces import (
+    Face,
     Painter,
     add_polygons,
-    faces_of,
-    leading,
-    limit,
-    moments,
+    choose_times,
+    find_leading_column,
     name_states,
     plot_faces,
+    set_limits,
     sheet,
+    split_faces,
 )
-from .histories import STYLE, plain, require_matplotlib, save, scale, scaled, shaken
+from .histories import (
+    STYLE,
+    escape_dollars,
+    list_shaken_axes,
+    require_matplotlib,
+    save,
+    scale,
+    scale_values,
+)
 
-# of the size of the bodies: how large their largest displacement is drawn, if it is not larger
+# How large the largest displacement is drawn if it is not larger, over the size of the bodies.
 DRAWN = 0.1
 FILM_FRAMES = 48  # at most: a film of two megabytes
 BODIES = ("0.35", "tab:blue", "tab:green", "tab:purple")  # edges of their elements
-# from where it comes; sides along it have 0.6 of their brightness
+# Direction from which the light comes; sides along it have 0.6 of their brightness.
 LIGHT = np.array([0.3, -0.5, 0.81])
-# of the size of the bodies: how far inside the dots are that show the contact in the plane
+# How far inside the dots are that show the contact in the plane, over the size of the bodies.
 INWARDS = 0.015
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Hold what is seen of bodies at ``times`` (k,) [s].
+    """Hold what is seen of bodies at some times.
 
-    That is cells in the plane, in space the boundary's sides of cells.
+    In the plane that is the cells, in space the sides of cells on the boundary.
 
-    ``points`` (s, d) [m] of their nodes; ``polygons`` (p, corners), the number of the ``body`` (p,)
-    of each; u (k, s, d) [m], drawn ``magnified`` times; von Mises stresses (k, p) [Pa].
-    ``contact``: where it was recorded its conditions, their nodes (m,), the ``sides`` (n, corners)
-    of elements between them, pressures [Pa] and states (k, m).
+    Attributes:
+        times: (k,) those of the frames [s].
+        points: (s, d) nodes of what is drawn [m].
+        polygons: (p, corners) rows of ``points``.
+        body: (p,) number of the body of each polygon.
+        u: (k, s, d) displacements [m].
+        stress: (k, p) von Mises stresses [Pa].
+        magnified: how many times larger displacements are drawn.
+        contact: the conditions of the contact, where it was recorded.
+        sides: (n, corners) sides of elements between contact points, as conditions.
+        nodes: (m,) row of ``points`` of each condition.
+        pressure: (k, m) contact pressures [Pa], (k, 0) without contact.
+        states: (k, m) as of ``contact_states``.
     """
 
     times: Array
@@ -69,48 +87,77 @@ class Scene:
     states: Array
 
     @classmethod
-    def of(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
-        """Read the frames next to ``times``.
+    def read(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
+        """Read the frames next to some times.
 
-        ``magnified`` is a round number that shows the displacements when None.
+        Args:
+            run: its folder holds fields.
+            times: moments that are wanted [s].
+            magnified: how many times larger displacements are drawn; None: a round number that
+                shows them.
+
+        Returns:
+            the bodies, and their contact where it was recorded.
+
+        Raises:
+            InputError: the run has bars or points only, or a number is wrong.
         """
-        frames, history = read_frames(run), run.history
+        frames = read_frames(run)
+        history = run.history
         if frames.cells.shape[1] < 3:
             raise InputError(
                 f"the run in '{run.folder}' has bars or points only: draw runs in the plane or in "
                 "space"
             )
         optional(number, "pictures of a run", "magnified", magnified, positive=True)
-        found = frames.t[np.unique(nearest(frames.t, times))]
-        plane = frames.points.shape[1] == 2
-        corners, cells = (frames.cells, np.arange(len(frames.cells))) if plane else frames.boundary
+        t = frames.t[np.unique(find_nearest(frames.t, times))]
+
+        # The polygons: cells of the plane, or what is seen of a body in space from outside.
+        if frames.points.shape[1] == 2:
+            corners = frames.cells
+            cells = np.arange(len(frames.cells))
+        else:
+            corners, cells = frames.boundary
+
         contact = run.contact if "pressure" in history else None
-        sides, nodes = (corners[:0], corners[:0, 0]) if contact is None else frames.facing(contact)
-        seen = np.union1d(corners, nodes)  # of degree 2 contact is at mid-points too
-        u, stress = map(
-            np.array, zip(*((u[seen], s[cells]) for _, u, s in map(frames.at, found)), strict=True)
-        )
-        size, largest = (
-            float(np.ptp(frames.points[seen], axis=0).max()),
-            float(np.linalg.norm(u, axis=2).max()),
-        )
-        rows, pressure = nearest(history["t"], found), np.zeros((len(found), 0))
-        states = pressure
-        if contact is not None:
-            pressure, states = history["pressure"][rows], contact_states(history)[rows]
+        if contact is None:
+            sides = corners[:0]
+            nodes = corners[:0, 0]
+        else:
+            sides, nodes = frames.facing(contact)
+
+        # Of all nodes those that are drawn: of degree 2 contact is at mid-points too.
+        drawn = np.union1d(corners, nodes)
+        displacements = []
+        stresses = []
+        for moment in t:
+            _, u, stress = frames.at(moment)
+            displacements.append(u[drawn])
+            stresses.append(stress[cells])
+        u_of_times = np.array(displacements)
+
+        if contact is None:
+            pressure = states = np.zeros((len(t), 0))
+        else:
+            rows = find_nearest(history["t"], t)
+            pressure = history["pressure"][rows]
+            states = contact_states(history)[rows]
+
+        size = float(np.ptp(frames.points[drawn], axis=0).max())
+        largest = float(np.linalg.norm(u_of_times, axis=2).max())
         return cls(
-            found,
-            frames.points[seen],
-            np.searchsorted(seen, corners),
-            frames.bodies[cells],
-            u,
-            stress,
-            magnified or _round_down(DRAWN * size / (largest or np.inf)),
-            contact,
-            sides,
-            np.searchsorted(seen, nodes),
-            pressure,
-            states,
+            times=t,
+            points=frames.points[drawn],
+            polygons=np.searchsorted(drawn, corners),
+            body=frames.bodies[cells],
+            u=u_of_times,
+            stress=np.array(stresses),
+            magnified=magnified or _round_down(DRAWN * size / (largest or np.inf)),
+            contact=contact,
+            sides=sides,
+            nodes=np.searchsorted(drawn, nodes),
+            pressure=pressure,
+            states=states,
         )
 
     @property
@@ -119,7 +166,7 @@ class Scene:
         along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
         return "y" if along[1 % len(along)] > along[-1] else "z"
 
-    def moved(self, k: int) -> Array:
+    def displace(self, k: int) -> Array:
         """Return where the nodes are drawn at the time number k, (s, d) [m]."""
         return np.asarray(self.points + self.magnified * self.u[k])
 
@@ -141,33 +188,52 @@ class Scene:
         return Painter.of_pressure(self.pressure)
 
     def draw(self, axis: Any, k: int, states: bool = False) -> None:
-        """Draw the bodies at the time number k.
+        """Draw the bodies at one time.
 
-        Each has edges of a colour of its own. In the plane there are dots inside of them with the
-        contact pressure, or the ``states`` of the points, those of both sides of a corner apart.
+        Each has edges of a colour of its own. In the plane, dots inside of them show the contact,
+        those of both sides of a corner apart.
+
+        Args:
+            axis: in projection where the bodies are in space.
+            k: number of the time.
+            states: whether dots are coloured by the states of the points on pale bodies, in place
+                of the contact pressure on bodies coloured by their stress.
         """
-        moved, colours = self.moved(k), self.stresses.colours(self.stress[k])
-        flat, polygons = moved.shape[1] == 2, moved[self.polygons]
-        colours = np.full_like(colours, 0.95) if states else colours
+        places = self.displace(k)
+        polygons = places[self.polygons]
+        flat = places.shape[1] == 2
+        colours = self.stresses.map_colours(self.stress[k])
+        if states:
+            colours = np.full_like(colours, 0.95)
         if not flat:
-            colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(polygons) @ LIGHT)[:, None]
+            # Sides along the light are darker, or the shape of a body could not be seen.
+            colours[:, :3] *= 0.6 + 0.4 * np.abs(compute_normals(polygons) @ LIGHT)[:, None]
         edges = [BODIES[body % len(BODIES)] for body in self.body]
         thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
-        every = (self.points + self.magnified * self.u).reshape(-1, moved.shape[1])
-        limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
+
+        # The limits are those of all times, so that pictures can be compared.
+        reached = (self.points + self.magnified * self.u).reshape(-1, places.shape[1])
+        low = reached.min(axis=0)
+        high = reached.max(axis=0)
+        set_limits(axis, low, high, margin=0.03, up=self.up)
+
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
-            painter, values = (
-                (Painter.of_states(), self.states) if states else (self.pressures, self.pressure)
-            )
-            painter.dots(axis, moved[self.nodes] - inwards, values[k])
+            if states:
+                painter = Painter.of_states()
+                values = self.states[k]
+            else:
+                painter = self.pressures
+                values = self.pressure[k]
+            painter.draw_dots(axis, places[self.nodes] - inwards, values)
 
 
 def _round_down(factor: float) -> float:
-    """1, 2 or 5 times a power of ten, at least 1."""
+    """Return 1, 2 or 5 times a power of ten, not above the factor but at least 1."""
     power = 10.0 ** np.floor(np.log10(max(factor, 1.0)))
-    return float(max([1.0, *(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor)]))
+    steps = [step * power for step in (1.0, 2.0, 5.0) if step * power <= factor]
+    return float(max([1.0, *steps]))
 
 
 @checked
@@ -179,35 +245,47 @@ def plot_deformed(
     magnified: float | None = None,
     title: str = "Deformed bodies",
 ) -> Path:
-    """Draw the deformed bodies of a run in the frames next to ``times`` [s].
+    """Draw the deformed bodies of a run at some times, coloured by von Mises stress.
 
-    They are coloured by von Mises stress.
+    The edges of elements have the colour of their body. In the plane dots show the contact
+    pressure, and below them which points are open, stick and slip. In space y points upwards where
+    contact is along y rather than z, else z.
 
-    None: the first, the last, and when most happens. The edges of elements have the colour of their
-    body. In the plane dots show the contact pressure, and below them which points are open, stick
-    and slip. In space y points upwards where contact is along y rather than z, else z.
-    ``magnified``: how many times larger displacements are drawn; None: a round number that shows
-    them. InputError for a run without fields or in one dimension.
+    Args:
+        run: its folder holds fields.
+        path: the picture; its ending says the format.
+        times: moments [s], of which the nearest frames are drawn; None: the first, the last, and
+            when most happens.
+        magnified: how many times larger displacements are drawn; None: a round number that shows
+            them.
+        title: stands above the picture.
+
+    Returns:
+        the path.
+
+    Raises:
+        InputError: the run has no fields, or is in one dimension.
     """
-    scene = Scene.of(run, moments(run.history) if times is None else times, magnified)
+    scene = Scene.read(run, choose_times(run.history) if times is None else times, magnified)
     flat = scene.points.shape[1] == 2
     with_states = flat and scene.contact is not None
-    figure, axes = sheet([flat] * (1 + with_states), len(scene.times), (4.2, 3.8))
+    rows = [flat, flat] if with_states else [flat]
+    figure, axes = sheet(rows, len(scene.times), (4.2, 3.8))
     for row, line in enumerate(axes):
         for k, axis in enumerate(line):
             scene.draw(axis, k, states=row > 0)
             axis.set_title(f"t = {scene.times[k]:.4g} s", fontsize=9)
-    scene.stresses.bar(figure, list(axes[0]), extend="max")
+    scene.stresses.draw_bar(figure, list(axes[0]), extend="max")
     if with_states:
-        scene.pressures.bar(figure, list(axes[0]))
+        scene.pressures.draw_bar(figure, list(axes[0]))
         name_states(figure, "slip" in run.history)
-    return save(figure, path, _headed(title, scene))
+    return save(figure, path, _compose_title(title, scene))
 
 
-def _headed(title: str, scene: Scene) -> str:
-    """Return a title on lines that fit above the picture."""
-    told = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
-    return "\n".join(wrap(plain(title) + told, 64))
+def _compose_title(title: str, scene: Scene) -> str:
+    """Return a title on lines that fit above the picture, with the factor of displacements."""
+    factor = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
+    return "\n".join(wrap(escape_dollars(title) + factor, 64))
 
 
 @checked
@@ -223,93 +301,126 @@ def film(
 ) -> Path:
     """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4.
 
-    Its frames are those next to ``times`` [s].
+    In space the pressure on each contact face is beside the bodies. Below them is a column of the
+    history with the moment marked, and dashed the motion of the ground.
 
-    None: up to 48 frames around the one in which most happens. In space the pressure on each
-    contact face is beside the bodies. Below them is a ``column`` of the history with the moment
-    marked, and dashed the motion of the ground. InputError for another kind of file, .mp4 without
-    ffmpeg, a column that the run does not have, and as ``plot_deformed``.
+    Args:
+        run: its folder holds fields.
+        path: the film, .gif or .mp4.
+        times: moments [s], of which the nearest frames are shown; None: up to 48 frames around the
+            one in which most happens.
+        magnified: how many times larger displacements are drawn; None: a round number that shows
+            them.
+        column: what is drawn below; None: what tells when most happens.
+        title: stands above the film, before the moment.
+        fps: frames per second.
+
+    Returns:
+        the path.
+
+    Raises:
+        InputError: another kind of file, .mp4 without ffmpeg, a column that the run does not have,
+            and as of ``plot_deformed``.
     """
     require_matplotlib()
     import matplotlib
     from matplotlib.animation import FFMpegWriter, PillowWriter
-    from matplotlib.figure import Figure
 
-    if Path(path).suffix not in (".gif", ".mp4"):
+    path = Path(path)
+    if path.suffix not in (".gif", ".mp4"):
         raise InputError(
-            f"'{Path(path).name}' is not a .gif or .mp4: give such a name, or use plot_deformed"
+            f"'{path.name}' is not a .gif or .mp4: give such a name, or use plot_deformed"
         )
-    if Path(path).suffix == ".mp4" and not FFMpegWriter.isAvailable():
+    if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(
             "an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif"
         )
-    scene = Scene.of(run, _around(run) if times is None else times, magnified)
-    flat, contact = scene.points.shape[1] == 2, scene.contact
-    faces = [] if flat or contact is None else faces_of(contact, scene.sides)
-    writer = (PillowWriter if Path(path).suffix == ".gif" else FFMpegWriter)(fps=fps)
+    scene = Scene.read(run, _choose_film_times(run) if times is None else times, magnified)
+    flat = scene.points.shape[1] == 2
+    faces = [] if flat or scene.contact is None else split_faces(scene.contact, scene.sides)
+    writer = PillowWriter(fps=fps) if path.suffix == ".gif" else FFMpegWriter(fps=fps)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.6 + 3.4 * len(faces), 6.0), layout="constrained")
-        wide = [1.6, *[1.0] * len(faces)]
-        grid = figure.add_gridspec(2, len(wide), height_ratios=(3.6, 1.0), width_ratios=wide)
-        planes = [flat, *(face.axes is not None for face in faces)]
-        axes = [
-            figure.add_subplot(grid[0, i], projection=None if plane else "3d")
-            for i, plane in enumerate(planes)
-        ]
-        marker = _trace(
-            figure.add_subplot(grid[1, :]), run, column or leading(run.history)[0], scene.times
-        )
-        scene.stresses.bar(figure, axes[0], extend="max", shrink=0.85)
-        if contact is not None:
-            scene.pressures.bar(figure, axes[-1], shrink=0.85)
-        with TemporaryDirectory() as place:
-            draft = Path(place) / Path(path).name
+        figure, axes, below = _lay_out_film(scene, faces)
+        marker = _draw_trace(below, run, column or find_leading_column(run.history)[0], scene.times)
+        scene.stresses.draw_bar(figure, axes[0], extend="max", shrink=0.85)
+        if scene.contact is not None:
+            scene.pressures.draw_bar(figure, axes[-1], shrink=0.85)
+        with TemporaryDirectory() as folder:
+            draft = Path(folder) / path.name
             with writer.saving(figure, str(draft), dpi=95):
                 for k, t in enumerate(scene.times):
-                    for axis in axes:
-                        axis.clear()
-                    scene.draw(axes[0], k)
-                    for axis, face in zip(axes[1:], faces, strict=True):
-                        scene.pressures.draw(axis, face, scene.pressure[k])
-                        axis.set_title(face.name, fontsize=9)
+                    _draw_film_frame(axes, scene, faces, k)
                     marker.set_xdata([t, t])
-                    figure.suptitle(
-                        _headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10
-                    )
+                    moment = f"{title}, t = {t:.4g} s".removeprefix(", ")
+                    figure.suptitle(_compose_title(moment, scene), fontsize=10)
                     if k == 0:
                         figure.draw_without_rendering()
                         # the same places in every frame, laid out once
                         figure.set_layout_engine("none")
                     writer.grab_frame()
             write_output(path, draft.read_bytes())
-    return Path(path)
+    return path
 
 
-def _around(run: RunFolder) -> list[float]:
+def _lay_out_film(scene: Scene, faces: Sequence[Face]) -> tuple[Any, list[Any], Any]:
+    """Make (figure, axes of the bodies and of each contact face, axis of the history below)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.6 + 3.4 * len(faces), 6.0), layout="constrained")
+    widths = [1.6, *[1.0] * len(faces)]
+    grid = figure.add_gridspec(2, len(widths), height_ratios=(3.6, 1.0), width_ratios=widths)
+    planes = [scene.points.shape[1] == 2, *(face.axes is not None for face in faces)]
+    axes = [
+        figure.add_subplot(grid[0, i], projection=None if plane else "3d")
+        for i, plane in enumerate(planes)
+    ]
+    return figure, axes, figure.add_subplot(grid[1, :])
+
+
+def _draw_film_frame(axes: Sequence[Any], scene: Scene, faces: Sequence[Face], k: int) -> None:
+    """Draw the bodies, and the pressure on each contact face, at the time number k."""
+    for axis in axes:
+        axis.clear()
+    scene.draw(axes[0], k)
+    for axis, face in zip(axes[1:], faces, strict=True):
+        scene.pressures.draw_values(axis, face, scene.pressure[k])
+        axis.set_title(face.name, fontsize=9)
+
+
+def _choose_film_times(run: RunFolder) -> list[float]:
     """Return the times of the frames next to the one in which most happens."""
     t = read_frames(run).t
-    (middle,) = nearest(t, [moments(run.history)[1]])
+    (middle,) = find_nearest(t, [choose_times(run.history)[1]])
     first = max(min(middle - FILM_FRAMES // 2, len(t) - FILM_FRAMES), 0)
     return list(t[first : first + FILM_FRAMES])
 
 
-def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
-    """Draw a column of the history and, dashed the ground's acceleration.
+def _draw_trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
+    """Draw a column of the history, and dashed the acceleration of the ground.
 
-    It is that during the film. The moment's line is returned.
+    Both are shown during the film.
+
+    Returns:
+        the line that marks the moment.
+
+    Raises:
+        InputError: the run has no such column.
     """
     history = run.history
     if column not in run.columns or np.ndim(history.get(column, 0)) != 1:
         raise InputError(f"the run has no column '{column}': see columns.json in its folder")
-    values, unit = scaled(history[column], run.columns[column][0])
+    values, unit = scale_values(history[column], run.columns[column][0])
     axis.plot(history["t"], values, color="black", lw=1.0)
-    shown = times if len(times) > 1 else history["t"]
-    axis.set(xlabel="time [s]", xlim=(shown[0], shown[-1]))
+    span = times if len(times) > 1 else history["t"]
+    axis.set(xlabel="time [s]", xlim=(span[0], span[-1]))
     axis.set_ylabel(f"{column} [{unit}]", fontsize=8)
-    if shaken(history):
+
+    directions = list_shaken_axes(history)
+    if directions:
         behind = axis.twinx()
-        for ground in shaken(history):
-            behind.plot(history["t"], history[f"a_g_{ground}"], color="0.6", lw=0.9, ls="--")
+        for direction in directions:
+            ground = history[f"a_g_{direction}"]
+            behind.plot(history["t"], ground, color="0.6", lw=0.9, ls="--")
         behind.set_ylabel("$a_g$ [m/s²]", color="0.4")
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
@@ -323,20 +434,27 @@ def draw_run(
     times: Sequence[float] | None = None,
     magnified: float | None = None,
 ) -> list[Path]:
-    """Draw the bodies of a run with fields into the folder ``out``.
+    """Draw all pictures of the bodies of a run for which its folder has data.
 
-    They are drawn as deformed.png and, in space with ``Contact()``, the contact faces as faces.png,
-    next to the ``times`` [s]. None: the first, the last, and when most happens.
+    With fields the bodies are drawn as deformed.png; in space with ``Contact()`` the contact faces
+    are drawn as faces.png.
 
-    ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
+    Args:
+        run: what ``read_run`` returned.
+        out: folder of the pictures.
+        title: stands above them.
+        times: moments [s], of which the nearest are drawn; None: the first, the last, and when most
+            happens.
+        magnified: how many times larger displacements are drawn; None: so that they are seen.
+
+    Returns:
+        the pictures that were written.
     """
-    drawn, contact, history = [], run.contact, run.history
+    pictures = []
     if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
-        drawn.append(
-            plot_deformed(
-                run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title
-            )
-        )
-    if contact is not None and contact.points.shape[1] == 3 and "active" in history:
-        drawn.append(plot_faces(run, Path(out) / "faces.png", times=times, title=title))
-    return drawn
+        path = Path(out) / "deformed.png"
+        pictures.append(plot_deformed(run, path, times=times, magnified=magnified, title=title))
+    contact = run.contact
+    if contact is not None and contact.points.shape[1] == 3 and "active" in run.history:
+        pictures.append(plot_faces(run, Path(out) / "faces.png", times=times, title=title))
+    return pictures

@@ -1,9 +1,7 @@
-"""Read bodies and what happens on their contact to draw them.
+"""Read bodies, and what happens on their contact, from the folder of a run to draw them.
 
-They come from the folder of a run, in the plane and in space.
-
-A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that
-is needed there.
+A run in the plane or in space that writes fields (``fields=fem.XDMF(every=...)``) and records
+``Contact()`` leaves all that is needed there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,19 +24,28 @@ from ...meshes.rows import SIDES, connected
 from ...run.files.reading import RunFolder, read_run
 from ...run.recorders.contact_parts import Geometry, tangent_vectors
 
-OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
-SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane
+# States of contact points, as contact_status in fields.xdmf.
+OPEN = 1
+STICK = 2
+SLIP = 3
+# What lies at one place or in one plane may differ by this, over the size of what is drawn.
+SAME = 1e-6
 FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
-# dimension, corners
+# (dimension, corners) -> kind of cell.
 CELLS = {(2, 3): "triangle", (2, 4): "quadrilateral", (3, 4): "tetrahedron", (3, 8): "hexahedron"}
+# Nodes of a cell of second order -> its vertices, which are its first nodes.
+VERTICES = {6: 3, 9: 4, 10: 4, 27: 8}
 
 
 @dataclass(frozen=True)
 class StoredFrames:
-    """Hold fields of a run.
+    """Hold the fields of a run at its stored times.
 
-    There are ``points`` (n, d) [m], ``cells`` (c, corners), times ``t`` (f,) [s], (file, group)
-    each.
+    Attributes:
+        points: (n, d) vertices [m].
+        cells: (c, corners) their vertices.
+        t: (f,) times [s].
+        places: (file, group in it) of each time.
     """
 
     points: Array
@@ -51,12 +58,13 @@ class StoredFrames:
 
         They are those of the frame nearest to t; stresses are NaN where the run has none.
         """
-        (row,) = nearest(self.t, [t])
+        (row,) = find_nearest(self.t, [t])
         path, group = self.places[row]
-        with _opened(path) as file:
-            frame, unknown = file[group], np.full(len(self.cells), np.nan)
-            stress = frame["von_mises"][:] if "von_mises" in frame else unknown
+        with _open_fields(path) as file:
+            frame = file[group]
             u = frame["u"][:]
+            unknown = np.full(len(self.cells), np.nan)
+            stress = frame["von_mises"][:] if "von_mises" in frame else unknown
             if u.shape != (len(self.points), 3) or stress.shape != unknown.shape:
                 raise ValueError("the numbers of nodes or cells are not those of the mesh")
             return float(self.t[row]), u[:, : self.points.shape[1]], stress
@@ -67,10 +75,11 @@ class StoredFrames:
 
         Cells that share nodes are of one body.
         """
+        # Cells and nodes are one graph, in which nodes follow the cells.
         count, corners = self.cells.shape
-        # from cells to their nodes
-        links = (np.repeat(np.arange(count), corners), count + self.cells.ravel())
-        return connected(count + len(self.points), *links)[:count]
+        cells = np.repeat(np.arange(count), corners)
+        nodes = count + self.cells.ravel()
+        return connected(count + len(self.points), cells, nodes)[:count]
 
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:
@@ -78,7 +87,9 @@ class StoredFrames:
 
         The cell (s,) of each comes with them.
         """
-        sides = self.cells[:, np.array(SIDES[CELLS[self.points.shape[1], self.cells.shape[1]]])]
+        kind = CELLS[self.points.shape[1], self.cells.shape[1]]
+        sides = self.cells[:, np.array(SIDES[kind])]
+        # A side between two cells has the same nodes twice, in any order.
         rows = np.sort(sides.reshape(-1, sides.shape[2]), axis=1)
         _, first, counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
         alone = np.sort(first[counts == 1])
@@ -91,27 +102,37 @@ class StoredFrames:
         body that its direction points away from, not on one that it touches there.
         """
         sides, cell = self.boundary
+
+        # Candidates: up to four conditions at the place of each corner, those of all faces that
+        # meet there. The number m stands for none.
         nodes, place = np.unique(sides, return_inverse=True)
         reach = SAME * float(np.ptp(self.points, axis=0).max())
         tree = cKDTree(contact.points)
         _, near = tree.query(self.points[nodes], k=[1, 2, 3, 4], distance_upper_bound=reach)
-        # those of all faces at this place; m: none
         candidates = near[place.ravel()].reshape(*sides.shape, 4)
+
+        # Outward normals of the sides: away from the middle of their cells.
         corners = self.points[sides]
         away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
-        outwards = plane_normals(corners)
+        outwards = compute_normals(corners)
         outwards *= np.sign(np.sum(outwards * away, axis=1))[:, None]
+
+        # Of the candidates of a corner the one whose direction is nearest to that normal; none has
+        # a direction of zeros. A side faces the contact when this holds at all its corners.
         normals = np.vstack([contact.normals, np.zeros_like(contact.normals[:1])])
         cosines = np.einsum("scki,si->sck", normals[candidates], outwards)
-        chosen = np.take_along_axis(candidates, cosines.argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
-        found = np.all(cosines.max(axis=2) > FACING, axis=1)
+        best = cosines.argmax(axis=2)[:, :, None]
+        conditions = np.take_along_axis(candidates, best, axis=2)[:, :, 0]
+        facing = np.all(cosines.max(axis=2) > FACING, axis=1)
+
+        # Where no side faces the contact, the nearest vertex stands for a condition.
         node = cKDTree(self.points).query(contact.points)[1]
-        node[chosen[found]] = sides[found]
-        return chosen[found], node
+        node[conditions[facing]] = sides[facing]
+        return conditions[facing], node
 
 
-def plane_normals(polygons: Array) -> Array:
-    """Return a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3).
+def compute_normals(polygons: Array) -> Array:
+    """Compute a unit normal (p, d) of each line (p, 2, 2) or polygon (p, corners, 3).
 
     That of one without any size is zero.
     """
@@ -123,10 +144,11 @@ def plane_normals(polygons: Array) -> Array:
     return np.asarray(normals / np.where(sizes > 0.0, sizes, 1.0))
 
 
-def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
-    """Return the rows of ``t`` next to each of ``times`` [s].
+def find_nearest(t: Array, times: Sequence[float] | Array) -> Indices:
+    """Find the rows of ``t`` next to each of ``times`` [s].
 
-    InputError for no times, or what is none.
+    Raises:
+        InputError: there are no times, or one of them is no number.
     """
     wanted = array("pictures of a run", "times", times, (None,), unit="seconds")
     if not len(wanted):
@@ -148,28 +170,30 @@ def contact_states(history: Mapping[str, Array]) -> Array:
     active = np.reshape(history["active"], (rows, -1)).astype(bool)
     change = np.zeros(active.shape)
     if "slip" in history:
-        change[1:] = np.linalg.norm(
-            np.diff(np.reshape(history["slip"], (*active.shape, -1)), axis=0), axis=2
-        )
-    moved = change > 1e-9 * np.max(change, initial=0.0)
-    return np.where(active, np.where(moved, SLIP, STICK), OPEN)
+        slip = np.reshape(history["slip"], (*active.shape, -1))
+        change[1:] = np.linalg.norm(np.diff(slip, axis=0), axis=2)
+    slips = change > 1e-9 * np.max(change, initial=0.0)
+    return np.where(active, np.where(slips, SLIP, STICK), OPEN)
 
 
-def stored_tangents(contact: Geometry) -> Array:
-    """Return the tangents (m, d, d - 1) of slip and traction_t in a history.
+def compute_tangents(contact: Geometry) -> Array:
+    """Compute the tangents (m, d, d - 1) of slip and traction_t in a history.
 
     What is at one place is one node.
     """
-    return tangent_vectors(
-        contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel()
-    )
+    _, node = np.unique(contact.points, axis=0, return_inverse=True)
+    return tangent_vectors(contact.normals, node.ravel())
 
 
 @checked
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     """Read the frames from the fields of a run in plane or space.
 
-    InputError for a folder without them.
+    Args:
+        run: what ``read_run`` returned, or its folder.
+
+    Raises:
+        InputError: the folder has no fields, or they are damaged.
     """
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
     places = frames_of(folder)
@@ -182,8 +206,15 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
         raise InputError(
             f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)"
         )
-    with _opened(inner_folder(folder, FIELDS) / "mesh.h5") as file:
-        points, cells = file["points"][:], file["cells"][:]
+    points, cells = _read_mesh(folder)
+    return StoredFrames(points, cells, np.array([times[k] for k in places]), tuple(places.values()))
+
+
+def _read_mesh(folder: Path) -> tuple[Array, Indices]:
+    """Read the vertices (n, d) [m] of a run, and those of each cell (c, corners)."""
+    with _open_fields(inner_folder(folder, FIELDS) / "mesh.h5") as file:
+        points = file["points"][:]
+        cells = file["cells"][:]
         if (
             points.ndim != 2
             or points.shape[1] != 3
@@ -198,16 +229,13 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
             or cells.max() >= len(points)
         ):
             raise ValueError("a cell has a point that is not there")
-    # of second order: the vertices
-    cells = cells[:, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])]
+    vertices = VERTICES.get(cells.shape[1], cells.shape[1])
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
-    return StoredFrames(
-        points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values())
-    )
+    return points[:, :d], cells[:, :vertices]
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _open_fields(path: Path) -> Iterator[Any]:
     """Open a file of fields; InputError when it is missing or damaged."""
     try:
         with open_hdf5(path) as file:

@@ -13,144 +13,191 @@ from .histories import STYLE, require_matplotlib
 from .maps import Drawing
 from .sections import Section, Table
 
-PAGE = (8.27, 11.69)  # inches, A4
-SIDE, WIDE, FOOT = 0.6, 7.1, 0.6  # inches: margins, what is between them, and what is left below
-LINE, LETTER = 0.135, 0.058  # inches: between lines of a table, and the mean width of its letters
+# Lengths are in inches.
+PAGE = (8.27, 11.69)  # A4
+SIDE = 0.6  # margins
+WIDE = 7.1  # between the margins
+FOOT = 0.6  # left below
+LINE = 0.135  # between lines of a table
+LETTER = 0.058  # mean width of a letter of a table
+HEIGHT = 1.75  # of a chart
 CURVES = 6  # of a printed chart
-HEIGHT = 1.75  # inches, of a chart
 
 
 class _Pages:
-    """Fill pages from the top; ``y`` [inches] is where the next thing goes."""
+    """Fill pages from the top.
+
+    Attributes:
+        file: the PDF that takes finished pages.
+        foot: text at the foot of every page, before its number.
+        count: number of the page.
+        figure: the page.
+        y: where the next thing goes, from the top [inches].
+    """
 
     def __init__(self, file: Any, foot: str) -> None:
-        self.file, self.foot, self.count = file, foot, 0
+        self.file = file
+        self.foot = foot
+        self.count = 0
         self.begin()
 
     def begin(self) -> None:
         """Begin a page."""
         from matplotlib.figure import Figure
 
-        self.figure, self.y, self.count = Figure(figsize=PAGE), SIDE, self.count + 1
-        self._text(SIDE, PAGE[1] - 0.4, f"{self.foot}, page {self.count}", 6.5, color="0.45")
+        self.figure = Figure(figsize=PAGE)
+        self.y = SIDE
+        self.count += 1
+        self._write(SIDE, PAGE[1] - 0.4, f"{self.foot}, page {self.count}", 6.5, color="0.45")
 
-    def room(self, height: float) -> None:
+    def make_room(self, height: float) -> None:
         """Turn the page where so much [inches] no longer fits."""
         if self.y + height > PAGE[1] - FOOT:
             self.file.savefig(self.figure)
             self.begin()
 
-    def _text(self, x: float, y: float, text: str, size: float, **look: Any) -> None:
+    def _write(self, x: float, y: float, text: str, size: float, **look: Any) -> None:
+        """Write a text; x from the left and y from the top [inches] are of its upper left."""
         self.figure.text(x / PAGE[0], 1.0 - y / PAGE[1], text, fontsize=size, va="top", **look)
 
-    def words(self, text: str, size: float = 8.0, keep: float = 0.0, **look: Any) -> None:
-        """Write a paragraph, on one page with ``keep`` [inches] of what follows."""
-        lines, step = wrap(text, int(WIDE * 72.0 / (0.53 * size))) or [""], 1.35 * size / 72.0
-        self.room(step * len(lines) + keep)
-        self._text(SIDE, self.y, "\n".join(lines), size, linespacing=1.2, **look)
+    def write_words(self, text: str, size: float = 8.0, keep: float = 0.0, **look: Any) -> None:
+        """Write a paragraph.
+
+        Args:
+            text: broken into lines here.
+            size: of the letters [points].
+            keep: height of what follows that has to be on the same page [inches].
+            **look: arguments of matplotlib's ``text``.
+        """
+        letters = int(WIDE * 72.0 / (0.53 * size))  # of a line: a letter is about half as wide
+        lines = wrap(text, letters) or [""]
+        step = 1.35 * size / 72.0
+        self.make_room(step * len(lines) + keep)
+        self._write(SIDE, self.y, "\n".join(lines), size, linespacing=1.2, **look)
         self.y += step * len(lines) + 0.05
 
-    def table(self, table: Table) -> None:
+    def write_table(self, table: Table) -> None:
         """Write a table as wide as its texts; those of a cell that is too wide on several lines."""
-        from matplotlib.lines import Line2D
-
         if table.title:
-            self.words(table.title, 7.5, keep=0.5, style="italic")
-        rows = [[str(cell) for cell in row] for row in (table.header, *table.rows)]
-        widths = [min(70, max(len(row[k]) for row in rows) + 2) for k in range(len(table.header))]
-        while sum(widths) * LETTER > WIDE:
-            widths[widths.index(max(widths))] -= 1
+            self.write_words(table.title, 7.5, keep=0.5, style="italic")
+        rows = [[str(cell) for cell in table.header]]
+        for row in table.rows:
+            rows.append([str(cell) for cell in row])
+        widths = _choose_widths(rows)
         for number, row in enumerate(rows):
-            cells = [wrap(cell, max(width - 1, 1)) for cell, width in zip(row, widths, strict=True)]
-            height, x = LINE * max(1, *map(len, cells)) + 0.03, SIDE
-            self.room(height)
-            for cell, width in zip(cells, widths, strict=True):
-                self._text(
-                    x,
-                    self.y,
-                    "\n".join(cell),
-                    6.8,
-                    weight="normal" if number else "bold",
-                    linespacing=1.1,
-                )
-                x += LETTER * width
-            self.y += height
-            across, level = (
-                [SIDE / PAGE[0], min(x, SIDE + WIDE) / PAGE[0]],
-                1.0 - (self.y - 0.025) / PAGE[1],
-            )
-            self.figure.add_artist(
-                Line2D(across, [level, level], lw=0.3 if number else 0.8, color="0.6")
-            )
+            self._write_row(row, widths, head=number == 0)
         self.y += 0.12
 
-    def panels(self, panels: Sequence[Chart | Drawing], height: float, beside: int) -> None:
-        """Draw so many axes beside each other, the rows of them so high [inches]."""
+    def _write_row(self, row: Sequence[str], widths: Sequence[int], *, head: bool) -> None:
+        """Write a row with a line below; the columns are so many letters wide."""
+        from matplotlib.lines import Line2D
+
+        cells = [wrap(cell, max(width - 1, 1)) for cell, width in zip(row, widths, strict=True)]
+        height = LINE * max(1, *map(len, cells)) + 0.03
+        self.make_room(height)
+        x = SIDE
+        for cell, width in zip(cells, widths, strict=True):
+            weight = "bold" if head else "normal"
+            self._write(x, self.y, "\n".join(cell), 6.8, weight=weight, linespacing=1.1)
+            x += LETTER * width
+        self.y += height
+        ends = [SIDE / PAGE[0], min(x, SIDE + WIDE) / PAGE[0]]
+        level = 1.0 - (self.y - 0.025) / PAGE[1]
+        line = Line2D(ends, [level, level], lw=0.8 if head else 0.3, color="0.6")
+        self.figure.add_artist(line)
+
+    def draw_panels(self, panels: Sequence[Chart | Drawing], height: float, beside: int) -> None:
+        """Draw charts and maps in rows.
+
+        Args:
+            panels: each has an axis of its own.
+            height: of each axis [inches].
+            beside: how many stand beside each other.
+        """
+        width = WIDE / beside
         for first in range(0, len(panels), beside):
-            self.room(height + 0.75)
+            self.make_room(height + 0.75)
+            bottom = PAGE[1] - self.y - height - 0.25
             for place, panel in enumerate(panels[first : first + beside]):
-                wide = WIDE / beside
+                left = SIDE + place * width + 0.5
                 box = (
-                    SIDE + place * wide + 0.5,
-                    PAGE[1] - self.y - height - 0.25,
-                    wide - 0.65,
-                    height,
+                    left / PAGE[0],
+                    bottom / PAGE[1],
+                    (width - 0.65) / PAGE[0],
+                    height / PAGE[1],
                 )
-                axis = self.figure.add_axes([one / PAGE[k % 2] for k, one in enumerate(box)])
-                draw_chart(axis, panel.shortened(CURVES)) if isinstance(panel, Chart) else panel(
-                    axis
-                )
+                axis = self.figure.add_axes(box)
+                if isinstance(panel, Chart):
+                    draw_chart(axis, panel.shorten(CURVES))
+                else:
+                    panel(axis)
             self.y += height + 0.75
 
-    def picture(self, path: Path) -> None:
+    def place_picture(self, path: Path) -> None:
         """Place a PNG as wide as the page, or as high as half of it."""
         from matplotlib.image import imread
 
         image = imread(BytesIO(read_bytes(path)), format="png")
-        wide = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
-        high = wide * image.shape[0] / image.shape[1]
-        self.room(high)
+        width = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
+        height = width * image.shape[0] / image.shape[1]
+        self.make_room(height)
         axis = self.figure.add_axes(
-            (SIDE / PAGE[0], 1.0 - (self.y + high) / PAGE[1], wide / PAGE[0], high / PAGE[1])
+            (SIDE / PAGE[0], 1.0 - (self.y + height) / PAGE[1], width / PAGE[0], height / PAGE[1])
         )
         axis.set_axis_off()
         axis.imshow(image)
-        self.y += high + 0.15
+        self.y += height + 0.15
+
+
+def _choose_widths(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Choose how many letters wide the columns are, so that the table fits on the page."""
+    widths = []
+    for column in zip(*rows, strict=True):
+        widths.append(min(70, max(map(len, column)) + 2))
+    while sum(widths) * LETTER > WIDE:
+        widths[widths.index(max(widths))] -= 1
+    return widths
 
 
 def write_pages(
     path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
 ) -> Path:
-    """Write a PDF.
+    """Write sections as a PDF.
 
-    It has the title, (name, value) of facts, the sections, and a line at the foot of every page.
+    Args:
+        path: the file.
+        title: stands first.
+        facts: (name, value) of what the report says next.
+        sections: the rest.
+        foot: text at the foot of every page, before its number.
+
+    Returns:
+        the path.
     """
     require_matplotlib()
     import matplotlib
     from matplotlib.backends.backend_pdf import PdfPages
 
     fonts = {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7, "text.parse_math": False}
-    written, about = BytesIO(), {"Title": title, "CreationDate": None}
-    with matplotlib.rc_context(STYLE | fonts), PdfPages(written, metadata=about) as file:
+    pdf = BytesIO()
+    metadata = {"Title": title, "CreationDate": None}
+    with matplotlib.rc_context(STYLE | fonts), PdfPages(pdf, metadata=metadata) as file:
         pages = _Pages(file, foot)
-        pages.words(title, 15.0, weight="bold")
-        pages.table(Table(("", ""), facts))
+        pages.write_words(title, 15.0, weight="bold")
+        pages.write_table(Table(("", ""), facts))
         for section in sections:
             pages.y += 0.12
-            pages.words(
-                section.title,
-                11.0,
-                keep=1.2 if section.sentences or section.tables else 4.0,
-                weight="bold",
-            )
+            # A heading stays with what follows: a sentence or, which is higher, a chart.
+            keep = 1.2 if section.sentences or section.tables else 4.0
+            pages.write_words(section.title, 11.0, keep=keep, weight="bold")
             for sentence in section.sentences:
-                pages.words(sentence)
+                pages.write_words(sentence)
             for table in section.tables:
-                pages.table(table)
-            pages.panels(section.charts, HEIGHT, 2)
-            pages.panels(section.drawings, 1.6 * HEIGHT, 1)
+                pages.write_table(table)
+            pages.draw_panels(section.charts, HEIGHT, 2)
+            pages.draw_panels(section.drawings, 1.6 * HEIGHT, 1)
             for picture in section.pictures:
-                pages.picture(picture)
+                pages.place_picture(picture)
         file.savefig(pages.figure)
-    write_output(path, written.getvalue())
+    write_output(path, pdf.getvalue())
     return path

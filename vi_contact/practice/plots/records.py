@@ -1,7 +1,4 @@
-"""Draw ground motions, response spectra and a target.
-
-Transfer functions, and loops of force and deformation, are drawn too.
-"""
+"""Draw ground motions, response spectra, transfer functions, and loops of force and deformation."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,40 +17,54 @@ from ..ground_motion.intensity import arias, d5_95, husid, pga
 from ..ground_motion.processing import integrated
 from ..ground_motion.record import UNITS, Record, canonical_units
 from ..ground_motion.spectra import ResponseSpectrum
-from .histories import canvas, length_unit, panels, plain, plain_numbers, save, scaled
-
-SAMPLES_A_PERIOD = (
-    10  # a spectrum is drawn pale at periods with fewer samples of the record than this
+from .histories import (
+    canvas,
+    escape_dollars,
+    length_unit,
+    panels,
+    plain_numbers,
+    save,
+    scale_values,
 )
+
+# A spectrum is drawn pale at periods with fewer samples of the record than this.
+SAMPLES_A_PERIOD = 10
 
 
 @checked
 def plot_motion(
     record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2"
 ) -> Path:
-    """Draw acceleration in `units`, velocity, displacement and the Husid curve.
+    """Draw acceleration, velocity, displacement and the Husid curve of a record.
 
-    Peaks are marked and D5-95 is shaded.
+    Peaks are marked and D5-95 is shaded. Nothing is corrected: a drift of the record shows.
 
-    title: default the record's. Nothing is corrected: a drift of the record shows.
+    Args:
+        record: the ground motion.
+        path: the picture; its ending says the format.
+        title: stands above it; None: that of the record, or where it comes from.
+        units: of the acceleration.
+
+    Returns:
+        the path.
     """
     units = canonical_units("plot_motion: units", units)
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
-    _line(
+    _draw_history(
         axes[0],
         record.times,
         record.acceleration / UNITS[units],
-        f"acceleration [{_pretty(units)}]",
+        f"acceleration [{_typeset_unit(units)}]",
     )
-    quantities = (velocity, "velocity", "/s"), (displacement, "displacement", "")
-    for axis, (values, quantity, per_second) in zip(axes[1:3], quantities, strict=True):
-        metres, unit = _size(values)
-        _line(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
-    _husid(axes[3], record)
-    axes[0].set_title(
-        plain(title if title is not None else record.title or record.source), fontsize=10
-    )
+    metres, unit = _choose_length_unit(velocity)
+    _draw_history(axes[1], record.times, velocity / metres, f"velocity [{unit}/s]")
+    metres, unit = _choose_length_unit(displacement)
+    _draw_history(axes[2], record.times, displacement / metres, f"displacement [{unit}]")
+    _draw_husid(axes[3], record)
+    if title is None:
+        title = record.title or record.source
+    axes[0].set_title(escape_dollars(title), fontsize=10)
     axes[-1].set_xlim(0.0, record.duration)
     return save(figure, path)
 
@@ -68,11 +79,22 @@ def plot_spectra(
     title: str = "Response spectra",
     units: str = "g",
 ) -> Path:
-    """Draw pseudo-acceleration in `units` and displacement over the period.
+    """Draw pseudo-acceleration and displacement over the period.
 
-    There is one line for each label; the target is dashed.
+    Args:
+        spectra: label of a line -> spectrum.
+        path: the picture; its ending says the format.
+        target: spectrum of Eurocode 8, which is dashed.
+        steps: time step [s] of the record behind each label; at periods below ten of them its line
+            is pale.
+        title: stands above the picture.
+        units: of the pseudo-acceleration.
 
-    steps: time step [s] of the record behind each label; below ten of them its line is pale.
+    Returns:
+        the path.
+
+    Raises:
+        InputError: there is no spectrum, or such a unit does not exist.
     """
     units = canonical_units("plot_spectra: units", units)
     if not spectra:
@@ -83,47 +105,55 @@ def plot_spectra(
     figure, ((top,), (bottom,)) = canvas(2, 1, (8.0, 7.5), sharex=True)
     bottom.set_xscale("log")
     plain_numbers(bottom.xaxis)
-    shown = np.concatenate([spectrum.periods for spectrum in spectra.values()])
+    periods = np.concatenate([spectrum.periods for spectrum in spectra.values()])
     metres, unit = length_unit(
         max(float(np.max(spectrum.displacement)) for spectrum in spectra.values())
     )
-    # period that is trusted
-    first = {label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra}
+    # The least period of each label that its record resolves.
+    trusted = {label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra}
     for label, spectrum in spectra.items():
-        colour = None
-        for axis, values in (
-            (top, spectrum.psa / UNITS[units]),
-            (bottom, spectrum.displacement / metres),
-        ):
-            known = np.where(spectrum.periods >= first[label], values, np.nan)
-            (line,) = axis.plot(spectrum.periods, known, lw=1.2, color=colour, label=plain(label))
-            colour = line.get_color()
-            axis.plot(spectrum.periods, values, lw=0.8, color=colour, alpha=0.35)
+        psa = spectrum.psa / UNITS[units]
+        colour = _draw_spectrum(top, spectrum.periods, psa, trusted[label], label=label)
+        _draw_spectrum(
+            bottom,
+            spectrum.periods,
+            spectrum.displacement / metres,
+            trusted[label],
+            label=label,
+            colour=colour,
+        )
     if target is not None:
-        periods = np.geomspace(shown.min(), shown.max(), 500)
         name = f"EC8 target, {100.0 * target.damping:g} %"
-        top.plot(periods, target.acceleration(periods) / UNITS[units], "k--", lw=1.2, label=name)
-        code = periods <= 4.0  # beyond, the code gives another displacement spectrum
-        bottom.plot(
-            periods[code], target.displacement(periods[code]) / metres, "k--", lw=1.2, label=name
-        )
-    if any(np.min(spectrum.periods) < first[label] for label, spectrum in spectra.items()):
-        top.plot(
-            [],
-            [],
-            color="0.5",
-            lw=0.8,
-            alpha=0.5,
-            label=f"pale: under {SAMPLES_A_PERIOD} samples a period",
-        )
+        grid = np.geomspace(periods.min(), periods.max(), 500)
+        top.plot(grid, target.acceleration(grid) / UNITS[units], "k--", lw=1.2, label=name)
+        code = grid[grid <= 4.0]  # beyond, the code gives another displacement spectrum
+        bottom.plot(code, target.displacement(code) / metres, "k--", lw=1.2, label=name)
+    if any(np.min(spectrum.periods) < trusted[label] for label, spectrum in spectra.items()):
+        pale = f"pale: under {SAMPLES_A_PERIOD} samples a period"
+        top.plot([], [], color="0.5", lw=0.8, alpha=0.5, label=pale)
     top.legend(fontsize=8)
     for axis in (top, bottom):
         axis.set_ylim(bottom=0.0)
-    top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=plain(title))
+    top.set(
+        ylabel=f"pseudo-acceleration [{_typeset_unit(units)}]",
+        title=escape_dollars(title),
+    )
     bottom.set(
-        ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max())
+        ylabel=f"displacement [{unit}]",
+        xlabel="period [s]",
+        xlim=(periods.min(), periods.max()),
     )
     return save(figure, path)
+
+
+def _draw_spectrum(
+    axis: Any, periods: Array, values: Array, trusted: float, *, label: str, colour: Any = None
+) -> Any:
+    """Draw a spectrum, pale at periods below the least that is trusted [s]; return its colour."""
+    resolved = np.where(periods >= trusted, values, np.nan)
+    (line,) = axis.plot(periods, resolved, lw=1.2, color=colour, label=escape_dollars(label))
+    axis.plot(periods, values, lw=0.8, color=line.get_color(), alpha=0.35)
+    return line.get_color()
 
 
 @checked
@@ -135,30 +165,50 @@ def plot_loop(
     y: tuple[str, str],
     title: str | None = None,
 ) -> Path:
-    """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two.
+    """Draw force over deformation.
 
-    The title says the work at the end.
+    Args:
+        loop: what ``hysteresis`` returned.
+        path: the picture; its ending says the format.
+        x: name and SI unit of the deformation.
+        y: name and SI unit of the force.
+        title: stands above the picture; None: the work at the end.
+
+    Returns:
+        the path.
     """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
-    across, x_unit = scaled(loop.deformation, x[1])
-    up, y_unit = scaled(loop.force, y[1])
+    x_name, x_si = x
+    y_name, y_si = y
+    deformation, x_unit = scale_values(loop.deformation, x_si)
+    force, y_unit = scale_values(loop.force, y_si)
     axis.axhline(0.0, color="0.6", lw=0.6)
     axis.axvline(0.0, color="0.6", lw=0.6)
-    axis.plot(across, up, color="black", lw=0.8)
-    axis.plot(across[:1], up[:1], "o", color="tab:green", ms=5, label="start")
-    axis.plot(across[-1:], up[-1:], "s", color="tab:red", ms=5, label="end")
+    axis.plot(deformation, force, color="black", lw=0.8)
+    axis.plot(deformation[:1], force[:1], "o", color="tab:green", ms=5, label="start")
+    axis.plot(deformation[-1:], force[-1:], "s", color="tab:red", ms=5, label="end")
     axis.legend(fontsize=8)
-    work, unit = scaled(loop.work[-1:], "J")
-    title = title or f"work {work[0]:.3g} {unit}"
+    work, unit = scale_values(loop.work[-1:], "J")
     axis.set(
-        xlabel=plain(f"{x[0]} [{x_unit}]"), ylabel=plain(f"{y[0]} [{y_unit}]"), title=plain(title)
+        xlabel=escape_dollars(f"{x_name} [{x_unit}]"),
+        ylabel=escape_dollars(f"{y_name} [{y_unit}]"),
+        title=escape_dollars(title or f"work {work[0]:.3g} {unit}"),
     )
     return save(figure, path)
 
 
 @checked
 def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> Path:
-    """Draw the amplitude over frequency, both logarithmic."""
+    """Draw the amplitude of a transfer function over frequency, both logarithmic.
+
+    Args:
+        found: what ``transfer_function`` returned.
+        path: the picture; its ending says the format.
+        title: stands above it.
+
+    Returns:
+        the path.
+    """
     figure, ((axis,),) = canvas(1, 1, (7.5, 4.5))
     axis.loglog(found.frequencies, found.amplitude, color="black", lw=1.0)
     plain_numbers(axis.xaxis)
@@ -174,33 +224,37 @@ def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> P
     )
     finite = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
     axis.set_ylim(0.5 * float(finite.min()), 2.0 * float(finite.max()))
-    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=plain(title))
+    axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=escape_dollars(title))
     return save(figure, path)
 
 
-def _line(axis: Any, times: Array, values: Array, label: str) -> None:
-    """Return a history with its peak marked and written."""
+def _draw_history(axis: Any, times: Array, values: Array, label: str) -> None:
+    """Draw a history with its peak marked and written."""
     axis.plot(times, values, color="black", lw=0.7)
-    peak = int(np.argmax(np.abs(values)))
-    axis.plot(times[peak], values[peak], "o", ms=4, color="tab:red", clip_on=False)
-    side, outwards = -1 if times[peak] > 0.75 * times[-1] else 1, -1 if values[peak] < 0.0 else 1
+    row = int(np.argmax(np.abs(values)))
+    instant = times[row]
+    peak = values[row]
+    axis.plot(instant, peak, "o", ms=4, color="tab:red", clip_on=False)
+
+    # The text is to the right of the peak, except near the end, and away from the zero line.
+    late = instant > 0.75 * times[-1]
     axis.annotate(
-        f"{values[peak]:.3g} at {times[peak]:g} s",
-        (times[peak], values[peak]),
-        xytext=(6 * side, 4 * outwards),
+        f"{peak:.3g} at {instant:g} s",
+        (instant, peak),
+        xytext=(-6 if late else 6, -4 if peak < 0.0 else 4),
         textcoords="offset points",
         fontsize=8,
         color="tab:red",
         va="center",
-        ha="left" if side > 0 else "right",
+        ha="right" if late else "left",
     )
     axis.axhline(0.0, color="0.6", lw=0.6)
     axis.margins(y=0.12)
     axis.set_ylabel(label)
 
 
-def _husid(axis: Any, record: Record) -> None:
-    """Accumulated Arias intensity in percent, the significant duration shaded."""
+def _draw_husid(axis: Any, record: Record) -> None:
+    """Draw the accumulated Arias intensity in percent, the significant duration shaded."""
     curve = husid(record)
     if curve[-1] > 0.0:
         curve = 100.0 * curve / curve[-1]
@@ -215,14 +269,15 @@ def _husid(axis: Any, record: Record) -> None:
     axis.set(ylabel="Arias intensity [%]", ylim=(-3.0, 103.0))
 
 
-def _size(values: Array) -> tuple[float, str]:
-    """Return the unit of length that fits.
+def _choose_length_unit(values: Array) -> tuple[float, str]:
+    """Return (metres per unit, name) that fits lengths.
 
-    There are centimetres in place of hundreds of millimetres, as is usual for ground motions.
+    Centimetres take the place of hundreds of millimetres, as is usual for ground motions.
     """
     peak = float(np.max(np.abs(values)))
     return (0.01, "cm") if 0.001 <= peak < 10.0 else length_unit(peak)
 
 
-def _pretty(units: str) -> str:
+def _typeset_unit(units: str) -> str:
+    """Return a unit with its square raised."""
     return units.replace("s2", "s²")

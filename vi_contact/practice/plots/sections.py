@@ -1,6 +1,6 @@
 """Say in words, tables and curves what a run tells a design engineer.
 
-This is the content of the page, whatever draws it.
+This is the content of the report; ``pages`` prints it, and ``web_page`` writes it for browsers.
 """
 
 from collections import defaultdict
@@ -19,8 +19,8 @@ from ...run.solution import energy_warning
 from ..engineering.peak_values import peaks
 from . import charts
 from .charts import Chart
-from .histories import LEDGER, scaled
-from .maps import Drawing, maps_of
+from .histories import LEDGER, scale_values
+from .maps import Drawing, list_maps
 from .report_words import (
     CHARTS,
     HEADERS,
@@ -31,10 +31,20 @@ from .report_words import (
     SUMMARY,
 )
 
+NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
+FEW_ROWS = 20  # of a history: accelerations of a run with no more are not filtered
+
 
 @dataclass(frozen=True)
 class Table:
-    """Hold a table of texts; ``sortable``: whether a reader may want its rows in another order."""
+    """Hold a table of texts.
+
+    Attributes:
+        header: names of the columns.
+        rows: a text for each column.
+        title: stands above; none when empty.
+        sortable: whether a reader may want the rows in another order.
+    """
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -44,9 +54,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """Hold a part of the page.
+    """Hold a part of the page; what it has stands in the order of the attributes.
 
-    It has, in this order, sentences, tables, curves, drawings on one axis each, pictures.
+    Attributes:
+        title: heading.
+        sentences: paragraphs.
+        tables: after them.
+        charts: curves.
+        drawings: each draws on one axis.
+        pictures: PNG files.
     """
 
     title: str
@@ -62,211 +78,243 @@ def sections_of(
 ) -> list[Section]:
     """Return the sections that a run has data for.
 
-    ``model`` is model.json, empty where there is none; ``columns`` are groups of columns for the
-    histories, in place of those that move.
+    Args:
+        run: what ``read_run`` returned.
+        model: model.json of its folder, empty where there is none.
+        columns: groups of columns of one unit, a chart each for the histories; None: those that
+            move.
+
+    Raises:
+        InputError: the run has no steps, or columns do not exist or have different units.
     """
     if len(run.history["t"]) < 2:
         raise InputError(
             f"the run in '{run.folder}' has no steps yet: report on it when it has some"
         )
-    histories = (
-        charts.history_charts(run, CHARTS)
-        if columns is None
-        else charts.chosen_charts(run, columns)
-    )
-    found = [
-        _model(model),
-        _motion(run, model),
-        _results(run),
-        _accelerations(run),
-        Section("Histories", charts=histories, drawings=maps_of(run)),
-        _certificate(run),
-        _peaks(run),
+    if columns is None:
+        histories = charts.chart_histories(run, CHARTS)
+    else:
+        histories = charts.chart_groups(run, columns)
+    sections = [
+        _describe_model(model),
+        _describe_motion(run, model),
+        _tabulate_results(run),
+        _compare_accelerations(run),
+        Section("Histories", charts=histories, drawings=list_maps(run)),
+        _explain_certificate(run),
+        _tabulate_peaks(run),
     ]
-    return [one for one in found if one.sentences or one.tables or one.charts or one.drawings]
+    return [
+        section
+        for section in sections
+        if section.sentences or section.tables or section.charts or section.drawings
+    ]
 
 
-NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
-
-
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Return a number with four digits, a dash for none."""
     return "-" if np.isnan(value) else f"{value:.4g}"
 
 
-def words(value: Any, depth: int = 9) -> str:
+def format_value(value: Any, depth: int = 9) -> str:
     """Return a value of a file as it is read by people.
 
     What is nested deeper than anybody would is left out.
     """
     if isinstance(value, Mapping) and depth:
-        return ", ".join(f"{key} = {words(one, depth - 1)}" for key, one in value.items())
+        return ", ".join(f"{key} = {format_value(item, depth - 1)}" for key, item in value.items())
     if isinstance(value, list | tuple | Mapping):
-        return ", ".join(words(one, depth - 1) for one in value) if depth else "…"
+        return ", ".join(format_value(item, depth - 1) for item in value) if depth else "…"
     if isinstance(value, float):
         return f"{value:.5g}"
     return "-" if value is None else shorten(str(value), 200, placeholder=" …")
 
 
-def table_of(title: str, rows: Any) -> list[Table]:
+def tabulate(title: str, rows: Any) -> list[Table]:
     """Return the table of objects that a file lists.
 
     It has a column for each of their keys; there is none for anything else.
     """
-    given = (
-        [one for one in rows if isinstance(one, Mapping)] if isinstance(rows, list | tuple) else []
-    )
-    header = list(dict.fromkeys(key for one in given for key in one if key not in NOT_SHOWN))
-    return (
-        [Table(header, [[words(one.get(key)) for key in header] for one in given], title)]
-        if given
-        else []
-    )
+    listed = rows if isinstance(rows, list | tuple) else ()
+    objects = [row for row in listed if isinstance(row, Mapping)]
+    if not objects:
+        return []
+    keys = (key for row in objects for key in row if key not in NOT_SHOWN)
+    header = list(dict.fromkeys(keys))
+    cells = []
+    for row in objects:
+        cells.append([format_value(row.get(key)) for key in header])
+    return [Table(header, cells, title)]
 
 
-def _model(model: Mapping[str, Any]) -> Section:
-    tables = [
-        table for title, key in MODEL_TABLES.items() for table in table_of(title, model.get(key))
+def _describe_model(model: Mapping[str, Any]) -> Section:
+    """Say what model.json tells: facts, warnings and tables of what it lists."""
+    tables = []
+    for title, key in MODEL_TABLES.items():
+        tables += tabulate(title, model.get(key))
+    sentences = [
+        text.format(format_value(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)
     ]
-    said = [text.format(words(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)]
     warnings = model.get("warnings")
-    said += [f"Warning: {words(one)}." for one in (warnings if isinstance(warnings, list) else ())]
-    return Section("Model and contact", said, tables)
+    if isinstance(warnings, list):
+        sentences += [f"Warning: {format_value(warning)}." for warning in warnings]
+    return Section("Model and contact", sentences, tables)
 
 
-def _motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
-    records, shown = table_of("records (SI units)", model.get("records")), charts.motion_charts(run)
-    said = []
-    if shown:
-        peaks = {
-            line.name: np.max(np.abs(run.history[line.name])) / STANDARD_GRAVITY
-            for line in shown[0].lines
-        }
-        told = " and ".join(f"{peak:.3g} g along {name[-1]}" for name, peak in peaks.items())
-        said = [SAY["shaken"].format(peaks=told), SAY["spectrum"]]
-    return Section("Ground motion", said, records, shown)
+def _describe_motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
+    """Say how strongly the ground moved, with the records that model.json names."""
+    records = tabulate("records (SI units)", model.get("records"))
+    motion = charts.chart_motion(run)
+    sentences = []
+    if motion:
+        texts = []
+        for line in motion[0].lines:
+            peak = np.max(np.abs(run.history[line.name])) / STANDARD_GRAVITY
+            texts.append(f"{peak:.3g} g along {line.name[-1]}")
+        sentences = [SAY["shaken"].format(peaks=" and ".join(texts)), SAY["spectrum"]]
+    return Section("Ground motion", sentences, records, motion)
 
 
-def _results(run: RunFolder) -> Section:
-    rows = [
-        row for title, starts in RESULTS.items() for row in _result_rows(run, title, tuple(starts))
-    ]
-    safe = list(_safety(run))
-    tables = [Table(HEADERS["results"], rows), Table(HEADERS["safety"], safe)]
+def _tabulate_results(run: RunFolder) -> Section:
+    """Tabulate forces, sliding and the like, and how far each part is from sliding."""
+    results: list[list[str]] = []
+    for title, prefixes in RESULTS.items():
+        results += _list_results(run, title, tuple(prefixes))
+    safety = list(_list_safety(run))
+    tables = [Table(HEADERS["results"], results), Table(HEADERS["safety"], safety)]
     return Section(
         "Base shear, thrust, uplift and sliding",
-        [SAY["safety"]] if safe else [],
-        [one for one in tables if one.rows],
+        [SAY["safety"]] if safety else [],
+        [table for table in tables if table.rows],
     )
 
 
-def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Iterable[list[str]]:
-    """Return the rows of the columns that begin so.
+def _list_results(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Iterable[list[str]]:
+    """Yield the rows of the columns that begin so.
 
     Of heights, the row is at the largest thrust, for without thrust they say nothing.
     """
     t = run.history["t"]
-    for name in (name for name in run.columns if name.startswith(prefixes)):
-        values = run.history.get(name, np.zeros((0, 0)))
+    for name in run.columns:
+        values = run.history.get(name)
+        if not name.startswith(prefixes) or values is None:
+            continue
+        if values.ndim != 1 or np.isnan(values).all():
+            continue
         kind, _, part = name.partition("_")
-        if (
-            values.ndim != 1
-            or np.isnan(values).all()
-            or kind == "height"
-            and not np.nan_to_num(values).any()
-        ):
+        if kind == "height" and not np.nan_to_num(values).any():
             continue  # the thrust on a level part has no height
+
+        # When the result is largest in size; heights count where they are numbers.
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
-        shown, unit = scaled(values, run.columns[name][0])
+        scaled, unit = scale_values(values, run.columns[name][0])
         yield [
             title,
             name,
             unit,
-            number(shown[row]),
-            number(t[row]),
-            number(shown[0]),
-            number(shown[-1]),
+            format_number(scaled[row]),
+            format_number(t[row]),
+            format_number(scaled[0]),
+            format_number(scaled[-1]),
         ]
 
 
-def _safety(run: RunFolder) -> Iterable[list[str]]:
-    """Return the rows of the parts of the contact.
+def _list_safety(run: RunFolder) -> Iterable[list[str]]:
+    """Yield the rows of the parts of the contact.
 
     In them 1 / (1 - margin) is the friction that they could carry over what they do.
     """
-    for name in (name for name in run.history if name.startswith("margin_")):
+    for name in run.history:
+        if not name.startswith("margin_"):
+            continue
         used = 1.0 - run.history[name]
-        if not np.isnan(used).all() and np.nanmax(used) > 0.0:
-            row = int(np.nanargmax(used))
-            last = 1.0 / used[-1] if used[-1] > 0.0 else np.inf
-            yield [name[7:], number(1.0 / used[row]), number(run.history["t"][row]), number(last)]
+        if np.isnan(used).all() or np.nanmax(used) <= 0.0:
+            continue  # never loaded in shear
+        row = int(np.nanargmax(used))
+        last = 1.0 / used[-1] if used[-1] > 0.0 else np.inf
+        yield [
+            name.removeprefix("margin_"),
+            format_number(1.0 / used[row]),
+            format_number(run.history["t"][row]),
+            format_number(last),
+        ]
 
 
-def _accelerations(run: RunFolder) -> Section:
-    """Accelerations of probes, low-passed beside raw."""
-    names = (
-        [name for axis in "xyz" for name in charts.varying(run, f"a_{axis}_")]
-        if len(run.history["t"]) > 20
-        else []
-    )
-    title, rows, found = (
-        "Accelerations, low-passed and raw",
-        [],
-        {name: charts.smoothed(run, name) for name in names},
-    )
+def _compare_accelerations(run: RunFolder) -> Section:
+    """Set accelerations of probes, low-passed and raw, beside each other."""
+    title = "Accelerations, low-passed and raw"
+    names: list[str] = []
+    if len(run.history["t"]) > FEW_ROWS:
+        for axis in "xyz":
+            names += charts.list_varying(run, f"a_{axis}_")
+    if not names:
+        return Section(title)
+    motions = {name: charts.smooth_acceleration(run, name) for name in names}
     # the same for all: they have the run's step
-    corner = max((corner for _, _, corner in found.values()), default=0.0)
-    for name, (raw, smooth, _) in found.items():
-        low, high = (float(np.max(np.abs(one.acceleration))) for one in (smooth, raw))
-        rows.append(
-            [name, *map(number, (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY))]
-        )
-    said, below = SAY["accelerations"].format(corner=corner), f"peak below {corner:.3g} Hz [m/s²]"
+    corner = max(corner for _, _, corner in motions.values())
+    rows = []
+    for name, (raw, smooth, _) in motions.items():
+        low = float(np.max(np.abs(smooth.acceleration)))
+        high = float(np.max(np.abs(raw.acceleration)))
+        numbers = (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY)
+        rows.append([name, *map(format_number, numbers)])
+    below = f"peak below {corner:.3g} Hz [m/s²]"
     table = Table(
         ("column", below, "[g]", "raw peak, not convergent at impacts [m/s²]", "[g]"),
         rows,
         sortable=True,
     )
-    shown = [charts.acceleration_chart(run, name, *found[name]) for name in names[:2]]
-    return Section(title, [said], [table], shown) if rows else Section(title)
+    curves = [charts.chart_acceleration(run, name, *motions[name]) for name in names[:2]]
+    return Section(title, [SAY["accelerations"].format(corner=corner)], [table], curves)
 
 
-def _certificate(run: RunFolder) -> Section:
-    """Return what the certificate and the ledger say, and what they do not."""
-    facts, history = run.facts, run.history
-    worst, steps = float(np.max(history["certificate"])), len(history["t"]) - 1
+def _explain_certificate(run: RunFolder) -> Section:
+    """Say what the certificate and the ledger tell, and what they do not."""
+    facts = run.facts
+    history = run.history
+    worst = float(np.max(history["certificate"]))
     asked = f", {facts['tolerance']:.0e} was asked for" if facts.get("tolerance") else ""
-    said = [SAY["certificate"].format(steps=steps, worst=worst, asked=asked), SAY["limits"]]
-    if facts.get("status") != "finished":
-        said.append(
-            SAY["unfinished"].format(
-                why=facts.get("reason") or facts.get("status") or "killed, or going on"
-            )
-        )
-    energy = charts.energy_chart(run)
-    tables = []
-    if energy is not None:
-        ends = {name: float(history[name][-1]) for name, *_ in LEDGER if name in history}
-        most = float(np.max(history["energy_kinetic"] + history["energy_strain"]))
-        rows = [
-            [label, number(ends[name]), number(ends[name] / most)]
-            for name, label, *_ in LEDGER
-            if ends.get(name)
-        ]
-        tables.append(Table(HEADERS["energies"], rows))
-        defect = float(np.max(np.abs(history["energy_defect"]))) / most
-        said.append(SAY["ledger"].format(defect=defect, most=most))
-    said += [f"Warning: {one}." for one in (energy_warning(facts), facts.get("sampling")) if one]
-    shown = [one for one in (energy, charts.certificate_chart(run)) if one is not None]
-    return Section("Certificate and energies in words", said, tables, shown)
-
-
-def _peaks(run: RunFolder) -> Section:
-    rows = [
-        [one.name, one.quantity, one.unit, *map(number, (one.max, one.t_max, one.min, one.t_min))]
-        for one in peaks(run.history, run.columns)
+    sentences = [
+        SAY["certificate"].format(steps=len(history["t"]) - 1, worst=worst, asked=asked),
+        SAY["limits"],
     ]
+    if facts.get("status") != "finished":
+        why = facts.get("reason") or facts.get("status") or "killed, or going on"
+        sentences.append(SAY["unfinished"].format(why=why))
+
+    tables = []
+    curves = []
+    energy = charts.chart_energy(run)
+    if energy is not None:
+        most = float(np.max(history["energy_kinetic"] + history["energy_strain"]))
+        tables.append(_tabulate_energies(run, most))
+        defect = float(np.max(np.abs(history["energy_defect"]))) / most
+        sentences.append(SAY["ledger"].format(defect=defect, most=most))
+        curves.append(energy)
+    curves.append(charts.chart_certificate(run))
+
+    warnings = (energy_warning(facts), facts.get("sampling"))
+    sentences += [f"Warning: {warning}." for warning in warnings if warning]
+    return Section("Certificate and energies in words", sentences, tables, curves)
+
+
+def _tabulate_energies(run: RunFolder, most: float) -> Table:
+    """Tabulate the terms of the ledger at the end, over the largest energy [J] too."""
+    rows = []
+    for name, label, *_ in LEDGER:
+        end = float(run.history[name][-1]) if name in run.history else 0.0
+        if end:
+            rows.append([label, format_number(end), format_number(end / most)])
+    return Table(HEADERS["energies"], rows)
+
+
+def _tabulate_peaks(run: RunFolder) -> Section:
+    """Tabulate the largest and the smallest value of every column."""
+    rows = []
+    for peak in peaks(run.history, run.columns):
+        numbers = (peak.max, peak.t_max, peak.min, peak.t_min)
+        rows.append([peak.name, peak.quantity, peak.unit, *map(format_number, numbers)])
     return Section(
         "Peak values of all columns", tables=[Table(HEADERS["peaks"], rows, sortable=True)]
     )
@@ -277,7 +325,8 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
 
     They are of the method, and of the outcome; a dash is for what is unknown.
     """
-    t, facts = run.history["t"], {key: one for key, one in run.facts.items() if one is not None}
+    t = run.history["t"]
+    facts = {key: value for key, value in run.facts.items() if value is not None}
     facts |= {
         "count": len(t) - 1,
         "first": t[0],
@@ -287,9 +336,10 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
         "status": facts.get("status", "not ended"),
         "mean": facts.get("iterations_per_step", {}).get("mean", np.nan),
     }
-    known: dict[str, Any] = defaultdict(lambda: "-")
-    known |= {key: number(one) if isinstance(one, float) else one for key, one in facts.items()}
+    values: dict[str, Any] = defaultdict(lambda: "-")
+    for key, value in facts.items():
+        values[key] = format_number(value) if isinstance(value, float) else value
     return [
-        (name, shorten(text.format_map(known), 78, placeholder=" …"))
+        (name, shorten(text.format_map(values), 78, placeholder=" …"))
         for name, text in SUMMARY.items()
     ]

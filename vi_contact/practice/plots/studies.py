@@ -10,8 +10,9 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.arguments import checked
 from ...core.units import STANDARD_GRAVITY
-from .histories import canvas, plain, save, scale
+from .histories import canvas, escape_dollars, save, scale
 
+MARKS = "osv^D"  # of records that are named
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
 
@@ -19,8 +20,13 @@ _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:
 class DemandPanel:
     """Describe one demand in its SI unit.
 
-    It has curves record -> (intensities, demands); fractiles (n, 3) of 16, 50 and 84 % at the
-    levels (n,); and intensities of runs that failed, marked at the right edge.
+    Attributes:
+        label: name of the demand.
+        unit: SI, of the demands.
+        curves: record -> (intensities, demands) of its runs.
+        levels: (n,) intensities of the fractiles.
+        fractiles: (n, 3) demands of 16, 50 and 84 % of the records at the levels.
+        failed: intensities of runs that failed, which are marked at the right edge.
     """
 
     label: str
@@ -38,12 +44,21 @@ def plot_ida(
     """Draw a panel for every demand: a grey curve for each record, and the fractiles.
 
     Accelerations are in g.
+
+    Args:
+        demands: at least one.
+        path: the picture; its ending says the format.
+        intensity: name of the intensity measure.
+        unit: its SI unit.
+
+    Returns:
+        the path.
     """
     figure, ((*axes,),) = canvas(1, len(demands), (1.0 + 4.4 * len(demands), 4.6), sharey=True)
-    factor, unit = _in_g(unit)
+    factor, shown_unit = _choose_intensity_unit(unit)
     for axis, panel in zip(axes, demands, strict=True):
-        _draw(axis, panel, factor)
-    axes[0].set_ylabel(f"{intensity} [{unit}]")
+        _draw_panel(axis, panel, factor)
+    axes[0].set_ylabel(f"{intensity} [{shown_unit}]")
     axes[0].set_ylim(bottom=0.0)
     handles, labels = axes[0].get_legend_handles_labels()
     # keeps room for the legend, which the layout of matplotlib 3.6 does not
@@ -63,17 +78,30 @@ def plot_fragility(
 ) -> Path:
     """Draw the probability that each limit is passed.
 
-    It is (3, n) lower bound, curve, upper bound at intensities (n,). The brackets (records, 2) that
-    it is fitted to are drawn one above the other.
+    The brackets that a curve is fitted to are drawn one above the other.
+
+    Args:
+        curves: name of a limit -> (function, brackets). The function returns (3, n) lower bound,
+            curve and upper bound at intensities (n,). The brackets (records, 2) are the intensities
+            between which each record first passes the limit.
+        path: the picture; its ending says the format.
+        intensity: name of the intensity measure.
+        unit: its SI unit; accelerations are drawn in g.
+
+    Returns:
+        the path.
     """
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.4))
-    factor, unit = _in_g(unit)
-    every = np.concatenate([brackets for _, brackets in curves.values()])
-    x = np.linspace(0.0, 1.2 * np.max(every, where=np.isfinite(every), initial=0.0), 300)[1:]
+    factor, shown_unit = _choose_intensity_unit(unit)
+    bounds = np.concatenate([brackets for _, brackets in curves.values()])
+    x = np.linspace(0.0, 1.2 * np.max(bounds, where=np.isfinite(bounds), initial=0.0), 300)[1:]
     for number, (name, (curve, brackets)) in enumerate(curves.items()):
-        colour, (low, value, high) = f"C{number}", curve(x)
-        axis.plot(factor * x, value, color=colour, label=plain(name))
+        colour = f"C{number}"
+        low, value, high = curve(x)
+        axis.plot(factor * x, value, color=colour, label=escape_dollars(name))
         axis.fill_between(factor * x, low, high, color=colour, alpha=0.15, lw=0.0)
+
+        # Brackets from the lowest record to the highest, each at its share of all records.
         first, last = brackets[np.lexsort(brackets.T)].T
         shares = (np.arange(len(first)) + 0.5) / len(first)
         axis.hlines(
@@ -85,7 +113,7 @@ def plot_fragility(
             alpha=0.6,
         )
     axis.set(
-        xlabel=f"{intensity} [{unit}]",
+        xlabel=f"{intensity} [{shown_unit}]",
         ylabel="probability that the limit is passed [-]",
         ylim=(0.0, 1.0),
         xlim=(0.0, factor * x[-1]),
@@ -95,32 +123,35 @@ def plot_fragility(
     return save(figure, path)
 
 
-def _in_g(unit: str) -> tuple[float, str]:
+def _choose_intensity_unit(unit: str) -> tuple[float, str]:
     """Return the factor and the unit in which an intensity is drawn: accelerations in g."""
     return (1.0 / STANDARD_GRAVITY, "g") if unit == "m/s²" else (1.0, unit)
 
 
-def _draw(axis: Any, panel: DemandPanel, level: float) -> None:
+def _draw_panel(axis: Any, panel: DemandPanel, intensity_factor: float) -> None:
+    """Draw a demand over the intensity, which is multiplied by a factor."""
     size = max(float(np.max(np.abs(demand), initial=0.0)) for _, demand in panel.curves.values())
     factor, unit = scale(size, panel.unit)
     axis.set_xlabel(f"{panel.label} [{unit}]")
-    few = len(panel.curves) <= 5
-    marks = "osv^D"
+
+    # Few records are named, each with a mark of its own; of many all are one grey line.
+    few = len(panel.curves) <= len(MARKS)
     for number, (record, (intensity, demand)) in enumerate(panel.curves.items()):
-        label = plain(record) if few else "a record" if number == 0 else None
-        mark = marks[number] if few else None
-        axis.plot(
-            factor * demand, level * intensity, marker=mark, color="0.65", lw=0.9, ms=4, label=label
-        )
+        look: dict[str, Any] = {"marker": None, "label": None}
+        if few:
+            look = {"marker": MARKS[number], "label": escape_dollars(record)}
+        elif number == 0:
+            look["label"] = "a record"
+        axis.plot(factor * demand, intensity_factor * intensity, color="0.65", lw=0.9, ms=4, **look)
+
     if len(panel.levels) > 1:
+        levels = intensity_factor * panel.levels
         for values, (name, colour, style) in zip(panel.fractiles.T, _FRACTILES, strict=True):
-            axis.plot(
-                factor * values, level * panel.levels, color=colour, ls=style, lw=1.6, label=name
-            )
+            axis.plot(factor * values, levels, color=colour, ls=style, lw=1.6, label=name)
     if len(panel.failed):
         axis.plot(
             np.ones(len(panel.failed)),
-            level * np.array(panel.failed),
+            intensity_factor * np.array(panel.failed),
             "x",
             color="tab:red",
             ms=7,

@@ -1,9 +1,9 @@
 """Write sections about a run as one HTML file.
 
-It loads nothing and runs no script but its own two.
+The page loads nothing and runs no script but its own two.
 
-Texts of files are escaped by the template's engine, those in curves once more, for Plotly reads
-some HTML in them.
+The template's engine escapes texts of files; ``report.js`` escapes those in curves once more, for
+Plotly reads some HTML in them.
 """
 
 from base64 import b64encode
@@ -26,8 +26,10 @@ from .sections import Section
 
 FOLDER = Path(__file__).parent / "web"
 POINTS = 160_000  # of all curves together: 20 bytes each
-FEWEST, MOST = 400, 12_000  # of a curve
+FEWEST = 400  # of a curve
+MOST = 12_000  # of a curve
 SHOWN = 4  # curves of a chart; the others when their names are clicked
+ENERGIES = 10  # likewise of the chart of energies: all of them
 MISSING = (
     'a report for browsers needs jinja2 and plotly: give pip install "vi-contact[report]", or bash '
     "install/report.sh in a clone, or name the report .pdf"
@@ -44,12 +46,23 @@ def can_write() -> bool:
 def write_web_page(
     path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
 ) -> Path:
-    """Write a page.
+    """Write sections as a page for browsers, with curves to zoom and tables to sort.
 
-    It has the title, (name, value) of facts, the sections with curves to zoom and tables to sort,
-    and a foot.
+    Histories are thinned; largest and smallest values stay.
 
-    Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly.
+    Args:
+        path: the file.
+        title: stands first.
+        facts: (name, value) of what the report says next.
+        sections: the rest.
+        foot: text at the foot of the page.
+
+    Returns:
+        the path.
+
+    Raises:
+        InputError: jinja2 or plotly is not installed.
+        ViContactError: the file cannot be written.
     """
     if not can_write():
         raise InputError(MISSING)
@@ -60,44 +73,32 @@ def write_web_page(
     engine = Environment(
         loader=FileSystemLoader(FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
+
+    # All curves share the points of a page.
     charts = [chart for section in sections for chart in section.charts]
-    most = int(np.clip(POINTS / max(sum(len(one.lines) for one in charts), 1), FEWEST, MOST))
-    thin = any(len(line.x) > most for one in charts for line in one.lines)
-    scripts = [
-        get_plotlyjs().replace("\r\n", "\n"),
-        (FOLDER / "report.js").read_text(encoding="utf-8"),
-    ]
-    shown, count = [], 0
-    for one in sections:
-        images = [*map(_drawn, one.drawings), *map(read_bytes, one.pictures)]
-        shown.append(
-            {
-                "own": one,
-                "charts": range(count, count := count + len(one.charts)),
-                "pictures": [
-                    f"data:image/png;base64,{b64encode(image).decode()}" for image in images
-                ],
-            }
+    curves = [line for chart in charts for line in chart.lines]
+    most = int(np.clip(POINTS / max(len(curves), 1), FEWEST, MOST))
+    note = ""
+    if any(len(line.x) > most for line in curves):
+        note = (
+            f"Curves have at most {most} points, in which extremes are kept; history.csv has all."
         )
+
+    # The page runs these scripts alone: it names them by their hashes.
+    plotly = get_plotlyjs().replace("\r\n", "\n")
+    own_script = (FOLDER / "report.js").read_text(encoding="utf-8")
+    scripts = [
+        {"text": Markup(script), "hash": _hash_script(script)} for script in (plotly, own_script)
+    ]
     text = engine.get_template("report.html").render(
         title=title,
         facts=facts,
-        sections=shown,
+        sections=_encode_sections(sections),
         foot=foot,
-        charts=[_chart(one, most) for one in charts],
+        charts=[_encode_chart(chart, most) for chart in charts],
         style=Markup((FOLDER / "report.css").read_text(encoding="utf-8")),
-        scripts=[
-            {
-                "text": Markup(script),
-                "hash": f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}",
-            }
-            for script in scripts
-        ],
-        thinned=(
-            f"Curves have at most {most} points, in which extremes are kept; history.csv has all."
-        )
-        if thin
-        else "",
+        scripts=scripts,
+        thinned=note,
     )
     try:
         write_output(path, text.encode())
@@ -106,15 +107,41 @@ def write_web_page(
     return path
 
 
-def extremes(values: Array, most: int) -> Indices:
-    """Return at most ``most`` rows (k,) in order.
+def _encode_sections(sections: Sequence[Section]) -> list[dict[str, Any]]:
+    """Return what the template fills in: sections, numbers of their charts, and pictures."""
+    encoded = []
+    first = 0  # number of the first chart of the section
+    for section in sections:
+        images = [*map(_draw_png, section.drawings), *map(read_bytes, section.pictures)]
+        after = first + len(section.charts)
+        encoded.append(
+            {
+                "own": section,
+                "charts": range(first, after),
+                "pictures": [
+                    f"data:image/png;base64,{b64encode(image).decode()}" for image in images
+                ],
+            }
+        )
+        first = after
+    return encoded
+
+
+def _hash_script(script: str) -> str:
+    """Return the hash of a script as a policy of security has it."""
+    return f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}"
+
+
+def find_extremes(values: Array, most: int) -> Indices:
+    """Find at most ``most`` rows (k,) in order.
 
     They are the smallest and the largest of equal parts; of few rows they are all.
     """
     if len(values) <= most:
         return np.arange(len(values))
     starts = np.linspace(0, len(values), most // 2, endpoint=False).astype(int)
-    parts = np.split(np.where(np.isnan(values), np.nanmean(values), values), starts[1:])
+    numbers = np.where(np.isnan(values), np.nanmean(values), values)
+    parts = np.split(numbers, starts[1:])
     rows = [
         start + np.array([part.argmin(), part.argmax()])
         for start, part in zip(starts, parts, strict=True)
@@ -122,16 +149,16 @@ def extremes(values: Array, most: int) -> Indices:
     return np.unique(np.concatenate(rows))
 
 
-def _chart(chart: Chart, most: int) -> Mapping[str, Any]:
-    """Return what the script draws."""
+def _encode_chart(chart: Chart, most: int) -> Mapping[str, Any]:
+    """Return what the script draws, with at most so many points of each line."""
     lines = []
     for line in chart.lines:
-        rows = extremes(line.y, most)
+        rows = find_extremes(line.y, most)
         lines.append(
             {
                 "name": line.name,
-                "x": _numbers(line.x[rows], 7),
-                "y": _numbers(line.y[rows], 5),
+                "x": _round_numbers(line.x[rows], 7),
+                "y": _round_numbers(line.y[rows], 5),
                 "pale": line.pale,
                 "dash": line.style == ":",
                 "dots": line.style == ".",
@@ -145,15 +172,16 @@ def _chart(chart: Chart, most: int) -> Mapping[str, Any]:
         "log_y": chart.log_y,
         "bound": chart.bound,
         "lines": lines,
-        "shown": 10 if chart.title == "energy" else SHOWN,
+        "shown": ENERGIES if chart.title == "energy" else SHOWN,
     }
 
 
-def _numbers(values: Iterable[float], digits: int) -> list[float | None]:
+def _round_numbers(values: Iterable[float], digits: int) -> list[float | None]:
+    """Return numbers with so many digits; None for what is none, as JSON has it."""
     return [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in values]
 
 
-def _drawn(drawing: Drawing) -> bytes:
+def _draw_png(drawing: Drawing) -> bytes:
     """Return the PNG of a drawing."""
     require_matplotlib()
     import matplotlib

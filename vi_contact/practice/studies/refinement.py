@@ -17,7 +17,7 @@ from ...core.own_files import inner_folder, is_own
 from ...run.files.folder import CHECKPOINT, HISTORY_CSV
 from ...run.files.reading import RunFolder, read_run
 from ..engineering.peak_values import GROWS, peaks
-from ..plots.sections import SAY, Section, Table, number
+from ..plots.sections import SAY, Section, Table, format_number
 from .cases.library import COPY, read_copy, read_settings
 from .cases.toml_file import format_value, with_settings
 
@@ -197,11 +197,11 @@ def _compare(peak: Any, refined: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """
     size = _measure(peak)
     mark = ", raw: not convergent at impacts" if peak.quantity.endswith(GROWS) else ""
-    row = [peak.name + mark, peak.unit, number(size)]
+    row = [peak.name + mark, peak.unit, format_number(size)]
     for others in refined.values():
         other = _measure(others[peak.name]) if peak.name in others else np.nan
         # adding zero makes -0 a zero
-        row += [number(other), f"{round(100.0 * (other / size - 1.0), 2) + 0.0:+g} %"]
+        row += [format_number(other), f"{round(100.0 * (other / size - 1.0), 2) + 0.0:+g} %"]
     return row
 
 

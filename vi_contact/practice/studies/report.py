@@ -19,9 +19,9 @@ from ..engineering import checks
 from ..engineering.checks.comparison import Check, Comparison
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
-from ..plots.histories import image_of
+from ..plots.histories import render_image
 from ..plots.pages import write_pages
-from ..plots.sections import HEADERS, Section, Table, header_facts, number, sections_of
+from ..plots.sections import HEADERS, Section, Table, format_number, header_facts, sections_of
 from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from .cases.library import COPY, read_copy
@@ -104,7 +104,7 @@ def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]
         return {}, []
     try:
         model = read_object(folder / MODEL)
-        image = image_of(sketch(model), bbox_inches="tight")
+        image = render_image(sketch(model), bbox_inches="tight")
     except InputError:
         raise
     except OSError as error:
@@ -147,16 +147,17 @@ def _describe_checks(folder: Path) -> Section:
 def _describe_comparison(comparison: Comparison) -> list[str]:
     """Return the row of a comparison."""
     inputs = [
-        f"{name} = {number(value)} {unit}" for name, (value, unit) in comparison.inputs.items()
+        f"{name} = {format_number(value)} {unit}"
+        for name, (value, unit) in comparison.inputs.items()
     ]
     applies = comparison.applies
     return [
         comparison.name,
         comparison.formula,
         ", ".join(inputs),
-        number(comparison.expected),
-        number(comparison.found),
+        format_number(comparison.expected),
+        format_number(comparison.found),
         comparison.unit,
-        f"does not apply: {applies}" if applies else number(comparison.ratio),
+        f"does not apply: {applies}" if applies else format_number(comparison.ratio),
         comparison.source,
     ]
