@@ -162,12 +162,12 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     counted("response_spectrum", f"{row.size} periods", numbers, most=MOST)
 
     # Oscillators that need the same number of looks a step go together.
-    wanted = 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))
-    parts = np.maximum(PER_STEP, wanted).astype(int)
+    least_parts = 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))
+    parts = np.maximum(PER_STEP, least_parts).astype(int)
     peaks = np.zeros((3, row.size))
     for count in np.unique(parts):
-        same = parts == count
-        peaks[:, same] = _peaks(record, 2.0 * math.pi / row[same], damping, int(count))
+        group = parts == count
+        peaks[:, group] = _peaks(record, 2.0 * math.pi / row[group], damping, int(count))
     return ResponseSpectrum(row, damping, *peaks)
 
 

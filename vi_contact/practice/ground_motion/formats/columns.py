@@ -200,14 +200,14 @@ def _count_and_step(rows: Sequence[Sequence[float]]) -> _First | None:
     two lines, before exactly as many numbers as it says.
     """
     first = rows[0]
-    others = rows[1:]
+    later_rows = rows[1:]
     count = first[0]
     if count != round(count) or count < 2.0:
         return None
-    values = sum(len(row) for row in others)
+    values = sum(len(row) for row in later_rows)
     if len(first) == 2 and 0.0 < first[1] < 1.0:
-        single = all(len(row) == 1 for row in others)
-        agrees = count in (values, len(others)) and len(others[0]) != 2
+        single = all(len(row) == 1 for row in later_rows)
+        agrees = count in (values, len(later_rows)) and len(later_rows[0]) != 2
         if single or agrees:
             return _First(count, first[1], 1)
     if len(first) == 1 and count == values:
@@ -460,7 +460,7 @@ def _on_times(
     """
     unit = TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s"))
     stated = facts.dt
-    given = text.dt if stated is None else stated  # by the file or its caller
+    dt = text.dt if stated is None else stated  # that the file or its caller states
     usual = float(np.median(np.diff(times)))
     rising = bool(np.all(np.diff(times) > 0.0))
     if column.unit is not None and unit is None:
@@ -470,19 +470,19 @@ def _on_times(
 
     # Numbers of samples?
     numbered = usual == 1.0 and unit is None and rises_evenly(times, decimals=decimals)
-    other_step = given is not None and given != 1.0
+    other_step = dt is not None and dt != 1.0
     if column.kind == "number" or (numbered and other_step):
         facts.notes.append("the first column counts the samples")
         return samples, stated, SAME_STEP
 
-    # Seconds or milliseconds? A time step that is given tells.
-    in_ms = given is not None and abs(1e-3 * usual - given) <= 1e-3 * given
+    # Seconds or milliseconds? A time step that is stated tells.
+    in_ms = dt is not None and abs(1e-3 * usual - dt) <= 1e-3 * dt
     if unit is None and rising and in_ms:
         unit = 1e-3
         facts.doubts.append("the times are taken to be milliseconds, as the time step says")
-    agrees = given is not None and abs(usual - given) <= 1e-3 * given
+    agrees = dt is not None and abs(usual - dt) <= 1e-3 * dt
     if unit is None and rising and usual >= LONGEST_TIME_STEP and not agrees:
-        but = "" if given is None else f", but not with a time step of {given:g} s"
+        but = "" if dt is None else f", but not with a time step of {dt:g} s"
         raise InputError(
             f"{text.at(lines[1])}: the first column counts up by {usual:g}, which may be seconds, "
             f"milliseconds or numbers of samples{but}; pass the time step that they mean as dt= in "
@@ -495,8 +495,8 @@ def _on_times(
     if uneven:
         samples = interpolate(seconds, samples, step)
         facts.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
-    elif given is not None and abs(step - given) <= rounding * given:
-        step = given if rounding > SAME_STEP else step
+    elif dt is not None and abs(step - dt) <= rounding * dt:
+        step = dt if rounding > SAME_STEP else step
     elif stated is not None:
         raise InputError(
             f"{text.at(facts.step[0] if facts.step else 0)}: the header states a time step of "

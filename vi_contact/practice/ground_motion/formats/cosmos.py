@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from ....core.errors import InputError
-from ..record import Record, known_units
+from ..record import Record, recognise_units
 from .statements import agree
 from .text import NUMBER, TextFile
 
@@ -214,11 +214,11 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     for index in range(block.line + 1, block.end):
         line = text.lines[index].rstrip() if index < len(text.lines) else ""
         fields = -(-len(line) // block.width)
-        wanted = min(block.per_line, block.count - len(values))
-        if fields != wanted:
+        expected = min(block.per_line, block.count - len(values))
+        if fields != expected:
             raise InputError(
                 f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
-                f"{index + 1} holds {fields} of them instead of {wanted:g}; get the complete file"
+                f"{index + 1} holds {fields} of them instead of {expected:g}; get the complete file"
             )
         row = text.cut_fields(index, block.width)
         if unknown in row:
@@ -272,8 +272,8 @@ def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int
     """Return the line and the units of a peak that the header states and the samples have."""
     for index, match in _search(text, block.header, _PEAK):
         peak = abs(text.number(index, match[1]))
-        largest = max(map(abs, samples))
-        if known_units(match[2]) is not None and abs(largest - peak) <= 1e-3 * peak:
+        largest = max(map(abs, samples), default=0.0)
+        if recognise_units(match[2]) is not None and abs(largest - peak) <= 1e-3 * peak:
             return index, match[2]
     return None
 

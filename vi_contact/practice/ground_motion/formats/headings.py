@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..record import known_units
+from ..record import recognise_units
 from .statements import TIME_UNITS
 from .text import TextFile
 
@@ -138,7 +138,7 @@ def _split_cell(cell: str) -> tuple[str, str | None]:
 
 def _kind_of_unit(unit: str) -> str:
     """Return the kind of motion that a unit measures, or "" where it is unknown."""
-    if known_units(unit) is not None:
+    if recognise_units(unit) is not None:
         return "acceleration"
     word = "".join(unit.lower().split()).replace("sec", "s")
     if word in TIME_UNITS or unit.strip().lower() in TIME_UNITS:

@@ -61,7 +61,7 @@ def read(text: TextFile) -> Record:
     frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
     counts, _ = text.series(header["Memo."] + 1)
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
-    if not abs(len(counts) - seconds * frequency) <= 0.5:
+    if not counts or not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(
             f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are "
             f"announced but {len(counts)} samples follow; get the complete file"

@@ -71,9 +71,9 @@ def time_step(
             f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, "
             f"others {usual:.9g} s; pass resample_dt= to interpolate, or correct the time"
         )
-    wanted = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
-    step = wanted / math.ceil(wanted / usual * (1.0 - SAME_STEP))
-    counted("read_record", f"resample_dt = {wanted!r} s", (times[-1] - times[0]) / step)
+    dt = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
+    step = dt / math.ceil(dt / usual * (1.0 - SAME_STEP))
+    counted("read_record", f"resample_dt = {dt!r} s", (times[-1] - times[0]) / step)
     return step, SAME_STEP, True
 
 
