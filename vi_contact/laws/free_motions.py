@@ -123,25 +123,26 @@ def _rigid_motions_of_bodies(system: Unheld, bodies: list[Indices]) -> Array:
     motions = amount * rigid_motions(system.influence, place)
 
     # Rotations and other unknowns that no translation moves follow without force.
-    other = ~system.influence.any(axis=1)
-    if largest(comm, other.any()):
-        factor_of_others = _factorise_others(system, other)
+    turning = ~system.influence.any(axis=1)
+    if largest(comm, turning.any()):
+        factor_of_rotations = _factorise_rotations(system, turning)
         for w in motions.T:
-            w[other] = -factor_of_others.solve((system.K @ w)[other])
+            w[turning] = -factor_of_rotations.solve((system.K @ w)[turning])
     return motions
 
 
-def _factorise_others(system: Unheld, other: Mask) -> Factor:
+def _factorise_rotations(system: Unheld, turning: Mask) -> Factor:
     """Return a factor of K for unknowns that are no displacements, also where nothing holds them.
 
-    What holds them is made a little stiffer; what nothing holds gets a stiffness of one.
+    ``turning`` (n,) marks these, which are rotations as a rule. What holds them is made a little
+    stiffer; what nothing holds gets a stiffness of one.
     """
     algebra = system.algebra
-    stiffness = np.abs(system.K.diagonal())[other]
+    stiffness = np.abs(system.K.diagonal())[turning]
     places = np.arange(len(stiffness))
     soft = np.where(stiffness > 0.0, SOFT * stiffness, 1.0)
     shift = algebra.local(places, places, soft, len(places))
-    return algebra.factor(algebra.combine([(1.0, algebra.block(system.K, other)), (1.0, shift)]))
+    return algebra.factor(algebra.combine([(1.0, algebra.block(system.K, turning)), (1.0, shift)]))
 
 
 def _find_kernel(form: Array, size: Array) -> Array:

@@ -113,11 +113,11 @@ def _update_by_iterations(
     """Return v after the impulse: M (v⁺ - v⁻) = 0 off the chosen unknowns. Collective."""
     chosen = ~np.isnan(target)
     unknowns = surface.owned[chosen]
-    held = np.zeros(len(v), dtype=bool)
-    held[unknowns] = True
+    prescribed = np.zeros(len(v), dtype=bool)
+    prescribed[unknowns] = True
     jump = np.zeros(len(v))
     jump[unknowns] = (target - surface.normal_values(v))[chosen]
-    return v + solve_free(system.algebra, system.M, np.zeros(len(v)), held, jump)
+    return v + solve_free(system.algebra, system.M, np.zeros(len(v)), prescribed, jump)
 
 
 def _update_condensed(

@@ -35,7 +35,13 @@ class ConsistentMass:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
-        """Return the system as it is; the arguments are those of ``core.protocols.MassLaw``."""
+        """Return the system as it is, for any arguments of ``core.protocols.MassLaw``.
+
+        Args:
+            system: the equations.
+            surface: the contact conditions.
+            tangential: whether tangential unknowns lose their mass too.
+        """
         return system
 
 
@@ -78,7 +84,13 @@ class Redistributed:
     ) -> SemiDiscreteSystem:
         """Return the system without mass at the contact unknowns.
 
-        The arguments are those of ``core.protocols.MassLaw``.
+        Args:
+            system: the equations.
+            surface: the contact conditions.
+            tangential: whether tangential unknowns lose their mass too.
+
+        Raises:
+            InputError: what the class lists.
         """
         if surface.total == 0:
             return system
