@@ -120,7 +120,7 @@ class ThrownBar(UprightBar):
         """Return the contact pressure p(t) [Pa] >= 0."""
         t = np.asarray(t, dtype=float)
         touches = (t > self.contact_start) & (t < self.contact_end)
-        return np.where(touches, self.pressure, 0.0)
+        return self.pressure * np.where(touches, 1.0, 0.0)
 
     def contacts(self, until: float) -> Array:
         """Return start and end of the contacts before `until` [s].
@@ -171,7 +171,7 @@ class PeriodicBar:
     def force(self, t: ArrayLike) -> Array:
         """Return the contact pressure p(t) [Pa]: 1/2 in the second third of a period, else 0."""
         phase = np.floor(np.mod(np.asarray(t, dtype=float), 3.0))
-        return np.where(phase == 1.0, 0.5, 0.0)
+        return 0.5 * np.where(phase == 1.0, 1.0, 0.0)
 
     def contacts(self, until: float) -> Array:
         """Return start and end of the contacts before `until` [s].
