@@ -223,21 +223,18 @@ def _body(
     columns_around = np.stack([column, column + 1, column + 1, column])
     rows_around = np.stack([row, row, row + 1, row + 1])
     around = (columns_around, rows_around)
-    used = np.zeros((len(xs), len(ys)), dtype=bool)
-    used[around] = True
-    number = np.where(used, np.cumsum(used).reshape(used.shape) - 1, -1)
-    place = np.argwhere(used)
+    has_point = np.zeros((len(xs), len(ys)), dtype=bool)
+    has_point[around] = True
+    number = np.where(has_point, np.cumsum(has_point).reshape(has_point.shape) - 1, -1)
+    place = np.argwhere(has_point)
     boxes = number[around].T
     if triangles:
         rising = [[0, 1, 2], [0, 2, 3]]
         falling = [[0, 1, 3], [1, 2, 3]]
         on_left = 0.5 * (xs[column] + xs[column + 1]) < middle
         boxes = np.where(on_left[:, None, None], boxes[:, rising], boxes[:, falling]).reshape(-1, 3)
-    return (
-        np.column_stack([xs[place[:, 0]], ys[place[:, 1]]]),
-        boxes.astype(np.int64),
-        number.astype(np.int64),
-    )
+    points = np.column_stack([xs[place[:, 0]], ys[place[:, 1]]])
+    return points, boxes.astype(np.int64), number.astype(np.int64)
 
 
 def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:

@@ -134,12 +134,12 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     model = gmsh.model
     kinds, _, _ = model.mesh.getElements()
     d = max((model.mesh.getElementProperties(kind)[1] for kind in kinds), default=0)
-    body = _named_entities(model, d)
-    sides = _named_entities(model, d - 1)
-    both = body.keys() & sides.keys()
-    if both:
+    body = _find_entities(model, d)
+    sides = _find_entities(model, d - 1)
+    common = body.keys() & sides.keys()
+    if common:
         raise InputError(
-            f"{source} calls both cells and facets '{min(both)}': give one of the groups another "
+            f"{source} calls both cells and facets '{min(common)}': give one of the groups another "
             "name"
         )
     named = sorted(set(chain.from_iterable(body.values())))
@@ -151,13 +151,13 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     tags, cells = np.unique(nodes, return_inverse=True)
     points = _flat(_coordinates(model, tags, source), d, source)
     cells = cells.reshape(nodes.shape).astype(np.int64)
-    kept, position = _drop_repeats(cells)
-    cells = cells[kept]
+    first_rows, position = _drop_repeats(cells)
+    cells = cells[first_rows]
     corners = cells[:, : vertex_count(cell)]
     check_cells(points, corners, cell, source)
     check_folds(points, corners, cell, source)
     if cells.shape[1] > corners.shape[1]:
-        folded = _find_folded(model, number, entity, d)[kept]
+        folded = _find_folded(model, number, entity, d)[first_rows]
         refuse_cells(folded, "a fold between its curved sides", points, cells, source)
 
     cell_groups = {} if body else {"all": np.ones(len(cells), dtype=bool)}
@@ -166,15 +166,15 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
         cell_groups[name][position[np.isin(entity, entities)]] = True
     facet_groups = {}
     for name, entities in sides.items():
-        what = f"boundary group '{name}' of {source}"
-        facets = _facets(model, entities, side, tags, points, what)
+        group = f"boundary group '{name}' of {source}"
+        facets = _facets(model, entities, side, tags, points, group)
         if len(facets):
             facet_groups[name] = facets
     check_sides(facet_groups, corners, cell, source)
     return MeshArrays(cell, points, cells, cell_groups, facet_groups)
 
 
-def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
+def _find_entities(model: Any, dim: int) -> dict[str, list[int]]:
     """Return the entities of each physical group of a dimension.
 
     A group without a name is called by its number.
@@ -290,9 +290,9 @@ def _flat(points: Array, d: int, source: str) -> Array:
 
 
 def _drop_repeats(rows: Rows) -> tuple[Rows, Rows]:
-    """Return which rows are kept, and the place of every row among these.
+    """Return the first of all rows with the same members, and the place of every row among these.
 
-    Of rows with the same members the first is kept.
+    Both are numbers of rows.
     """
     (number,) = number_alike(rows)
     _, first, place = np.unique(number, return_index=True, return_inverse=True)
@@ -303,7 +303,7 @@ def _drop_repeats(rows: Rows) -> tuple[Rows, Rows]:
 
 
 def _facets(
-    model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str
+    model: Any, entities: list[int], kind: int, tags: Rows, points: Array, group: str
 ) -> Rows:
     """Return the facets of a group as rows of points at their vertices, each once.
 
@@ -315,7 +315,7 @@ def _facets(
         kind: Gmsh's number of the sides of the cells.
         tags: of the nodes of the points, ascending.
         points: (n_points, d) [m].
-        what: name of the group in messages.
+        group: its name in messages.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is
     then meshed by itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands
@@ -327,7 +327,7 @@ def _facets(
         return np.empty((0, 1), dtype=np.int64)
     if list(elements) != [kind]:
         raise InputError(
-            f"{what} is not of the shapes of the cells' sides: mesh body and boundary together"
+            f"{group} is not of the shapes of the cells' sides: mesh body and boundary together"
         )
     all_nodes, _ = elements[kind]
     nodes = all_nodes[:, :vertices]
@@ -335,10 +335,10 @@ def _facets(
     rows = np.where(tags[place] == nodes, place, -1)
     unknown = rows < 0
     if unknown.any():
-        places = _coordinates(model, nodes[unknown], what)[:, : points.shape[1]]
+        places = _coordinates(model, nodes[unknown], group)[:, : points.shape[1]]
         rows[unknown] = _points_at(places, points)
-    kept, _ = _drop_repeats(rows)
-    return rows[kept]
+    first_rows, _ = _drop_repeats(rows)
+    return rows[first_rows]
 
 
 def _points_at(places: Array, points: Array) -> Rows:
@@ -383,7 +383,10 @@ def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
     numbers = number_alike(*groups.values())
     unique, first = np.unique(np.concatenate(numbers), return_index=True)
     rows = np.concatenate(list(groups.values()))[first]
-    return rows, {name: np.isin(unique, own) for name, own in zip(groups, numbers, strict=True)}
+    masks = {}
+    for name, numbers_of_group in zip(groups, numbers, strict=True):
+        masks[name] = np.isin(unique, numbers_of_group)
+    return rows, masks
 
 
 def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Mask]) -> None:
@@ -404,8 +407,8 @@ def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Ma
     entities = []
     for number in range(len(signatures)):
         entities.append(gmsh.model.addDiscreteEntity(dim))
-        own = rows[place.reshape(-1) == number]
-        gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + own.reshape(-1))
+        elements = rows[place.reshape(-1) == number]
+        gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + elements.reshape(-1))
     for column, name in enumerate(groups):
         members = np.array(entities)[signatures[:, column]].tolist()
         if members:

@@ -163,6 +163,6 @@ def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
         corners = np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])
         walk = [tuple(corner) for corner in corners.tolist()]
         if d and np.linalg.det(steps) < 0.0:
-            walk[-1], walk[-2] = walk[-2], walk[-1]
+            walk[-1], walk[-2] = walk[-2], walk[-1]  # a left-handed one
         simplices.append(walk)
     return simplices

@@ -14,7 +14,7 @@ from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.files import frames_of
 from ...core.step import AXES
-from ...meshes.rows import connected
+from ...meshes.rows import number_parts
 from ...run.files.reading import RunFolder
 from ...run.recorders.contact_parts import Geometry, tangent_vectors
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
@@ -60,7 +60,7 @@ def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
     alike = np.einsum("mki,mi->mk", normals[near], normals) > np.cos(FEATURE_ANGLE)
     rows = np.repeat(np.arange(m), alike.sum(axis=1))
-    piece = connected(m, rows, near[alike])
+    piece = number_parts(m, rows, near[alike])
     planes: dict[Any, list[Indices]] = {}
     for own in (np.flatnonzero(piece == number) for number in range(piece.max() + 1)):
         normal = normals[own[0]]
