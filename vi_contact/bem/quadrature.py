@@ -29,7 +29,7 @@ from ..core.algebra import Array, Indices
 from ..core.arguments import check_fields
 from ..core.quantities import Between
 from .element_pairs import ElementPairs
-from .rules import Rule, gauss, graded_rule, pieces, place_rule, roots, smoothed_rule
+from .rules import Rule, gauss, grade_rule, pieces, place_rule, roots, smooth_rule
 
 MOST_POINTS = 200  # Gauss points a rule may have
 CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
@@ -154,13 +154,13 @@ def point_sets(
     fine = pairs.near | just_passed
     yield from _product_points(pairs, np.flatnonzero(smooth & ~fine), orders.far)
     yield from _product_points(pairs, np.flatnonzero(smooth & fine), orders.near)
-    outer = smoothed_rule(orders.outer)
-    inner = smoothed_rule(orders.inner)
+    outer = smooth_rule(orders.outer)
+    inner = smooth_rule(orders.inner)
     yield from _split_points(pairs, np.flatnonzero(apart & crossed), fronts, outer, inner)
 
     # Elements that face each other: split about the feet as well, whether a front crosses or not.
     facing = reached & pairs.close & ~pairs.corner
-    rule = smoothed_rule(orders.close)
+    rule = smooth_rule(orders.close)
     yield from _split_points(pairs, np.flatnonzero(facing), fronts, rule, rule, close=True)
 
     # Elements that touch.
@@ -333,8 +333,8 @@ def _points_of_one_element(
     The integral over z is split at the fronts. Across, at one z, shape functions are quadratic and
     the kernel is constant: two points are exact.
     """
-    row, low, length = _reached_pieces(np.hypot(*pairs.a[:, chosen]), fronts)
-    x, w = graded_rule(order)
+    row, low, length = _cut_reached_pieces(np.hypot(*pairs.a[:, chosen]), fronts)
+    x, w = grade_rule(order)
     across, across_weight = gauss(2)
     z = (low[:, None] + length[:, None] * x)[:, :, None]
     small = (1.0 - z) * across
@@ -353,7 +353,7 @@ def _points_of_one_element(
     )
 
 
-def _reached_pieces(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
+def _cut_reached_pieces(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
     """Return the pieces of [0, 1], as ``pieces`` does, that the last front has reached.
 
     Here r is the place in [0, 1] times a distance (p,) [m].
@@ -444,15 +444,15 @@ def _half_of_corner(
     cuts.append(foot[:, None] if sharp else np.empty((len(foot), 0)))
     row, low, length = pieces(np.concatenate(cuts, axis=1))
     about = (foot[row], (height / c2)[row]) if sharp else None
-    w, w_weight = place_rule(low, length, smoothed_rule(order), about=about)
+    w, w_weight = place_rule(low, length, smooth_rule(order), about=about)
     owner = np.repeat(row, order)
     w = w.ravel()
     w_weight = w_weight.ravel()
 
     # Inner integral over u, cut at fronts / R(w); u is the Jacobian of Duffy's coordinates.
     distance = np.sqrt(c0[owner] - 2.0 * w * ab[owner] + w**2 * c2[owner])
-    row, low, length = _reached_pieces(distance, fronts)
-    u, u_weight = place_rule(low, length, graded_rule(order), w_weight[row])
+    row, low, length = _cut_reached_pieces(distance, fronts)
+    u, u_weight = place_rule(low, length, grade_rule(order), w_weight[row])
     return _HalfOfCorner(
         owner=np.repeat(owner[row], order),
         long=u.ravel(),

@@ -51,15 +51,15 @@ def tail(
     flat = (table / np.abs(table).max((0, 2))[:, None]).reshape(len(table), -1)
     r, order = qr(flat.T, mode="r", pivoting=True, check_finite=False)
     rank = int(np.count_nonzero(np.abs(np.diag(r)) > SHARE * np.abs(r[0, 0])))
-    others = solve_triangular(r[:rank, :rank], r[:rank, rank:]).T
-    weights = np.concatenate([np.eye(rank), others])[np.argsort(order)]
+    weights_of_others = solve_triangular(r[:rank, :rank], r[:rank, rank:]).T
+    weights = np.concatenate([np.eye(rank), weights_of_others])[np.argsort(order)]
     weights += (1.0 - weights.sum(1))[:, None] / rank
-    kept = order[:rank]
+    chosen = order[:rank]
 
     # What is lost is measured at other places than the samples.
     check = _radial_functions(reach * _places(3 * SAMPLES + 1), start, steps, dt, speeds)
-    lost = np.abs(check - np.tensordot(weights, check[kept], 1)).max((0, 2))
-    return start + kept, weights, _bounds(lost, speeds[1] ** 2, h)
+    lost = np.abs(check - np.tensordot(weights, check[chosen], 1)).max((0, 2))
+    return start + chosen, weights, _bounds(lost, speeds[1] ** 2, h)
 
 
 def _places(count: int) -> Array:
