@@ -18,6 +18,7 @@ motion. The bracket is the reaction along a^R [N], of either sign.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -102,6 +103,35 @@ def bilateral_motion(
     # The unknowns y are q, v, lambda and the momenta m̄ λ̇.
     n = len(q)
     parts = [n, 2 * n, 2 * n + k]
+    y0 = np.concatenate([q, v, np.zeros(2 * k)])
+    solution = _integrate(systems, y0, times, parts, rtol)
+
+    # Constraints and reactions at the times that were asked for.
+    places, speeds, multipliers, momenta = np.split(solution.y.T, parts, axis=1)
+    phi = np.empty((len(places), k))
+    for row, place in enumerate(places):
+        for R, system in enumerate(systems):
+            phi[row, R] = system.rho(place)
+    states = zip(solution.t, places, speeds, multipliers, momenta, strict=True)
+    reaction = np.array([_solve(systems, *state)[1] for state in states])
+    return BilateralMotion(solution.t, places, speeds, phi, multipliers, reaction)
+
+
+def _integrate(
+    systems: Sequence[ConstrainedSystem], y0: Array, times: Array, parts: list[int], rtol: float
+) -> Any:
+    """Return what ``solve_ivp`` makes of the unknowns y, with their values at the times.
+
+    Args:
+        systems: one for each constraint.
+        y0: the unknowns at the start.
+        times: (m,) [s].
+        parts: where y is cut into q, v, lambda and momenta.
+        rtol: relative tolerance.
+
+    Raises:
+        StepFailure: accelerations that are not finite at the start, or the integrator stops.
+    """
     evaluations = Evaluations()
 
     def rates(t: float, y: Array) -> Array:
@@ -113,7 +143,6 @@ def bilateral_motion(
         )
         return np.concatenate([speed, acceleration, multiplier_rate, force])
 
-    y0 = np.concatenate([q, v, np.zeros(2 * k)])
     atol = rtol * max(float(np.max(np.abs(y0))), 1e-300)
     with one_sentence():
         if not np.all(np.isfinite(rates(float(times[0]), y0))):
@@ -129,16 +158,7 @@ def bilateral_motion(
             f"the motion could not be integrated beyond t = {evaluations.t:.6g} s: "
             f"{solution.message}"
         )
-
-    # Constraints and reactions at the times that were asked for.
-    places, speeds, multipliers, momenta = np.split(solution.y.T, parts, axis=1)
-    phi = np.empty((len(places), k))
-    for row, place in enumerate(places):
-        for R, system in enumerate(systems):
-            phi[row, R] = system.rho(place)
-    states = zip(solution.t, places, speeds, multipliers, momenta, strict=True)
-    reaction = np.array([_solve(systems, *state)[1] for state in states])
-    return BilateralMotion(solution.t, places, speeds, phi, multipliers, reaction)
+    return solution
 
 
 def _solve(
