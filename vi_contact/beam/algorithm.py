@@ -207,10 +207,10 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     w0 = np.concatenate([start.at("omega", x), start.at("v", x)])
     rows = list[tuple[float, ...]]()
     snapshots = list[Snapshot]()
-    for k, (row, y, w) in enumerate(islice(_states(stepper, y0, w0), steps + 1)):
+    for k, (row, y, w) in enumerate(islice(_march(stepper, y0, w0), steps + 1)):
         rows.append(row)
         if every and k % every == 0:
-            snapshots.append(Snapshot(row[0], _values_of_all_nodes(y, w)))
+            snapshots.append(Snapshot(row[0], _gather_values(y, w)))
     history = dict(zip(COLUMNS, np.array(rows, dtype=float).T, strict=True))
 
     # Works and losses since the start, and what their balance leaves over.
@@ -222,14 +222,14 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     return BeamRun(np.insert(x, 0, 0.0), history, tuple(snapshots))
 
 
-def _values_of_all_nodes(y: Array, w: Array) -> Array:
+def _gather_values(y: Array, w: Array) -> Array:
     """Return theta, omega, u, v (4, m + 1) of y = (theta, u) and w = (omega, v), (2 m,) each."""
     values = np.zeros((4, len(y) // 2 + 1))
     values[:, 1:] = np.stack([y.reshape(2, -1), w.reshape(2, -1)], axis=1).reshape(4, -1)
     return values
 
 
-def _states(
+def _march(
     stepper: BeamStepper, y: Array, w: Array
 ) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
     """Yield (values by COLUMNS, y, w) at the start and after every step.

@@ -202,7 +202,7 @@ def compress_blocks(
     counted("boundary elements", f"a circle of {steps} steps", steps, "steps", most=LONGEST)
     reach = AHEAD * steps
     n = len(mesh)
-    above, spans = _windows(mesh, pairs, speeds, dt, reach)
+    above, spans = _find_windows(mesh, pairs, speeds, dt, reach)
     windows, group = np.unique(spans, axis=1, return_inverse=True)
     group = np.ravel(group)
     h = float(mesh.lengths.max())
@@ -220,7 +220,7 @@ def compress_blocks(
     for number, (begin, end) in enumerate(windows.T):
         a, b = above[:, group == number]
         kept_tail, weights, errors = tails[int(end)]
-        places = _places_of(matrices, a, b)
+        places = _find_places(matrices, a, b)
         steps_of_window = np.append(np.arange(begin, end), kept_tail)
         values = np.empty((len(steps_of_window), len(places)))
         stretches.append(Stretch(int(begin), int(end), kept_tail, weights, errors, places, values))
@@ -246,11 +246,11 @@ def compress_blocks(
         for part in stretches:
             part.record(j, numbers)
     order = np.concatenate([part.places for part in stretches])
-    places = _places_among(matrices, order)
+    places = _locate_entries(matrices, order)
     return CompressedBlocks(mesh, *speeds, dt, steps, reach, tuple(stretches), places)
 
 
-def _windows(
+def _find_windows(
     mesh: BoundaryMesh,
     pairs: ElementPairs,
     speeds: tuple[float, float],
@@ -260,6 +260,13 @@ def _windows(
     """Return the pairs of nodes a <= b (2, p), and the steps (2, p) where their windows are.
 
     A window begins before the first wave arrives, and ends when its points of quadrature rest.
+
+    Args:
+        mesh: the boundary, of n elements.
+        pairs: its pairs of elements.
+        speeds: (c_P, c_S) [m/s].
+        dt: time step [s].
+        reach: number of steps that are kept.
     """
     n = len(mesh)
     h = float(mesh.lengths.max())
@@ -288,7 +295,7 @@ def _number_entries(n: int) -> tuple[Indices, Indices, Indices]:
     return single.reshape(4 * n, 4 * n), double.reshape(4 * n, 2 * n), hyper.reshape(2 * n, 2 * n)
 
 
-def _places_of(matrices: tuple[Indices, Indices, Indices], a: Indices, b: Indices) -> Indices:
+def _find_places(matrices: tuple[Indices, Indices, Indices], a: Indices, b: Indices) -> Indices:
     """Return the places of the entries of pairs of nodes, half of those of symmetric matrices.
 
     Args:
@@ -305,7 +312,7 @@ def _places_of(matrices: tuple[Indices, Indices, Indices], a: Indices, b: Indice
     return np.concatenate([part.ravel() for part in parts])
 
 
-def _places_among(matrices: tuple[Indices, Indices, Indices], order: Indices) -> Indices:
+def _locate_entries(matrices: tuple[Indices, Indices, Indices], order: Indices) -> Indices:
     """Return where every entry of the matrices of a step stands among the kept numbers.
 
     ``order`` has the places of the kept numbers. Of two mirrored entries one is kept, and both get

@@ -266,7 +266,7 @@ def march_blocks(
         v0_early = cho_solve(v0, 0.5 * mass @ before - past)
         known = tested @ v0_early
         if symmetric and k:
-            known = known + _adjoint(blocks, p[:k], u[:k])
+            known = known + _sum_adjoint(blocks, p[:k], u[:k])
 
         # Solve for the free increments; then tractions, and reactions of the fixed unknowns.
         if prescribed is not None:
@@ -280,7 +280,7 @@ def march_blocks(
     return np.cumsum(u, axis=0, out=u), p, total
 
 
-def _adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
+def _sum_adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
     """Return the sum of K' p - D u over the k earlier steps of the symmetric form.
 
     K'^j = (K^j - K^(j-1))ᵀ: its sum with p is that of K^jᵀ with the jumps of p, but for the last

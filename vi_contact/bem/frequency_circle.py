@@ -94,7 +94,9 @@ def solve_on_circle(
     lost = max(_estimate_wrapped_share(values, radius) for values in histories[:2])
     if not lost <= SHARE:
         raise StepFailure(
-            _refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric)
+            _write_refusal(
+                f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric
+            )
         )
     compliance, motions, tractions, total = ((values[:steps].T / scale).T for values in histories)
     motions[:, fixed] = prescribed_columns[:, fixed]
@@ -145,7 +147,7 @@ def _solve_frequencies(
         powers = circle[start : start + BATCH, None] ** np.arange(blocks.reach)
         for i, (single, double, hyper) in enumerate(blocks.combine(powers), start):
             z = circle[i]
-            traction, stiffness = _operator(single, double, hyper, mass, z, symmetric)
+            traction, stiffness = _form_operators(single, double, hyper, mass, z, symmetric)
 
             # Free increments after the loads and after unit forces; those of fixed unknowns are
             # known.
@@ -171,6 +173,12 @@ def _gather_columns(
 
     The first column is the right-hand side. The second one, where there is a unit force to check,
     is this force in step 0.
+
+    Args:
+        forces: (steps, 2n), nodal forces over rho of the right-hand side.
+        fixed: (2n,), which unknowns are prescribed.
+        prescribed: (steps, 2n), displacements of the fixed unknowns [m]; None for zero.
+        one_unit: number of the unknown of the unit force, or none.
     """
     pulls = np.zeros((*forces.shape, 1 + len(one_unit)))
     pulls[..., 0] = forces
@@ -181,7 +189,7 @@ def _gather_columns(
     return pulls, displacements
 
 
-def _operator(
+def _form_operators(
     single: NDArray, double: NDArray, hyper: NDArray, mass: Array, z: complex, symmetric: bool
 ) -> tuple[NDArray, NDArray]:
     """Return the operators of one frequency, from increments of displacement.
@@ -209,6 +217,13 @@ def _check_motion(
     """Raise StepFailure unless a motion satisfies the equations of the march.
 
     It is checked in the middle and at the end.
+
+    Args:
+        blocks: those of the body.
+        u: (steps, 2n), displacements.
+        p: (steps, 4n), tractions over rho.
+        forces: (steps, 2n), nodal forces over rho.
+        symmetric: which form was solved.
     """
     steps = len(u)
     mass = 0.5 * blocks.mesh.mass
@@ -224,7 +239,7 @@ def _check_motion(
         lost = max(first_equation, second_equation)
         if not lost <= SHARE:
             fault = f"misses the equations of step {k + 1} of {steps} by a share of {lost:.1e}"
-            raise StepFailure(_refusal(fault, symmetric))
+            raise StepFailure(_write_refusal(fault, symmetric))
 
 
 def _estimate_wrapped_share(values: Array, radius: float) -> float:
@@ -240,7 +255,7 @@ def _estimate_wrapped_share(values: Array, radius: float) -> float:
     return float(radius**points * (far / near) ** 2) if near else 0.0
 
 
-def _refusal(fault: str, symmetric: bool) -> str:
+def _write_refusal(fault: str, symmetric: bool) -> str:
     """Return the sentence that names the fault and the remedies."""
     other_form = "" if symmetric else " or the symmetric form"
     return (

@@ -110,7 +110,14 @@ class ImpulseUpdate:
 def _update_by_iterations(
     system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
 ) -> Array:
-    """Return v after the impulse: M (v⁺ - v⁻) = 0 off the chosen unknowns. Collective."""
+    """Return v after the impulse: M (v⁺ - v⁻) = 0 off the chosen unknowns. Collective.
+
+    Args:
+        system: the equations that are marched.
+        surface: the contact conditions.
+        v: velocity (n,) [m/s] that the step left.
+        target: wanted normal velocities (m,) [m/s], NaN where they stay as they are.
+    """
     chosen = ~np.isnan(target)
     unknowns = surface.owned[chosen]
     prescribed = np.zeros(len(v), dtype=bool)
@@ -123,7 +130,14 @@ def _update_by_iterations(
 def _update_condensed(
     system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
 ) -> Array:
-    """Return v after the impulse, which is solved for on every rank. Collective."""
+    """Return v after the impulse, which is solved for on every rank. Collective.
+
+    Args:
+        system: the equations that are marched.
+        surface: the contact conditions.
+        v: velocity (n,) [m/s] that the step left.
+        target: wanted normal velocities (m,) [m/s], NaN where they stay as they are.
+    """
     jump = surface.everywhere(target - surface.normal_values(v))
     chosen: Indices = np.flatnonzero(~np.isnan(jump))
     if len(chosen) == 0:

@@ -160,8 +160,8 @@ def channel_grid(
     notch = (x[1] < right) & (right < x[4]) & (up > y[1])
     inside = (x[2] < right) & (right < x[3]) & (up > y[2])
     middle = 0.5 * (x[1] + x[4])
-    points, cells, corner = _body(xs, ys, notch & ~inside, middle, triangles)
-    soil_points, soil_cells, soil_corner = _body(xs, ys, ~notch, middle, triangles)
+    points, cells, corner = _mesh_body(xs, ys, notch & ~inside, middle, triangles)
+    soil_points, soil_cells, soil_corner = _mesh_body(xs, ys, ~notch, middle, triangles)
 
     # Boundary groups, as lines (x, y) of the grid.
     interface = {"left": [(x[1:2], y[1:])], "base": [(x[1:5], y[1:2])], "right": [(x[4:5], y[1:])]}
@@ -179,7 +179,7 @@ def channel_grid(
     facets = {}
     for number, table in ((corner, channel_lines), (soil_corner, soil_lines)):
         for name, lines in table.items():
-            on_lines = [_along(xs, ys, number, *line) for line in lines]
+            on_lines = [_collect_facets(xs, ys, number, *line) for line in lines]
             facets[name] = np.concatenate(on_lines)
 
     # Both bodies in one mesh, the channel first.
@@ -203,7 +203,7 @@ def _divide(places: Sequence[float], size: float) -> Array:
     return np.append(np.concatenate(parts), places[-1])
 
 
-def _body(
+def _mesh_body(
     xs: Array, ys: Array, chosen: Mask, middle: float, triangles: bool
 ) -> tuple[Array, Rows, Rows]:
     """Mesh the chosen boxes of a grid.
@@ -237,7 +237,9 @@ def _body(
     return points, boxes.astype(np.int64), number.astype(np.int64)
 
 
-def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
+def _collect_facets(
+    xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]
+) -> Rows:
     """Return the facets of a body on a straight line of the grid.
 
     Args:

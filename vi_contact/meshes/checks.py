@@ -55,7 +55,7 @@ def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
     (number,) = number_alike(sides)
     x = points[sides[:, : points.shape[1]]]
     centres = points[cells].mean(axis=1)
-    height = ((centres[owner] - x[:, 0]) * _normals(x)).sum(axis=1)
+    height = ((centres[owner] - x[:, 0]) * _compute_normals(x)).sum(axis=1)
 
     # Of two cells on either side of a facet the signs add up to zero.
     count = np.bincount(number)
@@ -87,7 +87,7 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
             )
 
 
-def _normals(x: Array) -> Array:
+def _compute_normals(x: Array) -> Array:
     """Return the normals (n, d) of facets through their first d vertices (n, d, d).
 
     They have any length and direction.

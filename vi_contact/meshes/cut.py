@@ -101,9 +101,9 @@ def cut_open(
             "CutOpen: give group=, the name of an inner boundary, or between=, two groups of cells"
         )
     if between is not None:
-        arrays, group, inside = _joint(arrays, between, inside, towards)
+        arrays, group, inside = _make_joint(arrays, between, inside, towards)
     assert group is not None
-    facets = _group(arrays, group)
+    facets = _get_facets(arrays, group)
     _refuse_unclear_sides(arrays, group, inside, towards)
 
     # Sides of cells, with equal numbers for the same facet; every inner facet has two of them.
@@ -118,7 +118,7 @@ def cut_open(
             f"boundary group '{group}' has facets without cells on both sides: cut inner "
             "boundaries only"
         )
-    is_first = _on_first_side(
+    is_first = _tell_first_side(
         arrays, group, owner[first_twin[cut]], owner[second_twin[cut]], inside, towards
     )
     cells, points = _double_nodes(
@@ -203,8 +203,8 @@ def weld(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     """
     from scipy.spatial import cKDTree  # late: it takes a while
 
-    staying = np.unique(_group(arrays, first))
-    replaced = np.unique(_group(arrays, second))
+    staying = np.unique(_get_facets(arrays, first))
+    replaced = np.unique(_get_facets(arrays, second))
     size = float(np.ptp(arrays.points, axis=0).max())
     tree = cKDTree(arrays.points[staying])
     distance, nearest = tree.query(arrays.points[replaced])
@@ -230,7 +230,7 @@ def weld(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     return replace(arrays, points=points, cells=number[arrays.cells], facet_groups=groups)
 
 
-def _group(arrays: MeshArrays, name: str) -> Rows:
+def _get_facets(arrays: MeshArrays, name: str) -> Rows:
     """Return the facets of a boundary group, or raise InputError if there is none."""
     if arrays.cells.shape[1] > vertex_count(arrays.cell):
         raise InputError(
@@ -245,10 +245,16 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
     return arrays.facet_groups[name]
 
 
-def _joint(
+def _make_joint(
     arrays: MeshArrays, between: Sequence[str], inside: str | None, towards: Sequence[float] | None
 ) -> tuple[MeshArrays, str, str]:
     """Make a boundary group of all facets between two cell groups.
+
+    Args:
+        arrays: the mesh.
+        between: names of the two groups of cells, side 1 first.
+        inside: has to be None.
+        towards: has to be None.
 
     Returns:
         The mesh with this group, the name of the group, the cell group on side 1.
@@ -295,7 +301,7 @@ def _joint(
     return replace(arrays, facet_groups=groups), joint, names[0]
 
 
-def _on_first_side(
+def _tell_first_side(
     arrays: MeshArrays,
     group: str,
     first_cell: Rows,

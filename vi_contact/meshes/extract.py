@@ -78,13 +78,13 @@ def arrays_from_script(mesh: MeshScript) -> MeshArrays:
     source = type(mesh).__name__
     grids: Sequence[Grid] = getattr(mesh, "grids", list)()
     if grids:
-        return _of_grids(grids, source)
+        return _join_grids(grids, source)
     with session() as gmsh:
         mesh.build(gmsh)
         return extract(gmsh, source)
 
 
-def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
+def _join_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     """Return the arrays that `extract` would find in a model of these grids."""
     points_of_grids = []
     cells_of_grids = []
@@ -143,13 +143,13 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
             "name"
         )
     named = sorted(set(chain.from_iterable(body.values())))
-    elements = _elements(model, d, named or [entity for _, entity in model.getEntities(d)])
+    elements = _collect_elements(model, d, named or [entity for _, entity in model.getEntities(d)])
 
     # Points in the order of their tags, and cells as rows of them, each once.
-    cell, number, side = _kind(model, elements, d, source)
+    cell, number, side = _find_kind(model, elements, d, source)
     nodes, entity = elements[number]
     tags, cells = np.unique(nodes, return_inverse=True)
-    points = _flat(_coordinates(model, tags, source), d, source)
+    points = _drop_coordinates(_find_coordinates(model, tags, source), d, source)
     cells = cells.reshape(nodes.shape).astype(np.int64)
     first_rows, position = _drop_repeats(cells)
     cells = cells[first_rows]
@@ -167,7 +167,7 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     facet_groups = {}
     for name, entities in sides.items():
         group = f"boundary group '{name}' of {source}"
-        facets = _facets(model, entities, side, tags, points, group)
+        facets = _collect_facets(model, entities, side, tags, points, group)
         if len(facets):
             facet_groups[name] = facets
     check_sides(facet_groups, corners, cell, source)
@@ -189,7 +189,7 @@ def _find_entities(model: Any, dim: int) -> dict[str, list[int]]:
     return groups
 
 
-def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
+def _collect_elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     """Return the elements of the entities."""
     nodes_of_kind: dict[int, list[Rows]] = {}
     entities_of_kind: dict[int, list[int]] = {}
@@ -206,8 +206,15 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     return elements
 
 
-def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
-    """Return the one type of cell there is: UFL's name, Gmsh's number, that of its sides."""
+def _find_kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
+    """Return the one type of cell there is: UFL's name, Gmsh's number, that of its sides.
+
+    Args:
+        model: Gmsh's current model.
+        elements: by Gmsh's number of their kind.
+        dim: dimension of the cells.
+        source: name of the mesh in messages.
+    """
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     known = {}
@@ -259,7 +266,7 @@ def _find_folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
     return np.concatenate(folded)
 
 
-def _coordinates(model: Any, tags: Rows, source: str) -> Array:
+def _find_coordinates(model: Any, tags: Rows, source: str) -> Array:
     """Return the coordinates (n, 3) of the nodes with the given tags.
 
     The tags may start anywhere and have holes.
@@ -276,7 +283,7 @@ def _coordinates(model: Any, tags: Rows, source: str) -> Array:
     return points
 
 
-def _flat(points: Array, d: int, source: str) -> Array:
+def _drop_coordinates(points: Array, d: int, source: str) -> Array:
     """Return the first d coordinates; the others must be zero."""
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
@@ -302,7 +309,7 @@ def _drop_repeats(rows: Rows) -> tuple[Rows, Rows]:
     return first[order], rank[place]
 
 
-def _facets(
+def _collect_facets(
     model: Any, entities: list[int], kind: int, tags: Rows, points: Array, group: str
 ) -> Rows:
     """Return the facets of a group as rows of points at their vertices, each once.
@@ -322,7 +329,7 @@ def _facets(
     for the one point at its place.
     """
     _, dimension, _, _, _, vertices, *_ = model.mesh.getElementProperties(kind)
-    elements = _elements(model, dimension, entities)
+    elements = _collect_elements(model, dimension, entities)
     if not elements:
         return np.empty((0, 1), dtype=np.int64)
     if list(elements) != [kind]:
@@ -335,13 +342,13 @@ def _facets(
     rows = np.where(tags[place] == nodes, place, -1)
     unknown = rows < 0
     if unknown.any():
-        places = _coordinates(model, nodes[unknown], group)[:, : points.shape[1]]
-        rows[unknown] = _points_at(places, points)
+        places = _find_coordinates(model, nodes[unknown], group)[:, : points.shape[1]]
+        rows[unknown] = _find_points(places, points)
     first_rows, _ = _drop_repeats(rows)
     return rows[first_rows]
 
 
-def _points_at(places: Array, points: Array) -> Rows:
+def _find_points(places: Array, points: Array) -> Rows:
     """Return the one point at each place.
 
     It is -1 where there is none, or more than one, as where two bodies touch.
@@ -373,10 +380,10 @@ def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
     home = gmsh.model.addDiscreteEntity(d)  # holds the nodes
     gmsh.model.mesh.addNodes(d, home, 1 + np.arange(len(points)), points.reshape(-1))
     _add_groups(gmsh, d, cell, arrays.cells, arrays.cell_groups)
-    _add_groups(gmsh, d - 1, side, *_members(arrays.facet_groups))
+    _add_groups(gmsh, d - 1, side, *_join_groups(arrays.facet_groups))
 
 
-def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
+def _join_groups(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
     """Return the rows of all groups, each once, and which of them are in each group."""
     if not groups:
         return np.zeros((0, 1), dtype=np.int64), {}

@@ -150,7 +150,7 @@ def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, st
     place = 0
     while place < len(tokens):
         token = tokens[place]
-        end = _end_of_unseen(tokens, place) if _can_begin(before) else place
+        end = _find_end_of_unseen(tokens, place) if _can_begin(before) else place
         if end == place:
             remaining.append(token)
             if token.kind != "blank":
@@ -160,7 +160,7 @@ def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, st
         # Line ends stay, so that what Gmsh says of a line is true of the user's script.
         statement = tokens[place:end]
         remaining += [token for token in statement if token.kind == "blank"]
-        left_out.append((token.line, _beginning(statement)))
+        left_out.append((token.line, _name_statement(statement)))
         place = end
     return remaining, left_out
 
@@ -170,7 +170,7 @@ def _can_begin(before: str) -> bool:
     return before in ("", ";", "}", ")", "EndIf", "EndFor", "Else")
 
 
-def _beginning(statement: Sequence[Token]) -> str:
+def _name_statement(statement: Sequence[Token]) -> str:
     """Return the words by which a user knows a statement that was left out."""
     words = [token.word for token in statement if token.kind != "blank"]
     if words[1:2] == ["."]:
@@ -178,7 +178,7 @@ def _beginning(statement: Sequence[Token]) -> str:
     return " ".join(words[:2]) if words[0] in ("Mesh", "Recursive") else words[0]
 
 
-def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
+def _find_end_of_unseen(tokens: Sequence[Token], start: int) -> int:
     """Return the place after the statement at ``start`` if it changes no mesh, else ``start``."""
     ahead = [token.word for token in tokens[start : start + 12] if token.kind != "blank"]
     first, second, third = [*ahead, "", "", ""][:3]
@@ -195,10 +195,10 @@ def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
     )
     if not unseen:
         return start
-    return _end_of_statement(tokens, start, braces=first in _UNSEEN_BRACES)
+    return _find_end(tokens, start, braces=first in _UNSEEN_BRACES)
 
 
-def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
+def _find_end(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
     """Return the place after the statement that begins at ``start``.
 
     Args:
@@ -217,13 +217,13 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
             return start  # what is no word of a script is refused, wherever it stands
         if token.kind != "sign":
             continue
-        level += _level_change(token.word)
+        level += _change_level(token.word)
         if level < 0:
             return start
         if level == 0 and token.word == ";":
             return place + 1
         if level == 0 and braces and token.word == "}":
-            after = _next_word(tokens, place + 1)
+            after = _find_next_word(tokens, place + 1)
             following = tokens[after].word if after < len(tokens) else ""
             if following == ";":
                 return after + 1
@@ -232,14 +232,14 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
     return start
 
 
-def _level_change(word: str) -> int:
+def _change_level(word: str) -> int:
     """Return how a sign changes the number of open brackets: 1, -1 or 0."""
     if word in ("(", "[", "{"):
         return 1
     return -1 if word in (")", "]", "}") else 0
 
 
-def _next_word(tokens: Sequence[Token], place: int) -> int:
+def _find_next_word(tokens: Sequence[Token], place: int) -> int:
     """Return the first place, from ``place`` on, of a token that is no blank."""
     while place < len(tokens) and tokens[place].kind == "blank":
         place += 1
@@ -263,10 +263,10 @@ def _drop_parameters(tokens: Sequence[Token]) -> list[Token]:
             inside = True
             level = 0
         if inside:
-            level += _level_change(token.word)
+            level += _change_level(token.word)
             inside = level > 0
         if inside and before == "=" and token.word == "{":
-            value, after = _value_and_end(tokens, place)
+            value, after = _find_value_and_end(tokens, place)
             if value is not None:
                 remaining += value
                 before = "}"
@@ -280,7 +280,7 @@ def _drop_parameters(tokens: Sequence[Token]) -> list[Token]:
     return remaining
 
 
-def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | None, int]:
+def _find_value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | None, int]:
     """Return the tokens of the value in {value, parameters}, and the place after the closing brace.
 
     Line ends among the parameters stay. Braces without parameters hold a list of numbers: for them
@@ -294,7 +294,7 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
         token = tokens[place]
         if token.kind == "blank":
             continue
-        level += _level_change(token.word)
+        level += _change_level(token.word)
         if level == 0:
             if not named:
                 return None, start
@@ -344,11 +344,11 @@ def _write(path: Path, tokens: Sequence[Token], own_names: set[str]) -> Iterator
         is_own = word in own_names and words[-1] != "."
         yield f" {PREFIX}{word}" if is_own else f" {word}"
         words.append(word)
-        level = 0 if word == "For" else level + _level_change(word)
+        level = 0 if word == "For" else level + _change_level(word)
         ends = word == "EndFor" or (begins and level == 0 and word in (")", "]", "}"))
         begins = (begins or word == "For") and not ends
     if refused:
-        raise InputError(f"{path}: {_sentence(refused)}")
+        raise InputError(f"{path}: {_write_sentence(refused)}")
 
 
 def _fits(kind: str, word: str, words: Sequence[str], own_names: set[str]) -> bool:
@@ -381,7 +381,7 @@ def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool
     """
     before = words[-1]
     is_field = list(words[-2:]) == ["]", "="] and "Field" in words[-6:]
-    next_place = _next_word(tokens, place + 1)
+    next_place = _find_next_word(tokens, place + 1)
     after = tokens[next_place].word if next_place < len(tokens) else ""
     return (
         tokens[place].kind == "name"
@@ -392,7 +392,7 @@ def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool
     )
 
 
-def _sentence(refused: Sequence[tuple[Token, bool]]) -> str:
+def _write_sentence(refused: Sequence[tuple[Token, bool]]) -> str:
     """Return the sentence of all that is refused, with its lines, and the remedy of each kind."""
     values = dict.fromkeys(token.word for token, is_value in refused if is_value)
     foreign = [token for token, is_value in refused if not is_value]
@@ -427,7 +427,7 @@ def _refuse_numbers_without_effect(
     set_at: dict[str, int] = {}
     for before, token, after in zip(words, words[1:], words[2:], strict=False):
         if define or before.word == "DefineConstant":
-            define += _level_change(token.word)
+            define += _change_level(token.word)
         elif token.kind == "name" and after.word in ("=", "In") and before.word != ".":
             set_at.setdefault(token.word, token.line)
     if len(words) > 1 and words[0].kind == "name" and words[1].word == "=":

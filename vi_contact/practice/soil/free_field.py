@@ -120,7 +120,7 @@ class FreeFieldSide:
             raise InputError("FreeField has a soil column of first order: give assemble degree=1")
         self._section: Section = forms.section
         self._dashpots = PetscMatrix(absorber.mat)
-        self.column, self._sign = _column(self.space, forms, self.side)
+        self.column, self._sign = _make_column(self.space, forms, self.side)
 
         # Nodes of the side on this rank, and the node of the column at the height of each.
         self._blocks = self.space.facet_blocks(self.side.facets.indices)
@@ -186,7 +186,7 @@ class FreeFieldSide:
         return self.space.pull(force.ravel())
 
 
-def _column(space: FemSpace, forms: Any, side: FreeField) -> tuple[SoilColumn, float]:
+def _make_column(space: FemSpace, forms: Any, side: FreeField) -> tuple[SoilColumn, float]:
     """Return the column beside the side, the same on every rank, and the sign of its normal.
 
     The sign is that of the x component of the side's outward normal.

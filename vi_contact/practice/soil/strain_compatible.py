@@ -130,7 +130,7 @@ def strain_compatible(
 
 def _refuse_two_curves(pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm) -> None:
     """Raise InputError for cells of two pairs. Collective."""
-    named = _cells_with_curves(pairs)
+    named = _list_cells_with_curves(pairs)
     doubled = len(np.unique(named)) < len(named)
     refuse([f"{OWNER}: some cells have two curves: give one" if doubled else ""], comm)
 
@@ -155,7 +155,7 @@ def _refuse_strains_beyond_curves(
     refuse(faults, comm)
 
 
-def _cells_with_curves(pairs: Sequence[tuple[Any, SoilCurves]]) -> Any:
+def _list_cells_with_curves(pairs: Sequence[tuple[Any, SoilCurves]]) -> Any:
     """Return the numbers of all cells of the pairs on this rank, as often as they are named."""
     return np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
 
@@ -169,7 +169,7 @@ def _refuse_lost_ratios(
     """
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio
-    named = _cells_with_curves(pairs)
+    named = _list_cells_with_curves(pairs)
     for cells, own_material in material:
         outside = largest(comm, len(np.setdiff1d(cells.indices, named)))
         if not outside and isinstance(own_material, LinearElastic) and own_material.xi:

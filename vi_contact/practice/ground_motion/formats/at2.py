@@ -74,7 +74,7 @@ def read(text: TextFile) -> Record:
 
     Units and dt are needed only where the file does not state them.
     """
-    npts, stated_dt, start = _header(text)
+    npts, stated_dt, start = _read_header(text)
     filled_lines = [index for index in range(start) if text.heads[index].strip()]
     believed = [index for index in filled_lines if not _is_title_of_ours(text, index)]
     header = [" ".join(text.heads[index].split()) for index in filled_lines]
@@ -132,7 +132,7 @@ def _find_units(text: TextFile, indices: list[int]) -> tuple[int | None, str | N
     return first_line, first_units
 
 
-def _header(text: TextFile) -> tuple[Statement | None, Statement | None, int]:
+def _read_header(text: TextFile) -> tuple[Statement | None, Statement | None, int]:
     """Return NPTS and DT, each with its line or None, and the index of the first data line."""
     counts: list[Statement] = []
     steps: list[Statement] = []

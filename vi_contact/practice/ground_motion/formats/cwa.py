@@ -21,7 +21,7 @@ _DIRECTION = re.compile(r"^([^()]*+)\(([+-])\)$")
 
 def recognises(text: TextFile) -> bool:
     """Tell whether two of the three entries are there that say what the columns are."""
-    header = _header(text)
+    header = _read_header(text)
     keys = ("SAMPLERATE(HZ)", "AMPLITUDEUNIT", "DATASEQUENCE")
     return sum(key in header for key in keys) >= 2
 
@@ -31,7 +31,7 @@ def read(text: TextFile) -> Record:
 
     ``channel`` is 1 for the one after the time, or its name such as "U".
     """
-    header = _header(text)
+    header = _read_header(text)
     sequence_line, sequence = text.entry(header, "DATASEQUENCE")
     first, *names = [" ".join(part.split()) for part in re.split(r"[;\s]+", sequence) if part]
     if first.lower() != "time" or not names:
@@ -142,7 +142,7 @@ def _check_rate(
     return rate_line, rate
 
 
-def _header(text: TextFile) -> dict[str, tuple[int, str]]:
+def _read_header(text: TextFile) -> dict[str, tuple[int, str]]:
     """Return the line and the value of every key of "#Key: value"; of two alike the first."""
     entries: dict[str, tuple[int, str]] = {}
     for index, line in enumerate(text.heads[:60]):

@@ -77,9 +77,9 @@ def read(text: TextFile) -> Record:
 
     ``channel`` is 1 for the first of the file, or its name such as "S16W".
     """
-    parts = list(_parts(text))
+    parts = list(_find_parts(text))
     part = parts[text.choose([part.name for part in parts])]
-    values, lines = _samples(text, part)
+    values, lines = _read_samples(text, part)
 
     # Number of samples and step, which the header states more than once.
     header = range(part.start, part.start + TEXT_LINES)
@@ -123,7 +123,7 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _parts(text: TextFile) -> Iterator[_Part]:
+def _find_parts(text: TextFile) -> Iterator[_Part]:
     """Yield the components of the file, which follow one another without a gap."""
     start = 0
     total = len(text.lines)
@@ -136,7 +136,7 @@ def _parts(text: TextFile) -> Iterator[_Part]:
                 f"{text.at(start)}: a component should begin here with 'Corrected accelerogram' or "
                 "'Uncorrected accelerogram'; lines were lost or added, get the complete file"
             )
-        integers = _fields(text, start + TEXT_LINES, INTEGER_LINES)
+        integers = _read_fields(text, start + TEXT_LINES, INTEGER_LINES)
         names = [match[1] for match in map(_COMPONENT.search, head) if match]
         counts = tuple(int(count) for count in integers[COUNTS])
         part = _Part(start, names[0] if names else "", counts)
@@ -150,7 +150,7 @@ def _parts(text: TextFile) -> Iterator[_Part]:
         start = part.end
 
 
-def _fields(text: TextFile, start: int, lines: int) -> list[float]:
+def _read_fields(text: TextFile, start: int, lines: int) -> list[float]:
     """Return the values of lines of ten fields."""
     values: list[float] = []
     for index in range(start, start + lines):
@@ -164,7 +164,7 @@ def _fields(text: TextFile, start: int, lines: int) -> list[float]:
     return values
 
 
-def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
+def _read_samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
     """Return the accelerations as they are written, and the index of the line of each."""
     values: list[float] = []
     lines: list[int] = []
@@ -187,6 +187,12 @@ def _read_first(
     """Return the line and the number of the first match.
 
     Raises InputError, which names the quantity that is missing, where there is none.
+
+    Args:
+        text: the file.
+        header: indices of the lines of the header.
+        pattern: with the number in a group.
+        quantity: that it states, in words for messages.
     """
     for index in header:
         match = pattern.search(text.heads[index])
@@ -207,7 +213,14 @@ def _find_number(text: TextFile, header: range, pattern: re.Pattern[str]) -> flo
 
 
 def _check_step(text: TextFile, part: _Part, step: Statement, count: float) -> None:
-    """Raise InputError unless the step agrees with the one among the reals, and the duration."""
+    """Raise InputError unless the step agrees with the one among the reals, and the duration.
+
+    Args:
+        text: the file.
+        part: the component.
+        step: line that states the step, and the step [s].
+        count: number of accelerations.
+    """
     step_line, seconds_of_step = step
     if seconds_of_step <= 0.0:
         raise InputError(
