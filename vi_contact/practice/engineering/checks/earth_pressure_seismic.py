@@ -120,7 +120,8 @@ class _Layer(EarthPressure):
     def find_added_thrust(self, t: Array, push: Array) -> tuple[float, float, str]:
         """Return the largest Q [N/m], its height [m], and why the theory does not apply, or "".
 
-        ``push`` (n,) is the acceleration of the ground towards the wall at times t (n,) [m/s²].
+        ``push`` (n,) is the acceleration with which inertia presses the soil on the wall, at times
+        t (n,) [m/s²]: that of the ground away from the wall.
         """
 
     def numbers(self, history: History) -> Numbers:
